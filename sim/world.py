@@ -139,8 +139,10 @@ def _shapes(model: WorldModel, source: Source) -> tuple[Shape, ...]:
         found.append(replace(outline, corners=()))
     for i, ends in enumerate(model.segments):
         found.append(wall(f"segments[{i}]", *ends, source.line(("segments", i))))
-    for key in ("boxes", "circles", "polygons"):
-        for i, item in enumerate(getattr(model, key)):
+    boxes, circles, polygons = model.boxes, model.circles, model.polygons
+    areas: dict[str, Any] = {"boxes": boxes, "circles": circles, "polygons": polygons}
+    for key, items in areas.items():
+        for i, item in enumerate(items):
             found.append(item.shape(f"{key}[{i}]", source.line((key, i))))
     return tuple(found)
 

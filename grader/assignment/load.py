@@ -51,10 +51,7 @@ class LoadedAssignment:
         return None if own else str(place.absolute())
 
     def scenarios_of(self, bound: BoundCheck) -> tuple[Scenario, ...]:
-        """The scenarios that a check judges: those that it names, or all.
-
-        A check of the submission itself has none.
-        """
+        """The scenarios that a check of a run judges: those that it names, or all."""
         if bound.check.subject is Subject.SUBMISSION:
             return ()
         wanted = bound.spec.scenarios

@@ -59,10 +59,7 @@ def load_function(text: str, folder: Path) -> Callable[..., Any]:
     """Load the function that ``file.py:function`` names, without looking at its arguments."""
     match = _FORM.fullmatch(text)
     if not match:
-        raise ValueError(
-            f"{text!r} does not name a function: write 'file.py:function', with the file "
-            "beside assignment.yaml"
-        )
+        raise ValueError(f"{text!r} does not name a function: write 'file.py:function'")
     file, name = folder / match[1], match[2]
     module = _module(file)
     function = vars(module).get(name)
@@ -131,11 +128,7 @@ def _parameters(
 
 
 def lesson_checks(assignment: Path) -> Mapping[str, Check]:
-    """The checks in the package of an assignment's folder, by name.
-
-    Raises:
-        ValueError: A module cannot be imported, or a name is taken; the text says where.
-    """
+    """The checks in the package of an assignment's folder, by name."""
     folder = assignment / FOLDER
     files = sorted(folder.glob("*.py"))
     if not files:

@@ -61,11 +61,8 @@ def why_destroyed(
         ):
             return None
     when_s = recording.since_launch_s(last_ns)
-    nodes = {item.node for item in found}
-    gone = {node.name for node in recording.student_nodes if node.vanished_ns is not None}
-    own = " with its node" if nodes <= gone else ""
     return Cause(
-        f"{seen}: {what} was destroyed{own} {when_s:.2f} s after launch, while the process ran on",
+        f"{seen}: {what} was destroyed {when_s:.2f} s after launch, while the process ran on",
         _HINT,
         Evidence(moments=(Moment(f"{what.replace('`', '')} was destroyed", when_s),)),
     )

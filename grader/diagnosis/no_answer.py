@@ -11,7 +11,7 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_destroyed
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_endpoint import Word, offered
-from grader.diagnosis.process.blocked_executor import why_never_spun
+from grader.diagnosis.process.blocked_executor import HINT, why_never_spun
 from grader.diagnosis.process.process_exit import ended_early, exited, why_it_exited
 from grader.diagnosis.process.raised import (
     in_brackets,
@@ -142,9 +142,8 @@ def blocked_executor(symptom: NoAnswer) -> Cause | None:
         blocked = Cause(
             f"{symptom.what}: something blocks the executor; the node's parameter services answer "
             "no call either",
-            "A callback must return soon. Look for `while True`, time.sleep() or input() in it, "
-            "and for a call() of another service, which waits for an answer that the same "
-            "executor would have to take in: use call_async().",
+            f"{HINT} A call() of another service waits for an answer that the same executor would "
+            "have to take in: use call_async().",
         )
     observed = f"{blocked.observed if blocked else ''}{in_brackets(symptom.place)}"
     return blocked and replace(blocked, observed=observed, evidence=symptom.evidence)

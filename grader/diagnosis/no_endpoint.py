@@ -218,15 +218,19 @@ def misspelt_name(symptom: NoEndpoint) -> Cause | None:
         for item in symptom.there
         if not ended or declarations.process_of(symptom.recording, item.node) in (None, *ended)
     ]
-    found = f"the node {symptom.word.does} {{}} instead of {code(wanted)}"
-    for item in suspects:
-        why, hint = _difference(wanted, item)
-        if why:
-            return Cause(f"{found.format(code(item.name))}: {why}", hint, symptom.evidence)
-    match = nearest(wanted, [item.name for item in suspects])
-    base = wanted.rpartition("/")[2]
+    base, match = wanted.rpartition("/")[2], None
     hint = f"Write the name as '{base}': {symptom.create}."
-    return Cause(found.format(code(match)), hint, symptom.evidence) if match else None
+    why = ""
+    for item in suspects:
+        prefix = item.name.removesuffix(wanted)
+        if item.name.lower() == wanted.lower():
+            match, why = item.name, ": upper and lower case differ"
+        elif prefix != item.name:
+            match, why = item.name, f": {code(prefix)} stands in front of the name"
+            hint += " Without `~/`, which puts the node's name in front, and without a namespace."
+    match = match or nearest(wanted, [item.name for item in suspects])
+    found = f"the node {symptom.word.does} {code(match or '')} instead of {code(wanted)}{why}"
+    return Cause(found, hint, symptom.evidence) if match else None
 
 
 @explanation(NoEndpoint)
@@ -239,7 +243,7 @@ def process_crashed(symptom: NoEndpoint) -> Cause | None:
 def never_appeared(symptom: NoEndpoint) -> Cause | None:
     """The process created it, but it never appeared in the ROS graph."""
     noun, name = symptom.word.noun, symptom.name
-    if not declarations.declares(symptom.recording, noun, "topic", name):
+    if not declarations.declares(symptom.recording, noun, topic=name):
         return None
     return why_never_appeared(symptom.recording, f"a {noun} on {code(name)}")
 
@@ -294,46 +298,11 @@ def _of_students(recording: Recording, word: Word) -> tuple[Service, ...]:
 def _is_own(service: Service) -> bool:
     """Whether every node has such a service by itself, or an action brings it along."""
     prefix, _, base = service.name.rpartition("/")
-    return "/_action/" in service.name or (
-        prefix == service.node and _OWN_SERVICE.fullmatch(base) is not None
-    )
+    of_node = prefix == service.node and _OWN_SERVICE.fullmatch(base) is not None
+    return of_node or "/_action/" in service.name
 
 
 def _action(service: Service) -> Service:
     """The action, with its own name and type, by the service that takes its goals."""
     name, type_ = service.name.removesuffix(_SEND_GOAL), service.type.removesuffix("_SendGoal")
     return Service(name, type_, service.node, service.appeared_ns, service.vanished_ns)
-
-
-def _difference(wanted: str, item: Service) -> tuple[str, str]:
-    """How a name differs that is the same but for its case or its place, and what to try."""
-    base = wanted.rpartition("/")[2]
-    if item.name.lower() == wanted.lower():
-        return (
-            "upper and lower case differ",
-            f"Names in ROS are case-sensitive: write '{base}'.",
-        )
-    prefix, namespace = item.name.removesuffix(wanted), item.node.rpartition("/")[0]
-    if prefix == item.node:
-        return (
-            "a private name, below the node's own name",
-            f"`~/{base}` puts the node's name in front: write '{base}', without `~/`.",
-        )
-    if prefix != item.name and prefix == namespace:
-        return (
-            f"the node is in the namespace {code(namespace)}, and a relative name goes there "
-            "with it",
-            f"Create the node without namespace, or write the absolute name '{wanted}'.",
-        )
-    if prefix != item.name:
-        return (
-            f"{code(prefix)} stands in front of the name",
-            f"Write '{wanted.lstrip('/')}' in the code, with nothing before it.",
-        )
-    if wanted.endswith(item.name):
-        return (
-            "an absolute name, which stays outside of the node's namespace",
-            f"Begin the name without `/`: '{item.name.lstrip('/')}' is relative, and ROS puts "
-            "the node's namespace in front of it.",
-        )
-    return "", ""

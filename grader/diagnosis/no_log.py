@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from grader.checks.finding import Evidence, Moment, Table
+from grader.checks.finding import Evidence, Moment
 from grader.checks.first_seen import endpoints_seen, first_seen
-from grader.checks.value import number_at
-from grader.checks.wording import code, counted, listing, value_text
+from grader.checks.wording import code, counted, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
@@ -83,9 +82,9 @@ class NotLogged(Symptom[Cause]):
         lines = output_lines(self.recording)
         return [line for line in lines if begin_ns <= line.time_ns <= end_ns]
 
-    def evidence(self, label: str, line: LogLine) -> Evidence:
-        """A line, and others near the messages."""
-        moment = Moment(label, self.recording.since_launch_s(line.time_ns))
+    def evidence(self, line: LogLine) -> Evidence:
+        """A line with other values, and others near the messages."""
+        moment = Moment("other values logged", self.recording.since_launch_s(line.time_ns))
         log = [one.text for one in self.near if one != line][: _LOG_LINES - 1]
         return Evidence(moments=(moment,), log=(*log, line.text))
 
@@ -235,39 +234,6 @@ def only_some_logged(symptom: NotLogged) -> Cause | None:
 
 
 @explanation(NotLogged)
-def logged_late(symptom: NotLogged) -> Cause | None:
-    """The values are logged too late: a callback takes too long, or another callback logs them."""
-    recording, topic, last = symptom.recording, symptom.topic, symptom.wanted[-1]
-    carried = [
-        Wanted(
-            message, {path: number_at(message.value, path) for path in last.values}, last.ready_ns
-        )
-        for message in recording.carried(topic)
-    ]
-    for line in reversed(output_lines(recording)):
-        printed = numbers(line.text)
-        late_ns = min(
-            (
-                line.time_ns - item.due_ns
-                for item in carried
-                if item.message.stamp_ns <= line.time_ns
-                and shown(printed, item, symptom.decimals) == set(item.values)
-            ),
-            default=0,
-        )
-        if late_ns > symptom.within_ns:
-            return Cause(
-                f"the values of {code(topic)} are logged too late: {quote(line.text)} was written "
-                f"{format_duration(late_ns / NS)} after that message had come",
-                f"Log in the callback of {code(topic)} itself, from the message that it is given. "
-                "A callback must return at once: look for time.sleep(), input() or a loop in one "
-                "of the callbacks. What comes meanwhile waits for its end.",
-                symptom.evidence("logged too late", line),
-            )
-    return None
-
-
-@explanation(NotLogged)
 def no_f_string(symptom: NotLogged) -> Cause | None:
     """The lines show braces in place of values: the f before the quotes is missing."""
     line = _meant(symptom)
@@ -279,13 +245,13 @@ def no_f_string(symptom: NotLogged) -> Cause | None:
         f"of a value: {quote(line.text)}",
         "Python fills in braces only where an f stands before the quotes: "
         "f'... {value}' instead of '... {value}'.",
-        symptom.evidence("other values logged", line),
+        symptom.evidence(line),
     )
 
 
 @explanation(NotLogged)
 def other_values(symptom: NotLogged) -> Cause | None:
-    """The lines show other values: another field, exchanged names, few decimals."""
+    """The lines show other values: another field, exchanged names, an older message."""
     line, item, decimals = _meant(symptom), symptom.wanted[-1], symptom.decimals
     if line is None:
         return None
@@ -296,16 +262,13 @@ def other_values(symptom: NotLogged) -> Cause | None:
     lines = "\n".join(logged_text(one.text) for one in symptom.near)
     pair = exchanged(lines, item.values, decimals)
     how = f", where {listing(map(code, pair))} are exchanged" if pair else ""
-    rows = tuple((path, value_text(value)) for path, value in item.values.items())
     fields = listing(code(f"msg.{path}") for path in missing)
     return Cause(
         f"log lines follow messages on {code(symptom.topic)}, but none shows {values}: "
         f"{quote(line.text)}{how}",
-        f"Log the fields of the message that the callback is given: {fields}.",
-        replace(
-            symptom.evidence("other values logged", line),
-            tables=(Table(f"A message on {symptom.topic}", ("field", "value"), rows),),
-        ),
+        f"Log the fields of the message that the callback is given: {fields}. A callback must "
+        "return at once: after time.sleep() or a loop it is given old messages.",
+        symptom.evidence(line),
     )
 
 
@@ -314,13 +277,12 @@ def nothing_logged(symptom: NotLogged) -> Cause:
     """Nothing is logged when a message comes."""
     recording, topic = symptom.recording, symptom.topic
     lines = output_lines(recording)
-    spins = any(call.answered_ns is not None for call in recording.calls)
     return Cause(
         f"nothing is logged when messages come on {code(topic)}: the subscription is there, its "
-        f"type and its QoS match{', and its executor spins' if spins else ''}"
-        + (f"; the process wrote {quote(lines[0].text)}" if lines else ""),
-        "Is the line reached that logs what the message says? What debug() logs is not shown by "
-        "default, an `except: pass` hides an error, and an `if` may leave messages out.",
+        "type and its QoS match" + (f"; the process wrote {quote(lines[0].text)}" if lines else ""),
+        "Is the line reached, in the callback of this topic, that logs what the message says? What "
+        "debug() logs is not shown by default, an `except: pass` hides an error, and an `if` may "
+        "leave messages out.",
         Evidence(
             moments=first_seen(recording, recording.carried(topic)),
             log=tuple(line.text for line in lines[:_LOG_LINES]),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from grader.checks.doubt import was_held_up
 from grader.checks.finding import Evidence, Moment
-from grader.checks.first_seen import endpoints_seen
+from grader.checks.first_seen import endpoints_seen, first_seen
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unpublished, why_unsubscribed
@@ -105,11 +105,8 @@ class FewMessages(OnTopic):
 
     @property
     def moments(self) -> tuple[Moment, ...]:
-        """When the first messages came."""
-        return tuple(
-            Moment(f"message {index}", self.recording.since_launch_s(message.stamp_ns))
-            for index, message in enumerate(self.recording.on(self.topic)[:10], start=1)
-        )
+        """When the first message came."""
+        return first_seen(self.recording, self.recording.on(self.topic))
 
 
 @dataclass(frozen=True)

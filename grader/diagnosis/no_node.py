@@ -53,7 +53,7 @@ class NoNode(Symptom[Cause]):
 
     def declares(self, kind: str) -> bool:
         """Whether the process declared something of a kind."""
-        return declarations.said(self.recording, kind, self.process.name)
+        return declarations.declares(self.recording, kind, self.process.name)
 
 
 @dataclass(frozen=True)

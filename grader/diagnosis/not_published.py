@@ -30,7 +30,6 @@ _LOG_LINES = 5
 _STARVED = 0.5
 # Without what the host took: in so long a node answers what it was asked.
 _OWN_S = 2.0
-# After so many periods of silence a timer has stopped.
 _ENDED_PERIODS = 3.0
 
 
@@ -119,7 +118,7 @@ def no_answer(symptom: NoMessages) -> Cause | None:
 def no_timer(symptom: NoMessages) -> Cause | None:
     """No timer was created, so nothing calls the callback that publishes."""
     recording = symptom.recording
-    traced, timer = declarations.traced(recording), declarations.said(recording, "timer")
+    traced, timer = declarations.traced(recording), declarations.declares(recording, "timer")
     if not traced or timer or _heard(recording, symptom.topic):
         return None
     return Cause(
@@ -138,9 +137,9 @@ def publish_not_reached(symptom: NoMessages) -> Cause:
     heard = _heard(recording, symptom.topic)
     periods = [format_duration(timer.period_s) for timer in _firing(recording)]
     although = ""
-    if heard and not declarations.said(recording, "timer"):
+    if heard and not declarations.declares(recording, "timer"):
         although = f", although {heard} reached the node"
-    elif periods and declarations.said(recording, "spin"):
+    elif periods and declarations.declares(recording, "spin"):
         although = f", although the process declared a timer of {listing(periods)}"
     return Cause(
         _idle(symptom) + although,
@@ -163,12 +162,16 @@ def publishing_stopped(symptom: FewMessages) -> Cause:
             "Publish from the callback of a timer, which goes on as long as the node spins.",
             evidence,
         )
-    timers = f"; the process declared a timer of {listing(map(format_duration, period_s))}"
+    # After so many periods of silence a timer has stopped.
     silent_s = (recording.stop_ns - recording.on(symptom.topic)[-1].stamp_ns) / NS
     stopped = silent_s > _ENDED_PERIODS * max(period_s)
-    last = f", none in the last {format_duration(silent_s)}" if stopped else ""
     is_slow = symptom.needed * min(period_s) > symptom.watched_s and not stopped
-    return Cause(f"{symptom.seen}{last}{timers}", SECONDS_HINT if is_slow else ENDED_HINT, evidence)
+    return Cause(
+        f"{symptom.seen}; the process declared a timer of "
+        f"{listing(map(format_duration, period_s))}",
+        SECONDS_HINT if is_slow else ENDED_HINT,
+        evidence,
+    )
 
 
 def _idle(symptom: NoMessages) -> str:

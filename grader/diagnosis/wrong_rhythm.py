@@ -199,7 +199,7 @@ def sleeping_loop(symptom: WrongRhythm) -> Cause | None:
     if not longer or not symptom.verdict.regular or symptom.timers_s:
         return None
     recording = symptom.recording
-    no_timer = declarations.traced(recording) and not declarations.said(recording, "timer")
+    no_timer = declarations.traced(recording) and not declarations.declares(recording, "timer")
     beginning = "the process declared no timer: " if no_timer else ""
     return Cause(
         f"{beginning}it looks like {format_duration(wanted_s)} of sleeping plus "

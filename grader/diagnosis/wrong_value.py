@@ -72,9 +72,8 @@ def not_a_number(symptom: WrongValue) -> str | None:
     bad = next((one for one in symptom.numbers if not math.isfinite(one.observed)), None)
     if bad is None or not math.isfinite(bad.expected):
         return None
-    if math.isnan(bad.observed):
-        return f"{bad.field} is not a number: look for 0/0 or the root of a negative number"
-    return f"{bad.field} is infinite: look for a division by zero or a range that sees nothing"
+    what = "not a number" if math.isnan(bad.observed) else "infinite"
+    return f"{bad.field} is {what}: look for a division by zero, and a range that sees nothing"
 
 
 @explanation(WrongValue)

@@ -23,8 +23,7 @@ class ScenarioFinding:
     """A finding and what it was found in.
 
     Attributes:
-        scenario: Id of the scenario; None for the submission itself, and for a check that
-            was skipped.
+        scenario: Its id; None for the submission itself, and for a check that was skipped.
         traceback: Where the check itself failed, for the instructor; else empty.
     """
 

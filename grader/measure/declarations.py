@@ -41,25 +41,29 @@ def traced(recording: Recording, process: str | None = None) -> bool:
     return bool(started) and all(item.name in started for item in recording.processes)
 
 
-def said(recording: Recording, kind: str, process: str | None = None) -> bool:
-    """Whether the process (or any) declared something of a kind, such as ``spin``."""
-    return any(process in (None, item.process) for item in recording.declared(kind))
+def declares(recording: Recording, kind: str, process: str | None = None, **texts: str) -> bool:
+    """Whether a process (or any) declared something, such as a ``publisher`` on a ``topic``."""
+    return any(
+        process in (None, item.process)
+        and all(_text(item.data, key) == value for key, value in texts.items())
+        for item in recording.declared(kind)
+    )
 
 
 def never_spun(recording: Recording, process: str | None = None) -> bool:
     """Whether the tracer was there and no executor ever waited for work."""
-    return traced(recording, process) and not said(recording, "spin", process)
+    return traced(recording, process) and not declares(recording, "spin", process)
 
 
 def in_no_executor(recording: Recording, node: str) -> bool:
     """Whether the process of a node spun, but gave this node to no executor."""
     process = process_of(recording, node)
-    if process is None or not declares(recording, "node", "node", node):
+    if process is None or not declares(recording, "node", node=node):
         return False
     spins = [item.data for item in recording.declared("spin") if item.process == process.name]
     # Older recordings do not tell, and neither does an EventsExecutor, which is made in C++.
     tells = bool(spins) and all("tells_added" in spin for spin in spins)
-    return tells and not declares(recording, "added", "node", node)
+    return tells and not declares(recording, "added", node=node)
 
 
 def exiting_ns(recording: Recording, process: str) -> int | None:
@@ -152,11 +156,6 @@ def left_open(recording: Recording, kind: Kind, topic: str, node: str) -> frozen
     )
 
 
-def declares(recording: Recording, kind: str, key: str, value: str) -> bool:
-    """Whether a declaration of a kind holds a text, such as a ``publisher`` on a ``topic``."""
-    return any(_text(item.data, key) == value for item in recording.declared(kind))
-
-
 def not_in_callback(recording: Recording, topic: str) -> bool:
     """Whether no executor had called what published the newest message that was declared.
 
@@ -168,9 +167,7 @@ def not_in_callback(recording: Recording, topic: str) -> bool:
         if item.time_ns <= recording.stop_ns and _text(item.data, "topic") == topic
     ]
     # What an EventsExecutor calls, it calls from C++.
-    return published[-1:] == [False] and not declares(
-        recording, "spin", "executor", "EventsExecutor"
-    )
+    return published[-1:] == [False] and not declares(recording, "spin", executor="EventsExecutor")
 
 
 def changed_environment(recording: Recording) -> list[str]:

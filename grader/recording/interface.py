@@ -170,12 +170,7 @@ def _full_type(name: str, package: str) -> str:
 
 
 def definition_finder(prefixes: Iterable[Path]) -> Callable[[str], str]:
-    """Make a function that reads definitions from install prefixes.
-
-    Returns:
-        A function from ``package/msg/Name`` (or ``srv``, ``action``) to the file's text; KeyError
-        if there is none.
-    """
+    """Make a function from ``package/msg/Name`` to its text; KeyError where there is none."""
     folders = tuple(prefixes)
 
     def find(interface: str) -> str:

@@ -169,12 +169,7 @@ def _in_order(messages: Mapping[str, list[Message]]) -> dict[str, tuple[Message,
 
 
 def read_topic(file: Path, topic: str) -> tuple[tuple[Message, ...], tuple[str, ...]]:
-    """The messages on one topic of any MCAP file with messages of ROS 2, and its topics.
-
-    Raises:
-        OSError: The file cannot be read.
-        ValueError: It is damaged, or no MCAP file.
-    """
+    """The messages on one topic of any MCAP file of ROS 2, and its topics."""
     found = []
     topics = set()
     with file.open("rb") as stream:

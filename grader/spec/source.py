@@ -56,12 +56,7 @@ class Source:
         return Problem(message=message, line=self.line(place), where=path(place))
 
     def duplicates(self, name: str, *keys: str) -> Iterator[Problem]:
-        """Entries of some lists that have the name of an earlier one.
-
-        Args:
-            name: Key of each entry that it is named by.
-            keys: Of the lists, at the top.
-        """
+        """Entries of the lists under some keys that have the name of an earlier one."""
         seen: dict[str, Place] = {}
         for key in keys:
             for index, entry in enumerate(self.data.get(key, ())):
@@ -71,19 +66,19 @@ class Source:
                     first = self.line(seen[value])
                     yield self.problem(place, f"{value!r} stands twice (first in line {first})")
 
-    def read(self, model: type[M], place: Place = ()) -> M:
-        """Validate the document, or a part of it, as a model.
-
-        Args:
-            place: The part to read; a part that was not written down reads as empty.
-        """
-        result, problems = self.examine(model, place)
+    def read(self, model: type[M]) -> M:
+        """Validate the document as a model."""
+        result, problems = self.examine(model)
         if result is None:
             raise AssignmentError(self.file, problems)
         return result
 
     def examine(self, model: type[M], place: Place = ()) -> tuple[M | None, list[Problem]]:
-        """Validate like :meth:`read`: the model and no problem, or None and at least one."""
+        """Validate a part; one that was not written down reads as empty.
+
+        Returns:
+            The model and no problem, or None and at least one.
+        """
         # Strict in the way of JSON: a list is a tuple and a word is an enum's member, but true
         # is no number and '3' neither. By alias only: the name in Python is no key of the YAML.
         text = json.dumps(self._part(place))

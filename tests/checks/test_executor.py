@@ -60,8 +60,8 @@ class TestGood:
             # The word of a process that never answers counts for nothing.
             (3.1, calls(None), Status.FAILED),
         ):
-            said = (declared("started"), declared("spin", spin_s))
-            run = recording(calls=calls_, declarations=said, **quiet)
+            traced = (declared("started"), declared("spin", spin_s))
+            run = recording(calls=calls_, declarations=traced, **quiet)
             assert responsive(run).status is status
 
     def test_a_call_too_late_to_be_answered_before_the_end(self):
@@ -169,8 +169,8 @@ class TestBlocked:
 
     def test_a_node_that_no_executor_has(self):
         spin = declared("spin", executor="SingleThreadedExecutor", threads=1, tells_added=True)
-        told = (*declarations(spin=False), spin)
-        found = failing("executor.responsive", recording(calls=calls(None), declarations=told))
+        traced = (*declarations(spin=False), spin)
+        found = failing("executor.responsive", recording(calls=calls(None), declarations=traced))
         assert ": an executor spins, but" in found
         assert "`/bot_publisher` was not given to it" in found
 

@@ -102,7 +102,7 @@ def verdict(subject: Recording, **changes):
     return judge("messages.follows", subject, **{**PARAMETERS, **changes})
 
 
-def told(subject: Recording) -> str:
+def failure(subject: Recording) -> str:
     return failing("messages.follows", subject, **PARAMETERS)
 
 
@@ -174,7 +174,7 @@ class TestExplains:
         ],
     )
     def test_a_wrong_heading(self, theta, words):
-        found = told(run(lambda t: status(place(t)[0], theta(place(t)[1]), place(t)[2])))
+        found = failure(run(lambda t: status(place(t)[0], theta(place(t)[1]), place(t)[2])))
         assert "`pose.theta` = " in found
         assert words in found
         assert "yaw(pose.pose.orientation)" in found
@@ -191,7 +191,7 @@ class TestExplains:
             z = turned(time_s)["pose"]["pose"]["orientation"]["z"]
             return status(place(time_s)[0], 2.0 * math.asin(z), place(time_s)[2])
 
-        found = told(from_sources(turned, values))
+        found = failure(from_sources(turned, values))
         assert "it is 2 asin(z), which is wrong where w is negative" in found
         assert verdict(from_sources(turned, right)).status is Status.PASSED
 
@@ -201,12 +201,12 @@ class TestExplains:
             off = 1.0 if time_s in (TIMES[20], TIMES[40]) else 0.0
             return status(x + off, heading + off, speed + off)
 
-        found = told(run(values))
+        found = failure(run(values))
         assert "2 of 60 messages wrong" in found
         assert "it is" not in found
 
     def test_another_field_of_the_source(self):
-        found = told(run(lambda t: status(-2.0 * place(t)[0], *place(t)[1:])))
+        found = failure(run(lambda t: status(-2.0 * place(t)[0], *place(t)[1:])))
         assert "it is `pose.pose.position.y`" in found
 
     def test_a_speed_that_has_lost_its_sign(self):
@@ -217,10 +217,10 @@ class TestExplains:
             return {**odometry(time_s), "twist": {"twist": {"linear": {"x": speed(time_s)}}}}
 
         subject = from_sources(sent, lambda t: status(*place(t)[:2], abs(speed(t))))
-        assert "without its sign" in told(subject)
+        assert "without its sign" in failure(subject)
 
     def test_fields_that_are_swapped(self):
-        found = told(run(lambda t: status(place(t)[2], place(t)[1], place(t)[0])))
+        found = failure(run(lambda t: status(place(t)[2], place(t)[1], place(t)[0])))
         assert "`pose.x`" in found and "it is `twist.twist.linear.x`" in found
         assert "`speed`" in found and "it is `pose.pose.position.x`" in found
 
@@ -229,7 +229,7 @@ class TestExplains:
             lambda t: {**odometry(t), "ranges": [1.0] * (60 - TIMES.index(t))},
             lambda t: status(-7.0 * place(t)[0], *place(t)[1:]),
         )
-        assert "`pose.x` = " in told(subject)
+        assert "`pose.x` = " in failure(subject)
 
     @pytest.mark.parametrize("items", [[], [1.0]])
     def test_an_array_that_is_too_short(self, items):
@@ -240,17 +240,17 @@ class TestExplains:
         assert "the array is too short" in found.observed
 
     def test_values_that_never_change(self):
-        found = told(run(lambda _: right(FIRST_S)))
+        found = failure(run(lambda _: right(FIRST_S)))
         assert "`pose.x` = 0 instead of" in found
         assert found.count("the same number in every message") == 1
 
     def test_values_that_lag(self):
-        found = told(run(lambda t: right(t - 1.0), times=TIMES[20:]))
+        found = failure(run(lambda t: right(t - 1.0), times=TIMES[20:]))
         assert "those of `/odom` 1.0" in found and "s earlier" in found
 
     def test_values_of_different_moments(self):
         mixed = run(lambda t: status(*place(t)[:2], place(t - 0.4)[2]), times=TIMES[10:])
-        assert "different moments" in told(mixed)
+        assert "different moments" in failure(mixed)
 
     def test_a_single_wrong_message_is_found(self):
         found = verdict(run(lambda t: right(t) if t != TIMES[30] else status(9.0, 0.0, 0.0)))

@@ -53,7 +53,7 @@ def verdict(run):
     return judge("qos.late_joiner", run, **LAST_10)
 
 
-def told(run):
+def failure(run):
     return failing("qos.late_joiner", run, **LAST_10)
 
 
@@ -74,18 +74,18 @@ def test_a_message_while_it_is_matched_counts_on_either_side():
 def test_a_message_right_after_the_match_counts_for_nothing_of_the_past():
     late = join(JOINED_S, matched_s=6.69)
     assert verdict(joined(9, joins=(late,))).status is Status.ERROR
-    assert "got 9 of the 12" in told(joined(9, depth=9, joins=(late,)))
+    assert "got 9 of the 12" in failure(joined(9, depth=9, joins=(late,)))
 
 
 def test_a_longer_queue():
-    found = told(joined(12, depth=100))
+    found = failure(joined(12, depth=100))
     assert "it got 12 of the 12 messages before it: the publisher's depth is 100" in found
     assert "depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL" in found
 
 
 def test_a_publisher_made_anew_for_each_message():
     own = tuple(endpoint(qos=LATCHED, appeared_s=0.35 + 0.1 * n) for n in range(12))
-    found = told(joined(12, endpoints=(*own, reader())))
+    found = failure(joined(12, endpoints=(*own, reader())))
     assert "of 12 publishers, each of which keeps its own" in found
     assert "Call create_publisher once" in found
 
@@ -94,7 +94,7 @@ def test_publishers_that_were_destroyed_took_along_what_they_kept():
     own = [endpoint(qos=LATCHED, appeared_s=0.3 + PERIOD_S * n) for n in range(12)]
     gone = [replace(item, vanished_ns=item.appeared_ns + NS // 2) for item in own[:-1]]
     run = joined(1, endpoints=(*gone, own[-1], reader()))
-    found = told(run)
+    found = failure(run)
     assert "lost with it, and 11 publishers were destroyed before it joined" in found
     assert "Call create_publisher once" in found
 
@@ -106,12 +106,12 @@ def test_a_publisher_that_was_out_of_sight_is_not_the_student_s_fault():
 
 
 def test_a_shorter_queue():
-    found = told(joined(9, depth=9))
+    found = failure(joined(9, depth=9))
     assert "it got 9 of the 12 messages before it: the publisher's depth is 9" in found
 
 
 def test_a_queue_that_nothing_declared():
-    assert "it got 3 of the 12 messages" in told(joined(3, declarations=()))
+    assert "it got 3 of the 12 messages" in failure(joined(3, declarations=()))
 
 
 def test_a_history_that_was_lost_is_not_the_student_s_fault():
@@ -121,7 +121,7 @@ def test_a_history_that_was_lost_is_not_the_student_s_fault():
 
 def test_a_lifespan_that_is_over():
     short = replace(LATCHED, lifespan_s=1.0)
-    found = told(joined(2, qos=short))
+    found = failure(joined(2, qos=short))
     assert "it got 2 of the 12 messages before it: the publisher's lifespan is 1 s" in found
     assert "Leave `lifespan` out" in found
 
@@ -153,7 +153,7 @@ def test_nothing_of_the_past():
 
 def test_too_few_were_published():
     few = messages(every(2.0, 3))
-    found = told(joined(0, messages=few, joined={}))
+    found = failure(joined(0, messages=few, joined={}))
     assert "3 messages on `/cmd_vel`" in found
 
 
@@ -165,7 +165,7 @@ def test_the_node_had_ended():
         processes=(died(1, exited_s=6.5),),
         messages=messages(every(0.4, 14)),
     )
-    assert "the run ended before it joined: the process" in told(run)
+    assert "the run ended before it joined: the process" in failure(run)
 
 
 def unheard(kept, published, **changes):
@@ -183,13 +183,13 @@ def test_where_nothing_is_subscribed_before_the_messages_numbers_tell_how_many_c
     finding = verdict(unheard(10, 12))
     assert finding.status is Status.PASSED
     assert finding.observed == "it got 10 of the 12 messages before it"
-    assert "got 9 of the 12 messages" in told(unheard(9, 12, depth=9))
-    assert "got 12 of the 12 messages" in told(unheard(12, 12, depth=100))
+    assert "got 9 of the 12 messages" in failure(unheard(9, 12, depth=9))
+    assert "got 12 of the 12 messages" in failure(unheard(12, 12, depth=100))
 
 
 @pytest.mark.parametrize("published", [0, 1, 10])
 def test_a_publisher_that_waits_for_a_subscription_fails(published):
-    found = told(unheard(published, published))
+    found = failure(unheard(published, published))
     assert f"before it, {published} message" in found
     assert "whether or not there is a subscription" in found
 
@@ -204,5 +204,5 @@ def test_where_nothing_is_subscribed_before_a_publisher_made_anew_is_named():
     own = [endpoint(qos=LATCHED, appeared_s=0.3 + PERIOD_S * n) for n in range(12)]
     gone = [replace(item, vanished_ns=item.appeared_ns + NS // 2) for item in own[:-1]]
     run = unheard(1, 1, endpoints=(*gone, own[-1], reader()))
-    found = told(run)
+    found = failure(run)
     assert "11 publishers were destroyed before it joined" in found

@@ -81,5 +81,5 @@ def test_what_the_machine_took_costs_no_point():
 @given(st.lists(st.floats(0.0, 0.5), min_size=1, max_size=20))
 def test_every_answer_within_the_pace_is_paired_with_its_question(delays):
     asked = [message(float(n)) for n in range(len(delays))]
-    said = [message(n + delay) for n, delay in enumerate(delays)]
-    assert answers_to(asked, said, 600_000_000) == said
+    answers = [message(n + delay) for n, delay in enumerate(delays)]
+    assert answers_to(asked, answers, 600_000_000) == answers

@@ -354,12 +354,6 @@ class TestOtherValues:
     def test_nothing_is_kept_of_the_loggers_own_numbers(self):
         assert "none shows" in front(lines("[INFO] [1.834] [bot]: hello", SCAN_TIMES_S))
 
-    def test_values_that_are_logged_in_the_other_callback(self):
-        found = position(lines("1.37 -0.62", SCAN_TIMES_S))
-        assert "are logged too late: `1.37 -0.62` was written 2.01 s after" in found
-        assert "Log in the callback of `/odom` itself" in found
-
-
 class TestWhatKeepsLinesBack:
     def test_lines_of_several_threads_in_another_order(self):
         values = (1.25, 2.5, 3.75, 4.5)

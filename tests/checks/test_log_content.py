@@ -103,7 +103,7 @@ class TestLevel:
         run = logging(logs("a"), logs("b", 2.0, level="WARN"))
         assert judge("log.level", run, at_most="WARN").status is Status.PASSED
 
-    def test_the_first_above_is_told(self):
+    def test_the_first_above_is_named(self):
         run = logging(logs("a"), logs("no map", 2.0, level="ERROR"))
         found = failing("log.level", run, at_most="WARN")
         assert "1 log message above it, the first ERROR: `no map`" in found

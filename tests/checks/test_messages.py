@@ -58,7 +58,7 @@ def unequal(value):
 
 
 class TestCount:
-    def test_messages_of_other_bytes_are_told(self):
+    def test_messages_of_other_bytes_are_named(self):
         run = replace(recording(messages=messages(every(0.3, 2))), unreadable={"/cmd_vel": 1})
         assert UNREADABLE in failing("messages.count", run, topic="/cmd_vel", at_least=3)
         assert UNREADABLE in failing("messages.equal", run, topic="/cmd_vel", value=VALUE)
@@ -214,7 +214,7 @@ class TestEqual:
     def test_the_hint_depends_on_whether_other_messages_are_right(self, values, hint):
         assert hint in equal(stream(*values)).hint
 
-    def test_expected_is_told_with_the_rest(self):
+    def test_expected_is_stated_with_the_rest(self):
         assert equal(recording()).expected == (
             "linear.x = 1.0, angular.z = 0.5, all else 0 in every message on `/cmd_vel`"
         )

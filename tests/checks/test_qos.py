@@ -47,7 +47,7 @@ class TestOffered:
         )
         assert "qos_profile_sensor_data is best_effort" in finding.hint
 
-    def test_a_stronger_offer_is_told_to_match_all_the_same(self):
+    def test_a_stronger_offer_is_stated_to_match_all_the_same(self):
         found = failing("qos.offered", offering(LATCHED), topic="/cmd_vel", durability="volatile")
         assert "durability transient_local instead of volatile" in found
         assert "would still match it" in found
@@ -194,7 +194,7 @@ class TestDepth:
         assert "fourth argument of create_subscription" in found
 
     def test_a_subscription_that_the_program_destroyed_itself_is_its_own_affair(self):
-        told = [
+        traced = [
             declared("subscription", topic="/scan", history="keep_last", depth=depth, number=number)
             for number, depth in enumerate((1, 10))
         ]
@@ -206,5 +206,5 @@ class TestDepth:
             (0, 99.0, Status.FAILED),
         ):
             gone = declared("destroyed", time_s, number=number)
-            run = replace(seen, declarations=(*told, gone))
+            run = replace(seen, declarations=(*traced, gone))
             assert judge("qos.depth", run, **asked).status is status

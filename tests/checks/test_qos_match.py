@@ -91,12 +91,12 @@ def test_the_student_s_subscription_is_the_one_that_requests():
 class TestTheBestAvailable:
     PICKY = replace(LATCHED, reliability="reliable")
 
-    def run(self, *told):
+    def run(self, *traced):
         return recording(
             endpoints=(endpoint(qos=self.PICKY, kind=Kind.SUBSCRIPTION), reader()),
             declarations=tuple(
                 declared("subscription", topic="/cmd_vel", node=NODE, **policies)
-                for policies in told
+                for policies in traced
             ),
         )
 

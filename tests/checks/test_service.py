@@ -38,7 +38,7 @@ class TestExists:
         [
             ("/enabel", "offers the service `/enabel` instead of `/enable`"),
             ("/Enable", "upper and lower case differ"),
-            ("/bot_publisher/enable", "a private name, below the node's own name"),
+            ("/bot_publisher/enable", "`/bot_publisher` stands in front of the name"),
             ("/robot/enable", "`/robot` stands in front of the name"),
         ],
     )

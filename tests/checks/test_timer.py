@@ -47,9 +47,9 @@ def test_a_rate_calls_nothing():
     assert "no timer but that of a rate, which calls nothing" in found
 
 
-@pytest.mark.parametrize("said", [(), declarations()[:1], (*declarations()[:1], timer(0.3))])
-def test_a_process_that_shut_the_tracer_out_is_named(said):
-    found = failing("executor.timer", recording(declarations=said), **ASKED)
+@pytest.mark.parametrize("traced", [(), declarations()[:1], (*declarations()[:1], timer(0.3))])
+def test_a_process_that_shut_the_tracer_out_is_named(traced):
+    found = failing("executor.timer", recording(declarations=traced), **ASKED)
     assert "the process did not declare the publisher on `/cmd_vel`" in found
 
 
@@ -60,15 +60,15 @@ def test_a_program_that_is_not_in_python_cannot_declare_anything():
 
 
 def test_a_timer_beside_the_thread_that_publishes_earns_nothing():
-    told = [declared("published", 1.0, topic="/cmd_vel", number=1, in_callback=True)]
-    told.append(declared("published", 1.3, topic="/cmd_vel", number=2, in_callback=False))
-    found = failing("executor.timer", loop(timer(0.3), *told), **ASKED)
+    traced = [declared("published", 1.0, topic="/cmd_vel", number=1, in_callback=True)]
+    traced.append(declared("published", 1.3, topic="/cmd_vel", number=2, in_callback=False))
+    found = failing("executor.timer", loop(timer(0.3), *traced), **ASKED)
     assert "outside of every callback: a thread or a loop calls publish()" in found
-    first_in_constructor = loop(timer(0.3), *told[::-1])
+    first_in_constructor = loop(timer(0.3), *traced[::-1])
     assert judge("executor.timer", first_in_constructor, **ASKED).status is Status.PASSED
     at_the_end = declared("published", 4.55, topic="/cmd_vel", number=4, in_callback=False)
-    stopped = loop(timer(0.3), *told[::-1], at_the_end)
+    stopped = loop(timer(0.3), *traced[::-1], at_the_end)
     assert judge("executor.timer", stopped, **ASKED).status is Status.PASSED
     events = declared("spin", 0.5, executor="EventsExecutor", threads=1)
-    run = loop(timer(0.3), *told, events)
+    run = loop(timer(0.3), *traced, events)
     assert judge("executor.timer", run, **ASKED).status is Status.PASSED

@@ -35,7 +35,7 @@ def spaced(intervals_s, **changes):
 
 
 def wrong(run):
-    """What is said of a run at a wrong period."""
+    """The text of the finding about a run at a wrong period."""
     return failing("timing.period", run, topic="/cmd_vel", period="300 ms")
 
 

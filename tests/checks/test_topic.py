@@ -101,18 +101,13 @@ class TestPublished:
             (
                 endpoint("/bot_publisher/cmd_vel"),
                 "/cmd_vel",
-                "`~/cmd_vel` puts the node's name in front",
+                "Without `~/`, which puts the node's name in front",
             ),
             (endpoint("/robot/cmd_vel"), "/cmd_vel", "`/robot` stands in front of the name"),
             (
                 endpoint("/robot/cmd_vel", node="/robot/bot_publisher"),
                 "/cmd_vel",
-                "the node is in the namespace `/robot`",
-            ),
-            (
-                endpoint("/cmd_vel", node="/robot/bot_publisher"),
-                "/robot/cmd_vel",
-                "stays outside of the node's namespace",
+                "without a namespace",
             ),
             (
                 endpoint(kind=Kind.SUBSCRIPTION),

@@ -347,7 +347,6 @@ CASES: list[Group] = [
             "NotLogged.only_some_logged": logging(
                 log=output("12.34", time_s=1.01) + output("12.34", time_s=1.31)
             ),
-            "NotLogged.logged_late": logging(log=output("12.34", time_s=3.5)),
             "NotLogged.no_f_string": logging("x = {msg.data}"),
             "NotLogged.other_values": logging("x = 5.67"),
             "NotLogged.nothing_logged": logging(),

@@ -66,7 +66,7 @@ class TestNeverReached:
         ("topic", "words"),
         [
             ("/chater", "subscribes to `/chater` instead of `/chatter`"),
-            ("/bot_publisher/chatter", "a private name, below the node's own name"),
+            ("/bot_publisher/chatter", "`/bot_publisher` stands in front of the name"),
             ("/bot/chatter", "`/bot` stands in front of the name"),
             ("/Chatter", "upper and lower case differ"),
         ],

@@ -78,15 +78,9 @@ class Sample:
         return "\n".join(line.rstrip() for line in stream.getvalue().split("\n"))
 
 
-def judged(
-    checks: Sequence[Told],
-    scenarios: Sequence[str] = ("listen",),
-    submission: SubmissionRecord | None = None,
-    **loaded: Any,
-) -> Sample:
+def judged(checks: Sequence[Told], scenarios: Sequence[str] = ("listen",), **loaded: Any) -> Sample:
     """A grade by checks of one ordinary run of each scenario."""
-    runs = {name: make_run(scenario=name) for name in scenarios}
-    return judged_runs(checks, runs, submission, **loaded)
+    return judged_runs(checks, {name: make_run(scenario=name) for name in scenarios}, **loaded)
 
 
 def judged_runs(

@@ -23,35 +23,23 @@ ENVIRONMENT = {
 WHEN = "2026-06-01T14:32:01Z"
 # Written from the table of the contract, wiki page "Advanced Autograding".
 TEXT = {"type": "string", "minLength": 1}
-SCHEMA = {
-    "type": "object",
-    "required": [
-        *("schema", "classroom", "assignment", "submission", "commit", "release", "review"),
-        *("datetime", "score", "max-score", "tests"),
-    ],
-    "properties": {
-        "schema": {"const": "classroom50/result/v1"},
-        **dict.fromkeys(
-            ("classroom", "assignment", "submission", "commit", "release", "review"), TEXT
-        ),
-        "datetime": {"type": "string", "pattern": r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$"},
-        "score": {"type": "integer"},
-        "max-score": {"type": "integer"},
-        "tests": {
-            "type": "array",
-            "items": {
-                "type": "object",
-                "required": ["test-name", "passed", "score", "max-score"],
-                "properties": {
-                    "test-name": TEXT,
-                    "passed": {"type": "boolean"},
-                    "score": {"type": "integer", "minimum": 0},
-                    "max-score": {"type": "integer", "minimum": 0},
-                },
-            },
-        },
-    },
-}
+POINTS = {"type": "integer", "minimum": 0}
+
+
+def obj(**properties):
+    named = {name.replace("_", "-"): value for name, value in properties.items()}
+    return {"type": "object", "required": list(named), "properties": named}
+
+
+TEST = obj(test_name=TEXT, passed={"type": "boolean"}, score=POINTS, max_score=POINTS)
+SCHEMA = obj(
+    schema={"const": "classroom50/result/v1"},
+    **dict.fromkeys(("classroom", "assignment", "submission", "commit", "release", "review"), TEXT),
+    datetime={"type": "string", "pattern": r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$"},
+    score=POINTS,
+    max_score=POINTS,
+    tests={"type": "array", "items": TEST},
+)
 
 
 def rendered(result):

@@ -45,23 +45,22 @@ def test_every_cell_leads_to_its_check_in_the_report():
     )
 
 
-def test_only_what_was_run_again_is_listed_as_disturbed():
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, None),
+        ({"runs": 2}, "student 00 listen 2 250 ms 0 ms"),
+        ({"faults": ("the disk is full",)}, "the disk is full"),
+    ],
+)
+def test_only_what_was_run_again_is_listed_as_disturbed(changes, said):
     row = classroom(1)[0]
-    run = row.result.scenarios[0]
+    (run,) = row.result.scenarios
     disturbance = run.disturbance.model_copy(update={"taken_s": 0.25})
-    once = run.model_copy(update={"disturbance": disturbance})
-
-    def page(scenario):
-        return squeezed(
-            render_overview(
-                [replace(row, result=row.result.model_copy(update={"scenarios": (scenario,)}))]
-            )
-        )
-
-    assert "Disturbed runs" not in page(once)
-    assert "student 00 listen 2 250 ms 0 ms" in page(once.model_copy(update={"runs": 2}))
-    assert "the disk is full" in page(once.model_copy(update={"faults": ("the disk is full",)}))
-    assert "Disturbed runs" not in squeezed(render_overview(classroom(1)))
+    run = run.model_copy(update={"disturbance": disturbance, **changes})
+    result = row.result.model_copy(update={"scenarios": (run,)})
+    text = squeezed(render_overview([replace(row, result=result)]))
+    assert said in text if said else "Disturbed runs" not in text
 
 
 def test_what_cannot_be_read_counts_neither_as_a_score_nor_as_failed_checks():

@@ -2,7 +2,6 @@
 
 import json
 import re
-from dataclasses import replace
 
 import pytest
 
@@ -136,13 +135,6 @@ def test_what_is_written_is_read_again_and_is_the_same_every_time(make, tmp_path
     file.write_text(result_json(result), encoding="utf-8")
     assert read_result(file) == result
     assert result_json(read_result(file)) == result_json(make().result)
-
-
-def test_the_order_of_the_environment_does_not_matter():
-    sample = lost_points()
-    environment = dict(reversed(list(sample.facts.environment.items())))
-    turned = replace(sample, facts=make_facts(environment=environment))
-    assert json.dumps(written(turned)) == json.dumps(written(sample))
 
 
 def test_the_schema_describes_what_is_written():

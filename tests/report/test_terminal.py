@@ -186,17 +186,6 @@ No check changed.
 Fix this first: The node is there. 1 other check waits for it.
 Score: 1 of 6 points
 """
-LESS = """\
-✗ failed  was failed  It is on time  0.75 / 3
-
-✗ failed  It is on time
-  expected  on time
-  observed  very late
-  try next  Use a timer.
-
-Fix this first: It is on time.
-Score: 3.75 of 6 points, before 4.5
-"""
 
 
 def graded(node=PASS, period=PASS, only=3):
@@ -221,11 +210,16 @@ def changes(before, after, width=80):
         (graded(), graded(FAIL), LOST),
         (graded(FAIL), graded(), WON),
         (graded(FAIL), graded(OTHER), SAME),
-        (graded(period=LATE), graded(period=VERY_LATE), LESS),
     ],
 )
 def test_what_a_student_reads_after_a_save(before, after, text, width):
     assert changes(before, after, width) == text
+
+
+def test_points_alone_are_a_change():
+    text = changes(graded(period=LATE), graded(period=VERY_LATE))
+    assert text.startswith("✗ failed  was failed  It is on time  0.75 / 3\n")
+    assert text.endswith("Score: 3.75 of 6 points, before 4.5\n")
 
 
 def test_a_check_that_was_not_judged_before_is_new():

@@ -27,11 +27,7 @@ from .pairing import pair
 
 @dataclass(frozen=True)
 class CaseLimits:
-    """What is right.
-
-    Attributes:
-        length: How far the length of a quaternion may be from 1.
-    """
+    """How far a rotation may be off, and the length of a quaternion from 1."""
 
     angle_rad: float
     length: float
@@ -39,11 +35,9 @@ class CaseLimits:
 
 @dataclass(frozen=True)
 class Answer:
-    """One answer to a question.
+    """One answer to a question, with its angle to the right rotation; infinite where it is none.
 
-    Attributes:
-        error_rad: Angle between its rotation and the right one; infinite where it is none.
-        length: Of a quaternion; None for angles.
+    Its length is that of a quaternion, and None for angles.
     """
 
     row: tuple[float, ...]
@@ -62,7 +56,6 @@ class Case:
     """A question with its answers.
 
     Attributes:
-        number: Of the question, counted from 1.
         right: Unit quaternion (x, y, z, w) of the right rotation.
         answers: The worst first; none if nothing answers it.
         behind_s: Where the next question had been sent already when the first answer came: how

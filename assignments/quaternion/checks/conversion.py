@@ -9,10 +9,9 @@ a quaternion as ``(x, y, z, w)``; lengths without unit, angles in radians.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -117,18 +116,16 @@ def _quaternion_words(row: Sequence[float]) -> str:
 _QUATERNION = ("x", "y", "z", "w")
 _VECTOR = ("x", "y", "z")
 
-CONVERSIONS: Mapping[str, Conversion] = MappingProxyType(
-    {
-        "axis_angle_to_quaternion": Conversion(
-            ("data[0]", "data[1]", "data[2]", "data[3]"),
-            _QUATERNION,
-            _axis_angle_group,
-            _axis_angle_words,
-        ),
-        "rpy_to_quaternion": Conversion(_VECTOR, _QUATERNION, _rpy_group, _rpy_words),
-        "quaternion_to_rpy": Conversion(_QUATERNION, _VECTOR, _quaternion_group, _quaternion_words),
-    }
-)
+CONVERSIONS = {
+    "axis_angle_to_quaternion": Conversion(
+        tuple(f"data[{index}]" for index in range(4)),
+        _QUATERNION,
+        _axis_angle_group,
+        _axis_angle_words,
+    ),
+    "rpy_to_quaternion": Conversion(_VECTOR, _QUATERNION, _rpy_group, _rpy_words),
+    "quaternion_to_rpy": Conversion(_QUATERNION, _VECTOR, _quaternion_group, _quaternion_words),
+}
 
 
 def answer_words(answer: Sequence[float]) -> str:
@@ -137,14 +134,7 @@ def answer_words(answer: Sequence[float]) -> str:
 
 
 def oracle(name: str, questions: Rows) -> Rows:
-    """The right rotations.
-
-    Args:
-        questions: Shape (n, k), as in the module's description.
-
-    Returns:
-        Unit quaternions, shape (n, 4); the identity where an axis or a quaternion is zero.
-    """
+    """The right rotations as unit quaternions; the identity where an axis or one is zero."""
     from scipy.spatial.transform import Rotation
 
     if name == "axis_angle_to_quaternion":
@@ -193,16 +183,9 @@ def rotations_of_answers(answers: Rows) -> Rows:
 
 
 def angles_between(ones: Rows, others: Rows) -> Rows:
-    """Angle from each rotation to each other, in radians, in [0, pi].
+    """Angle from each of n unit quaternions to each of m others, in [0, pi], shape (n, m).
 
     Exact also for tiny angles, where the arc cosine of a scalar product is not.
-
-    Args:
-        ones: Unit quaternions, shape (n, 4).
-        others: Unit quaternions, shape (m, 4).
-
-    Returns:
-        Shape (n, m).
     """
     minus = np.linalg.norm(ones[:, None, :] - others[None, :, :], axis=2)
     plus = np.linalg.norm(ones[:, None, :] + others[None, :, :], axis=2)

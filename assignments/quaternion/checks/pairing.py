@@ -28,15 +28,10 @@ def pair(
     right: NDArray[np.bool_],
     optional: Sequence[bool],
 ) -> tuple[int | None, ...]:
-    """Pair answers with questions.
+    """The index of its question for each answer; None for what came before the first question.
 
     Args:
-        asked_ns: When each question was sent, in order.
-        answered_ns: When each answer was published, in order.
         right: Whether an answer would be right for a question, shape (questions, answers).
-
-    Returns:
-        Per answer the index of its question; None for what came before the first question.
     """
     if not len(asked_ns) or not answered_ns or answered_ns[-1] < asked_ns[0]:
         return (None,) * len(answered_ns)
@@ -59,10 +54,9 @@ def _align(
     wrong: float,
     copy: float,
 ) -> tuple[int | None, ...]:
-    """The cheapest pairing.
+    """The cheapest pairing; at least one answer is not before the first question.
 
     Args:
-        answered_ns: As for :func:`pair`; at least one is not before the first question.
         wrong: Cost of a wrong answer; a question without an answer costs 1.
         copy: Cost of an answer once more, after a question that needs none.
     """

@@ -405,10 +405,7 @@ def _too_few(
 
 
 def _is_slow(recording: Recording, found: Sequence[Case]) -> bool:
-    """Whether the node takes its time for the answers, beyond what the machine took from it.
-
-    The next question follows the answer, so that the times between questions tell.
-    """
+    """Whether the node is slow by itself: the next question follows the answer."""
     answered = [case for case in found if case.answers]
     if len(answered) < 2:
         return False

@@ -39,12 +39,7 @@ class StimulusError(ValueError):
 
 
 def part_of(find: Find, interface: str, number: int) -> Find:
-    """Find definitions, but of one interface only a part: 0 is the request, or the goal.
-
-    Raises:
-        KeyError: Its definition is missing.
-        IndexError: It has fewer parts.
-    """
+    """Find definitions, but of one interface only a part: 0 is the request, or the goal."""
     text = _PARTS.split(find(interface))[number]
     return lambda name: text if name == interface else find(name)
 
@@ -56,16 +51,12 @@ def read_message(
     drawn: Mapping[str, float],
     place: Place = (),
 ) -> dict[str, Any]:
-    """Read a message.
+    """Read a message; a KeyError names a definition that is missing.
 
     Args:
         value: Fields by name, nested or by path (``linear.x``, ``data[0]``).
         drawn: Random values by name, which ``$name`` stands for.
         place: Of the value, for errors.
-
-    Raises:
-        StimulusError: A field does not exist, or its value does not fit.
-        KeyError: A definition is missing.
     """
     found = _Reader(find, drawn, place).message(value, interface, ())
     assert isinstance(found, dict)
@@ -73,11 +64,7 @@ def read_message(
 
 
 def _nested(value: Mapping[str, Any]) -> dict[str, Any]:
-    """Turn paths into nested fields: ``{"data[0]": 1, "data[1]": 2}`` is ``{"data": [1, 2]}``.
-
-    Raises:
-        ValueError: A key is no path, stands twice, or leaves out an item of an array.
-    """
+    """Turn paths into nested fields: ``{"data[0]": 1, "data[1]": 2}`` is ``{"data": [1, 2]}``."""
     root = _Inner()
     for key, item in value.items():
         if not _PATH.fullmatch(str(key)):

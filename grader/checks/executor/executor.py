@@ -259,7 +259,7 @@ def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
             ours=busy,
             disturbed=busy,
         ).finding(expected)
-    if declarations.said(recording, "spin") and declarations.said(recording, "timer"):
+    if declarations.declares(recording, "spin") and declarations.declares(recording, "timer"):
         return Finding.passed(
             expected,
             f"{codes(names)} answered no call that could be judged; the process declared a timer "
@@ -320,7 +320,7 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
     messages = recording.on(parameters.topic)
     if not messages:
         return why_silent(recording, parameters.topic).finding(expected)
-    if not declarations.declares(recording, "publisher", "topic", parameters.topic):
+    if not declarations.declares(recording, "publisher", topic=parameters.topic):
         cause = why_undeclared(recording, f"the publisher on {code(parameters.topic)}")
         return cause.finding(expected)
     timers = declarations.timers(recording)

@@ -159,7 +159,7 @@ def main_returned(symptom: ProcessExit) -> Cause | None:
     if not symptom.returned:
         return None
     how = ", or something ended the program"
-    if declarations.traced(recording, name) and not declarations.said(recording, "node", name):
+    if declarations.traced(recording, name) and not declarations.declares(recording, "node", name):
         how = " before a node was created"
     elif declarations.never_spun(recording, name):
         how = " without rclpy.spin()"
