@@ -123,13 +123,6 @@ packet = b'RTPS\\2\\3\\1\\x0f' + writer[:12] + struct.pack('<BBH', 7, 1, len(bod
 for port in (7410, 7411):
     udp.sendto(packet, ('127.0.0.1', port))
 """
-HOGS = """\
-for number in range(8):
-    if os.fork() == 0:
-        break
-while True:
-    pass
-"""
 # Nobody waits for them, so what they take is added to nobody's time.
 RELAY = """\
 signal.signal(signal.SIGCHLD, signal.SIG_IGN)
@@ -518,7 +511,6 @@ ATTACKS = {
         lost=frozenset({"starts"}),
         named=("keeps the middleware of the node that watches the run busy",),
     ),
-    "burns_the_cpus": ended(HOGS, "s of CPU time, 3 s are allowed"),
     "burns_the_cpus_in_turns": ended(RELAY, "s of CPU time, 3 s are allowed"),
     "injection": ended(INJECTION, "RuntimeError"),
     "shadows_modules": Attack(
@@ -538,10 +530,6 @@ ATTACKS = {
     ),
     "build_kills_colcon": unbuilt(
         KILL_COLCON.format(signal=9), "PermissionError: [Errno 1] Operation not permitted"
-    ),
-    "build_kills_its_group": unbuilt(
-        "import os, sys\nif 'install' in sys.argv:\n    os.kill(0, 15)",
-        "PermissionError: [Errno 1] Operation not permitted",
     ),
     "build_writes_into_colcon": unbuilt(
         "import os\nopen(f'/proc/{os.getppid()}/mem', 'r+b')",

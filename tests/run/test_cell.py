@@ -299,33 +299,26 @@ def test_a_second_process_of_the_student_is_not_foreign(run_node: RunNode) -> No
     assert {n.name for n in recording.student_nodes} == {"/bot_publisher", "/second"}
 
 
+def one_run(*arguments: str) -> subprocess.Popen[str]:
+    """A run in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, str(Path(__file__).with_name("one_run.py")), *arguments],
+        env={**cell_environment(ros.find()), "PYTHONPATH": str(Path.cwd())},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
 @pytest.mark.slow
 def test_ten_at_once_never_hear_each_other(tmp_path: Path) -> None:
-    script = Path(__file__).with_name("one_run.py")
-    environment = {**cell_environment(ros.find()), "PYTHONPATH": str(Path.cwd())}
-    processes = [
-        subprocess.Popen(
-            [sys.executable, str(script), str(tmp_path / str(number)), f"{number}.0"],
-            env=environment,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        for number in range(1, 11)
-    ]
+    processes = [one_run(str(tmp_path / str(n)), f"{n}.0") for n in range(1, 11)]
     heard = [process.communicate()[0].split() for process in processes]
     assert heard == [[f"{number}.0"] for number in range(1, 11)]
 
 
-def test_nothing_survives_the_death_of_whoever_ordered_the_run(tmp_path: Path) -> None:
-    script = Path(__file__).with_name("one_run.py")
+def test_nothing_survives_the_end_of_the_process_that_ordered_the_run(tmp_path: Path) -> None:
     marker = str(tmp_path / "1")
-    environment = {**cell_environment(ros.find()), "PYTHONPATH": str(Path.cwd())}
-    process = subprocess.Popen(
-        [sys.executable, str(script), marker, "1.0", "forever"],
-        env=environment,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+    process = one_run(marker, "1.0", "forever")
     assert process.stdout is not None
     assert process.stdout.readline().strip() == "recording"
     assert running(marker)

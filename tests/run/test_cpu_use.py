@@ -8,7 +8,6 @@ import sys
 import threading
 import time
 from collections.abc import Iterable
-from functools import partial
 from itertools import count
 
 import pytest
@@ -25,7 +24,7 @@ from grader.run.host.disturbance import (
     others_share,
     run_delays,
 )
-from grader.run.process.descendants import descendant_pids
+from grader.run.process.descendants import Family
 
 MS = 1_000_000
 
@@ -145,7 +144,7 @@ while True:
     except ChildProcessError:
         pass
 """
-    meter, look = CpuMeter(), partial(descendant_pids, os.getpid(), zombies=True)
+    meter, look = CpuMeter(), Family(os.getpid()).look
     with subprocess.Popen([sys.executable, "-S", "-c", script]) as relay:
         try:
             first, hidden = meter.read(look()), 0

@@ -45,6 +45,13 @@ def prefork_servers() -> set[int]:
     }
 
 
+def process_of(cell: CellProcess, prefork_server: PreforkServer) -> int:
+    cell.await_fork()
+    usages = usage_of([prefork_server._popen.pid])
+    (found,) = {usage.pid for usage in usages} - {usage.parent for usage in usages}
+    return found
+
+
 def test_a_run_whose_prefork_server_is_killed_is_a_fault_and_the_next_one_is_not(
     tmp_path: Path,
 ) -> None:
@@ -71,9 +78,7 @@ def test_a_run_whose_prefork_server_is_killed_is_a_fault_and_the_next_one_is_not
 def test_the_end_does_not_wait_for_a_cell_that_hangs(boxed: bool, sandbox: Sandbox) -> None:
     prefork_server = PreforkServer(ros.find(), sandbox if boxed else None)
     cell = CellProcess(prefork_server)
-    cell.await_fork()
-    usages = usage_of([prefork_server._popen.pid])
-    (hung,) = {usage.pid for usage in usages} - {usage.parent for usage in usages}
+    hung = process_of(cell, prefork_server)
     its_end = os.pidfd_open(hung)
     os.kill(hung, signal.SIGSTOP)
     prefork_server.close(limit_s=0.1)
@@ -87,10 +92,7 @@ def test_the_end_does_not_wait_for_a_cell_that_hangs(boxed: bool, sandbox: Sandb
 def test_a_cell_that_hangs_does_not_outlive_long_whoever_could_kill_it() -> None:
     prefork_server = PreforkServer(ros.find())
     cell = CellProcess(prefork_server)
-    cell.await_fork()
-    (hung,) = {usage.pid for usage in usage_of([prefork_server._popen.pid])} - {
-        prefork_server._popen.pid
-    }
+    hung = process_of(cell, prefork_server)
     os.kill(hung, signal.SIGSTOP)
     # What the kernel does for a grader that is killed.
     prefork_server._socket.close()

@@ -17,77 +17,59 @@ pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 STRING = "std_msgs/msg/String"
 INT = "std_msgs/msg/Int64"
 
-ECHO = """\
+
+def node_source(name: str, body: str) -> str:
+    """A node of the student's, whose constructor has more lines."""
+    return f"""\
 import rclpy
 from rclpy.node import Node
-from std_msgs.msg import String
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Int64, String
 
-class Echo(Node):
+class Made(Node):
     def __init__(self):
-        super().__init__("echo")
+        super().__init__("{name}")
+{body}
+rclpy.init()
+rclpy.spin(Made())
+"""
+
+
+ECHO = node_source(
+    "echo",
+    """\
         self.publisher = self.create_publisher(String, "/echo", 10)
         self.create_subscription(String, "/chatter", self.answer, 10)
 
     def answer(self, message):
         if message.data != "silence":
             self.publisher.publish(String(data=message.data.upper()))
-
-rclpy.init()
-rclpy.spin(Echo())
-"""
-
-LATCHED = """\
-import rclpy
-from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Int64
-
-class Latched(Node):
-    def __init__(self):
-        super().__init__("latched")
+""",
+)
+LATCHED = node_source(
+    "latched",
+    """\
         profile = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.publisher = self.create_publisher(Int64, "/count", profile)
-        self.create_subscription(Int64, "/history", self.take, profile)
-
-    def take(self, message):
-        self.publisher.publish(Int64(data=message.data))
-
-rclpy.init()
-rclpy.spin(Latched())
-"""
-
-
-TWO_EARS = """\
-import rclpy
-from rclpy.node import Node
-from std_msgs.msg import Int64, String
-
-class TwoEars(Node):
-    def __init__(self):
-        super().__init__("two_ears")
+        self.create_subscription(Int64, "/history", self.publisher.publish, profile)
+""",
+)
+TWO_EARS = node_source(
+    "two_ears",
+    """\
         self.echo = self.create_publisher(String, "/echo", 10)
         self.count = self.create_publisher(Int64, "/count", 10)
         self.create_subscription(String, "/chatter", self.echo.publish, 10)
         self.create_subscription(Int64, "/numbers", self.count.publish, 10)
-
-rclpy.init()
-rclpy.spin(TwoEars())
-"""
-
-TICKING = """\
-import rclpy
-from rclpy.node import Node
-from std_msgs.msg import String
-
-class Ticking(Node):
-    def __init__(self):
-        super().__init__("ticking")
+""",
+)
+TICKING = node_source(
+    "ticking",
+    """\
         self.publisher = self.create_publisher(String, "/echo", 10)
         self.create_timer(0.3, lambda: self.publisher.publish(String()))
-
-rclpy.init()
-rclpy.spin(Ticking())
-"""
+""",
+)
 
 
 def echoing(**scenario: object) -> dict[str, object]:

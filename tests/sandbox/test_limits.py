@@ -14,7 +14,6 @@ import pytest
 from pydantic import ValidationError
 
 from grader.assignment.model import BuildLimitOptions, LimitOptions
-from grader.recording.event import Breach
 from grader.sandbox.limits import BUILD
 from grader.sandbox.usage import (
     files_in_flight,
@@ -62,23 +61,6 @@ def test_an_author_s_limits_of_the_build_reach_it() -> None:
 def test_a_wrong_limit_is_refused_with_its_reason(written: object, problem: str) -> None:
     with pytest.raises(ValidationError, match=problem):
         LimitOptions.model_validate(written)
-
-
-@pytest.mark.parametrize(
-    ("breach", "said"),
-    [
-        (
-            Breach(1, "memory", "461 MiB of memory", "400 MiB"),
-            "its processes took 461 MiB of memory, 400 MiB are allowed",
-        ),
-        (
-            Breach(1, "forbidden call", "called `bpf`", ""),
-            "its processes called `bpf`, which is never allowed",
-        ),
-    ],
-)
-def test_a_breach_ends_processes_and_says_why(breach: Breach, said: str) -> None:
-    assert (str(breach), breach.ended) == (said, True)
 
 
 def test_usage_is_measured(tmp_path: Path) -> None:

@@ -7,7 +7,6 @@ import select
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +21,7 @@ from grader.run.host.disturbance import DisturbanceMeter, Stopwatch
 from grader.run.host.machine_faults import MachineFaults
 from grader.run.host.watchdog import Watchdog
 from grader.run.order import CellOrder, ProcessCommand
-from grader.run.process.descendants import descendant_pids
+from grader.run.process.descendants import Family
 from grader.run.process.output import OutputReader
 from grader.run.process.student import StudentProcesses
 from grader.run.stimuli.context import StimulusContext
@@ -84,7 +83,7 @@ class Cell:
                 lambda: self._output.written_bytes,
                 self._violations,
             )
-        self._meter = DisturbanceMeter(partial(descendant_pids, os.getpid(), zombies=True))
+        self._meter = DisturbanceMeter(Family(os.getpid()).look)
         self._exit_barrier = ExitBarrier(self._output, self._graph, self._students)
         self._waits: list[Wait] = []
         self._robot: SimulatedRobot | None = None

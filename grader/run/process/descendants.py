@@ -32,25 +32,51 @@ def descendants(of: int) -> dict[int, str]:
     return {pid: command_line(pid) for pid in descendant_pids(of)}
 
 
-def descendant_pids(of: int, *, zombies: bool = False) -> list[int]:
-    """Ids of the descendants of a process, with those that have ended and were not waited for."""
+def descendant_pids(of: int) -> list[int]:
+    """Ids of the living descendants of a process."""
     children: dict[int, list[int]] = {}
-    for entry in os.listdir("/proc"):  # noqa: PTH208  names only, and often
-        if entry.isdigit():
-            try:
-                with open(f"/proc/{entry}/stat", "rb") as file:  # noqa: PTH123  often
-                    # The command's name may contain anything, but the last ")" ends it.
-                    state, parent, *_ = file.read().rpartition(b") ")[2].split()
-            except (OSError, ValueError):
-                continue
-            if zombies or state not in (b"Z", b"X"):
-                children.setdefault(int(parent), []).append(int(entry))
+    for entry in filter(str.isdigit, os.listdir("/proc")):  # noqa: PTH208  names only, and often
+        parent = _parent(entry, of_zombie=False)
+        if parent is not None:
+            children.setdefault(parent, []).append(int(entry))
     found: list[int] = []
     pending = children.get(of, [])
     while pending:
         found.append(pending.pop())
         pending += children.get(found[-1], [])
     return found
+
+
+class Family:
+    """The descendants of a process, looked at often: only new processes are read."""
+
+    def __init__(self, of: int) -> None:
+        self._of = of
+        self._members: set[int] = set()
+        self._others: set[int] = set()
+
+    def look(self) -> frozenset[int]:
+        """Ids of those that are there now; of zombies too, which were not waited for yet."""
+        present = {int(name) for name in os.listdir("/proc") if name.isdigit()}  # noqa: PTH208
+        self._members &= present
+        self._others &= present
+        parents = {pid: _parent(str(pid)) for pid in present - self._members - self._others}
+        own = {self._of, *self._members}
+        while new := {pid for pid, parent in parents.items() if parent in own} - own:
+            own |= new
+        self._members = own - {self._of}
+        self._others |= parents.keys() - own
+        return frozenset(self._members)
+
+
+def _parent(pid: str, *, of_zombie: bool = True) -> int | None:
+    try:
+        with open(f"/proc/{pid}/stat", "rb") as file:  # noqa: PTH123  often
+            # The command's name may contain anything, but the last ")" ends it.
+            state, parent, *_ = file.read().rpartition(b") ")[2].split()
+    except (OSError, ValueError):
+        return None
+    return int(parent) if of_zombie or state not in (b"Z", b"X") else None
 
 
 def is_stopped(pid: int) -> bool:
