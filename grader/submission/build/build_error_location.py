@@ -66,8 +66,7 @@ def find_build_error(log: str, failed: Collection[str], sources: Sources) -> Sou
         failed: Packages that were not finished; what the log says of others is no reason.
 
     Returns:
-        For a Python traceback the deepest frame in the student's files. None where the log
-        names no file of the student.
+        For a Python traceback the deepest frame in the student's files.
     """
     lines = log.splitlines()
     package = ""
@@ -103,9 +102,9 @@ def last_started(log: str, sources: Sources, problem: str | None) -> SourceError
 
 def _last_words(log: str) -> str:
     """The first line of a package's log that tells of an error, or its last line."""
-    said = [line.strip() for line in log.splitlines() if line.strip() and not _AROUND.match(line)]
-    errors = [line for line in said if _ERROR.search(line)]
-    return (errors[0] if errors else said[-1] if said else "it says nothing")[:_MAX_MESSAGE]
+    lines = [line.strip() for line in log.splitlines() if line.strip() and not _AROUND.match(line)]
+    errors = [line for line in lines if _ERROR.search(line)]
+    return [*errors[:1], *lines[-1:], "it says nothing"][0][:_MAX_MESSAGE]
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ def clean(output: str, paths: Mapping[str, str]) -> str:
 def own_lines(output: str) -> str:
     """Begin a line wherever colcon says how a package ended.
 
-    It says so behind the last words of a build file, which may have no line end.
+    What a build file prints before that may have no line end.
     """
     return _ENDED.sub("\n", output)
 

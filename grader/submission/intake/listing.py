@@ -49,10 +49,7 @@ class ChangedMeanwhile(GraderFault):
 
     def __init__(self, path: str) -> None:
         """Name the file."""
-        super().__init__(
-            f"{shown(path)}: changed while the submission was read; grade again when nobody "
-            "writes to it"
-        )
+        super().__init__(f"{shown(path)}: changed while the submission was read; grade it again")
 
 
 def unreadable(path: str, error: OSError) -> SubmissionError | GraderFault:
@@ -143,7 +140,7 @@ def _leads_out(which: str) -> SubmissionError:
 def wrapper_of(files: Sequence[SubmissionFile]) -> str:
     """The folders around the packages that hold nothing else: ``ana_hw1`` in ``ana_hw1/src/...``.
 
-    The same work is packed under another name by everybody who hands it in.
+    Each student packs the same work under another name.
 
     Returns:
         The deepest one that is not ``src``; ``.`` where there is none, or where links may need it.

@@ -1,4 +1,4 @@
-"""Whether a name in package.xml exists, as far as can be told without asking the network."""
+"""Whether a name in package.xml exists, as far as is known without asking the network."""
 
 from __future__ import annotations
 

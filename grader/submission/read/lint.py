@@ -48,22 +48,18 @@ def find_ruff() -> Path | None:
 
 @cache
 def known_rules(ruff: Path) -> frozenset[str]:
-    """Codes of all rules that ruff can report.
-
-    Raises:
-        GraderFault: It does not tell.
-    """
+    """Codes of all rules that ruff can report."""
     try:
-        told = subprocess.run(
+        listed = subprocess.run(
             [str(ruff), "rule", "--all", "--output-format", "json"],
             capture_output=True,
             timeout=_WALL_S,
             check=True,
         )
-        codes = {rule["code"] for rule in json.loads(told.stdout)}
+        codes = {rule["code"] for rule in json.loads(listed.stdout)}
         return frozenset(code for code in codes if isinstance(code, str)) - EXCLUDED.keys()
     except (OSError, subprocess.SubprocessError, ValueError, KeyError, TypeError) as error:
-        raise GraderFault(f"{ruff} does not tell its rules: {error}") from error
+        raise GraderFault(f"{ruff} does not list its rules: {error}") from error
 
 
 def lint(root: Path, files: Collection[str], ruff: Path | None = None) -> Lint:
@@ -141,10 +137,10 @@ def _check(
 def _findings(line: str, root: Path) -> Iterator[LintFinding]:
     """What a line of ruff's output says; nothing for other output."""
     try:
-        said = json.loads(line)
-        code, message = str(said["code"]), str(said["message"])
-        file = os.path.relpath(said["filename"], root)
-        number = int(said["location"]["row"])
+        found = json.loads(line)
+        code, message = str(found["code"]), str(found["message"])
+        file = os.path.relpath(found["filename"], root)
+        number = int(found["location"]["row"])
     except (ValueError, KeyError, TypeError):
         return
     yield LintFinding(code, shown(file), number, shown(message.partition("\n")[0]))

@@ -28,11 +28,7 @@ _INSTALLED = re.compile(rf"^\[{_GROUP}\]\s*$(.*?)(?=^\[|\Z)", re.MULTILINE | re.
 
 @dataclass(frozen=True)
 class EntryPoint:
-    """A console script.
-
-    Attributes:
-        function: Dotted name in the module, empty where none is named.
-    """
+    """A console script; its function is empty where none is named."""
 
     name: str
     module: str
@@ -48,12 +44,7 @@ class EntryPoint:
 
 @dataclass(frozen=True)
 class Setup:
-    """What a package's setup.py says.
-
-    Attributes:
-        name: The distribution's name, or None where it cannot be told.
-        malformed: Entry points that setuptools refuses.
-    """
+    """A package's setup.py: the distribution's name, if it is known, and its entry points."""
 
     name: str | None = None
     entry_points: tuple[EntryPoint, ...] = ()
@@ -113,7 +104,7 @@ def parse_installed(text: str, file: str) -> list[EntryPoint]:
 
 
 def _setup_keywords(tree: ast.Module) -> dict[str, _Value]:
-    """The keyword arguments of the first call of ``setup``, as far as they can be told."""
+    """The keyword arguments of the first call of ``setup``, as far as they are known."""
     names: dict[str, _Value] = {}
     for node in tree.body:
         if isinstance(node, ast.Assign):

@@ -1,4 +1,4 @@
-"""Whether the ``module:function`` of an executable exists, told from syntax trees.
+"""Whether the ``module:function`` of an executable exists, by the syntax trees.
 
 In doubt (star imports, broken files, modules of others) it exists: a wrong accusation is worse
 than a missed one, and the run will show it anyway.
