@@ -12,7 +12,6 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from grader.errors import UsageError
-from grader.submission.read.code_facts import Lint, SourceFile
 
 
 @dataclass(frozen=True)
@@ -70,6 +69,78 @@ class Definition:
 
     file: str
     text: str
+
+
+@dataclass(frozen=True)
+class SourceClass:
+    """A class.
+
+    Attributes:
+        name: Qualified in its module, such as ``Outer.Inner`` or ``make.<locals>.Bot``.
+        bases: As written: ``Node``, ``rclpy.node.Node``; of a call such as ``mixed(Node)`` the
+            names in it.
+    """
+
+    name: str
+    line: int
+    bases: tuple[str, ...] = ()
+    documented: bool = False
+
+
+@dataclass(frozen=True)
+class SourceFunction:
+    """A function or method.
+
+    Attributes:
+        name: Qualified in its module, such as ``Bot.callback`` or ``main.<locals>.help``.
+        unannotated: Parameters without a type hint; ``self`` and ``cls`` are left out.
+    """
+
+    name: str
+    line: int
+    documented: bool = False
+    decorators: tuple[str, ...] = ()
+    unannotated: tuple[str, ...] = ()
+    returns: bool = False
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """A Python file that runs; at most 2000 of each kind of thing in it.
+
+    Attributes:
+        module: Dotted name that it is imported by, such as ``bot.node``.
+        names: What imports and plain assignments name: local name -> dotted name.
+        stars: Modules of ``from module import *``.
+        prints: Lines with ``print`` to the console.
+    """
+
+    path: str
+    module: str
+    documented: bool = False
+    classes: tuple[SourceClass, ...] = ()
+    functions: tuple[SourceFunction, ...] = ()
+    names: tuple[tuple[str, str], ...] = ()
+    stars: tuple[str, ...] = ()
+    prints: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class LintFinding:
+    """A place that breaks a rule; its code is such as ``F401``."""
+
+    code: str
+    file: str
+    line: int
+    message: str
+
+
+@dataclass(frozen=True)
+class Lint:
+    """What ruff says of a package: at most 20 findings of each rule, or why there are none."""
+
+    problem: str | None = None
+    findings: tuple[LintFinding, ...] = ()
 
 
 @dataclass(frozen=True)

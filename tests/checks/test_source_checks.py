@@ -5,9 +5,8 @@ import ast
 import pytest
 
 from grader.checks.finding import Status
-from grader.submission.read.code_facts import Lint, LintFinding
 from grader.submission.read.outline import outline
-from grader.submission.record import SourceError
+from grader.submission.record import Lint, LintFinding, SourceError
 from tests.checks.builder import failing, judge, package, submission
 
 PACKAGE = {"package": "bot_publisher"}

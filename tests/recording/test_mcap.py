@@ -30,12 +30,15 @@ from grader.recording.model import (
     Recording,
 )
 from grader.recording.simulated import Incident, Scene, Truth
-from grader.submission.read.code_facts import (
+from grader.submission.record import (
+    BuildRecord,
     Lint,
     LintFinding,
+    PackageRecord,
+    SourceError,
     SourceFile,
+    SubmissionRecord,
 )
-from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
 from sim.motion import Pose
 from sim.shapes import MovingObstacle, Waypoint
 from tests.checks.builder import endpoint

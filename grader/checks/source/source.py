@@ -21,10 +21,15 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_package, why_too_new
 from grader.spec.nearest_name import nearest
 from grader.spec.quantity import Ratio
-from grader.submission.read.code_facts import SourceFile, SourceFunction
 from grader.submission.read.inheritance import NODE, Family, FoundClass
 from grader.submission.read.lint import EXCLUDED
-from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
+from grader.submission.record import (
+    PackageRecord,
+    SourceError,
+    SourceFile,
+    SourceFunction,
+    SubmissionRecord,
+)
 
 _MOST_PLACES = 20
 _DOTTED = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+")

@@ -22,8 +22,7 @@ from pathlib import Path
 from grader.errors import GraderFault
 from grader.submission.build.bounded import OutputLimits, run_bounded
 from grader.submission.intake.paths import shown
-from grader.submission.read.code_facts import Lint, LintFinding
-from grader.submission.record import SourceError
+from grader.submission.record import Lint, LintFinding, SourceError
 
 LINE_LENGTH = 99
 """Of the ROS 2 style guide for Python."""

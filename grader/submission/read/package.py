@@ -19,7 +19,6 @@ from grader.submission.intake.listing import SubmissionFile
 from grader.submission.intake.locate import Located
 from grader.submission.intake.paths import is_within, join, shown
 from grader.submission.read import source
-from grader.submission.read.code_facts import Lint
 from grader.submission.read.dependencies import is_known
 from grader.submission.read.imports import find_imports, is_code, ros_imports
 from grader.submission.read.lint import lint, newer_syntax
@@ -28,7 +27,7 @@ from grader.submission.read.outline import outline
 from grader.submission.read.rosdistro import PYTHON_MODULES
 from grader.submission.read.setup_py import EntryPoint, Setup, read_setup
 from grader.submission.read.targets import Modules, missing_target
-from grader.submission.record import Definition, Import, PackageRecord, SourceError
+from grader.submission.record import Definition, Import, Lint, PackageRecord, SourceError
 
 SETUP_PY, CMAKE = "setup.py", "CMakeLists.txt"
 _INTERFACES = (".msg", ".srv", ".action")
