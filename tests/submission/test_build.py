@@ -115,18 +115,6 @@ def test_a_zip_of_a_whole_workspace_is_built_once(
     assert build_of(found).succeeded
 
 
-def test_setup_py_that_raises_is_blamed(tree: Tree, real_ros: RosInstallation) -> None:
-    tree.package({"setup.py": f"import os\nraise ValueError('boom')\n{SETUP_PY}"})
-    found = prepared(tree, real_ros)
-    build = build_of(found)
-    assert (build.succeeded, build.failed_packages) == (False, ("bot_publisher",))
-    assert str(build.culprit) == f"{FOLDER}/setup.py:2: ValueError: boom"
-    assert "ValueError: boom" in build.log
-    assert package_of(found).executables == ()
-    assert found.install is None
-    assert build_of(prepared(tree, real_ros)).cached
-
-
 def test_odd_names_of_folders_are_built(tree: Tree, real_ros: RosInstallation) -> None:
     tree.package(folder="my bot/größe 🤖\n/'x'")
     tree.write({"README": "A folder around everything would be left out of the path."})
@@ -211,20 +199,6 @@ def test_a_daemon_of_setup_py_that_holds_the_output_costs_the_wall_limit_at_most
     assert (build.succeeded, build.timed_out, found.install) == (False, True, None)
     assert str(build.culprit) == f"{FOLDER}/setup.py: the build was ended after 8 s"
     assert not build_of(prepared(tree, real_ros, python_s=0.1)).cached
-
-
-def test_a_daemon_that_lets_go_of_the_output_is_killed(
-    tree: Tree, real_ros: RosInstallation, tmp_path: Path
-) -> None:
-    pid_file = tmp_path / "pid"
-    detached = DAEMON.replace(
-        "    time.sleep",
-        "    [os.dup2(os.open(os.devnull, os.O_RDWR), n) for n in (0, 1, 2)]\n"
-        f"    open({str(pid_file)!r}, 'w').write(str(os.getpid()))\n    time.sleep",
-    )
-    tree.package({"setup.py": f"{detached}\n{SETUP_PY}"})
-    assert build_of(prepared(tree, real_ros)).succeeded
-    assert not Path("/proc", pid_file.read_text()).exists()
 
 
 def test_setup_py_does_not_see_the_callers_home_and_variables(

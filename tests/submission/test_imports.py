@@ -55,11 +55,6 @@ def test_imports_for_type_checkers_are_optional() -> None:
     assert imports(source) == [("nav_msgs", 2, True), ("std_msgs", 4, False)]
 
 
-def test_a_deep_tree_is_walked() -> None:
-    deep = "".join(f"{' ' * depth}if x:\n" for depth in range(90)) + " " * 90 + "import rclpy\n"
-    assert imports(deep) == [("rclpy", 91, False)]
-
-
 @pytest.mark.parametrize(
     ("path", "expected"),
     [

@@ -95,13 +95,6 @@ def test_of_equal_files_the_one_with_the_most_similar_path_is_the_origin() -> No
     }
 
 
-def test_thousands_of_equal_files_are_matched_at_once() -> None:
-    sources = {f"src/{number}/__init__.py": "empty" for number in range(10_000)}
-    installed = {f"bot/{number}/__init__.py": "empty" for number in range(10_000)}
-    assert match_files(installed, sources).keys() == installed.keys()
-    assert match_files({"other.py": "empty"}, sources) == {"other.py": "src/0/__init__.py"}
-
-
 def test_an_install_space_is_tidied_before_anybody_looks_into_it(tmp_path: Path) -> None:
     install = tmp_path / "install"
     (install / "lib").mkdir(parents=True)

@@ -132,11 +132,6 @@ def test_too_many_dependencies_are_an_error() -> None:
     assert "more than 500" in manifest.error.message
 
 
-def test_utf_16_is_xml_as_well() -> None:
-    text = MANIFEST.replace('<?xml version="1.0"?>', '<?xml version="1.0" encoding="UTF-16"?>')
-    assert read(text.encode("utf-16")).name == "bot_publisher"
-
-
 @settings(deadline=None)
 @given(st.binary(max_size=200), st.integers(0, len(MANIFEST)))
 def test_no_damage_to_a_manifest_raises(noise: bytes, place: int) -> None:

@@ -78,11 +78,6 @@ def test_what_tools_left_is_not_unpacked_and_may_be_ten_times_as_much() -> None:
     assert "members" in refusal([*left, *files(*(f"__MACOSX/{n}" for n in range(20)))])
 
 
-@pytest.mark.parametrize("name", ["__MACOSX/a/._x.py", "a/.DS_Store", "a/._setup.py", ".venv/x"])
-def test_leftovers_of_macos_and_of_tools_are_left_out(name: str) -> None:
-    assert admitted(files(name)) == []
-
-
 @pytest.mark.parametrize("names", [("a", "a"), ("a", "./a"), ("a/b", "a/b")])
 def test_a_path_that_is_there_twice_is_refused(names: tuple[str, str]) -> None:
     assert "twice" in refusal(files(*names))
@@ -91,10 +86,6 @@ def test_a_path_that_is_there_twice_is_refused(names: tuple[str, str]) -> None:
 def test_a_file_cannot_be_a_folder_as_well() -> None:
     assert "a is not a folder" in refusal(files("a", "a/b"))
     assert "twice" in refusal(files("a/b", "a"))
-
-
-def test_a_negative_size_is_refused() -> None:
-    assert "negative" in refusal(files("a", size=-1))
 
 
 @pytest.mark.parametrize("target", ["/etc", "..", "../x", "b/../../x"])

@@ -1,10 +1,6 @@
 from __future__ import annotations
 
 import ast
-import gc
-import sys
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from hypothesis import given, settings
@@ -94,37 +90,3 @@ def test_a_string_that_is_no_text_can_be_written_down() -> None:
 @given(st.binary(max_size=300))
 def test_no_bytes_raise(data: bytes) -> None:
     assert isinstance(parse(data, "node.py"), (ast.Module, SourceError))
-
-
-class Garbage:
-    """Collected at any moment, with code of its own: Python may then turn to another thread."""
-
-    def __init__(self) -> None:
-        self.itself = self
-
-    def __del__(self) -> None:
-        for _ in range(50):
-            pass
-
-
-@pytest.fixture
-def restless() -> Iterator[None]:
-    """Threads and the collector take turns as often as they can."""
-    interval_s, thresholds = sys.getswitchinterval(), gc.get_threshold()
-    sys.setswitchinterval(1e-6)
-    gc.set_threshold(50, 2, 2)
-    yield
-    sys.setswitchinterval(interval_s)
-    gc.set_threshold(*thresholds)
-
-
-@pytest.mark.usefixtures("restless")
-def test_a_class_is_parsed_by_many_threads_at_once() -> None:
-    data = b"def f(x):\n    return [x, {x: (x, -x)}, lambda y: x + y * 2]\n" * 60
-
-    def read(_: int) -> bool:
-        Garbage()
-        return isinstance(parse(data, "node.py"), ast.Module)
-
-    with ThreadPoolExecutor(6) as pool:
-        assert all(pool.map(read, range(600)))
