@@ -18,7 +18,7 @@ from rich.text import Text
 from sim.lidar import Lidar, Scan
 from sim.motion import NS, Pose, Twist, compose
 from sim.pacing import Lateness
-from sim.shapes import Shape, circle
+from sim.shapes import Shape, circle, obstacle_words
 from sim.simulation import EventKind, Simulation, Step
 from sim.world import World
 
@@ -77,7 +77,7 @@ class Screen:
         parts = [f"{step.time_ns / NS:8.2f} s", *_place(step.pose), *_speeds(step.twist)]
         parts.append(f"ahead {self._range(0.0)}")
         if step.contact:
-            parts.append(f"CONTACT with {step.contact}")
+            parts.append(f"CONTACT with {obstacle_words(step.contact)}")
         if self._late_steps:
             parts.append(f"{self._late_steps} steps late")
         return "  ".join([*parts, *self._complaints()])
@@ -112,7 +112,7 @@ class Screen:
                 "scan",
                 *(f"{side} {self._range(turn * math.pi)}" for side, turn in directions.items()),
             ),
-            ("contact", f"with {step.contact}" if step.contact else "none"),
+            ("contact", f"with {obstacle_words(step.contact)}" if step.contact else "none"),
             *self._topics(),
         ]
         if self._late_steps:

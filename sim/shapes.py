@@ -21,6 +21,21 @@ MAX_SPEED_M_S = 5.0
 5 cm in one, less than half of any robot, so that it cannot jump over one."""
 
 
+_WORDS = {
+    "bounds": "the wall around the world",
+    "segments": "a wall",
+    "boxes": "a box",
+    "circles": "a pillar",
+    "polygons": "an obstacle",
+    "moving": "a moving obstacle",
+}
+
+
+def obstacle_words(label: str) -> str:
+    """What stands under a label of a world file, in words: ``segments[0]`` is a wall."""
+    return _WORDS.get(label.partition("[")[0], "something")
+
+
 @dataclass(frozen=True, slots=True)
 class Shape:
     """A shape in the frame it is given in.

@@ -61,7 +61,7 @@ def gallery() -> Sample:
     touched_s = next(run.since_launch_s(step.time_ns) for step in run.truth if step.contact)
     touch = Finding.failed(
         "no contact on its way",
-        "drove into `segments[0]`",
+        "drove into a wall",
         "Stop early enough.",
         Evidence(moments=(Moment("contact", touched_s),), plots=(speed_plot(run),)),
     )

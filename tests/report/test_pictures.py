@@ -52,7 +52,7 @@ class TestPath:
 
     def test_a_contact_is_marked_and_named(self, touched):
         figure = draw_path(touched, (), "p")
-        assert "1 contact with segments[0] (marked ×)" in figure.caption
+        assert "1 contact with a wall (marked ×)" in figure.caption
         assert len(of_class(figure.wide, "out")) == 1
 
     def test_headings_world_and_scale_are_drawn(self, stopped):

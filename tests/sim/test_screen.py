@@ -31,13 +31,13 @@ def test_the_screen_shows_everything() -> None:
     screen.on_late(Lateness(7, 3, 40_000_000))
     line = screen.line()
     assert "3.00 s  x +0.200 m" in line
-    assert line.endswith("ahead -inf m  CONTACT with segments[0]  3 steps late")
+    assert line.endswith("ahead -inf m  CONTACT with a wall  3 steps late")
     text = screen.picture(80, 30).plain
     for part in (
         "wall.yaml, burger",
         "x +0.200 m",
         "+0.200 m/s",
-        "with segments[0]",
+        "with a wall",
         "at most 40 ms",
         "→",
     ):

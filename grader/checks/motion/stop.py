@@ -10,7 +10,7 @@ from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding
 from grader.checks.first_seen import until_the_end
 from grader.checks.motion.robot_check import RobotParameters
-from grader.checks.wording import code, counted
+from grader.checks.wording import counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why_not_moved
@@ -72,17 +72,13 @@ def stops(recording: Recording, parameters: Stops) -> Finding:
     evidence = _evidence(recording, scene, rest, parameters)
     off_m = None if sight is None or step.contact else sight.distance_m - wanted_m
     if sight is not None and off_m is not None and -parameters.late <= off_m <= parameters.early:
-        return Finding.passed(
-            expected, f"{code(sight.name)} at {metres(sight.distance_m)}", evidence
-        )
+        return Finding.passed(expected, f"{sight.name} at {metres(sight.distance_m)}", evidence)
     if deeper is not None:
         return deeper.finding(expected)
     if sight is not None and off_m is not None and off_m < 0.0:
         return _late(recording, scene, rest, sight, parameters).finding(expected)
     misread = misreading(recording, step)
-    where = (
-        f"{code(sight.name)} still {metres(sight.distance_m)} ahead" if sight else "nothing ahead"
-    )
+    where = f"{sight.name} still {metres(sight.distance_m)} ahead" if sight else "nothing ahead"
     return Finding.failed(
         expected,
         f"stopped early, with {where}{f': {misread.words}' if misread else ''}",
@@ -98,7 +94,7 @@ def _never_stopped(recording: Recording, scene: Scene) -> Cause:
     last = recording.truth[-1]
     sight = ahead(scene, last)
     where = (
-        f"{code(sight.name)} is still {metres(sight.distance_m)} ahead"
+        f"{sight.name} is still {metres(sight.distance_m)} ahead"
         if sight
         else "nothing is ahead any more"
     )
@@ -118,7 +114,7 @@ def _never_stopped(recording: Recording, scene: Scene) -> Cause:
 
 def _late(recording: Recording, scene: Scene, rest: int, sight: Sight, parameters: Stops) -> Cause:
     truth, wanted_m = recording.truth, parameters.distance
-    seen = f"stopped late, with {code(sight.name)} at {metres(sight.distance_m)}"
+    seen = f"stopped late, with {sight.name} at {metres(sight.distance_m)}"
     begin = rest
     while begin and (other := ahead(scene, truth[begin - 1])) is not None:
         if other.distance_m > wanted_m:
@@ -219,7 +215,7 @@ def _set_off(
         words += " backwards"
     words += f" {when_s:.2f} s after launch"
     words += ", before the first scan had come" if is_blind else ""
-    words += f", with {code(sight.name)} {metres(sight.distance_m)} ahead" if sight else ""
+    words += f", with {sight.name} {metres(sight.distance_m)} ahead" if sight else ""
     fastest = max(abs(item.linear_m_s) for item in truth)
     return Cause(
         f"{words}: {metres(way_m(truth))} in all, at up to {speed(fastest)}",

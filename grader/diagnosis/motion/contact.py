@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from grader.checks.wording import code, counted
+from grader.checks.wording import counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.process.blocked_executor import stuck_callback
@@ -15,6 +15,7 @@ from grader.measure.motion.scan import newest
 from grader.measure.motion.track import evidence_at, is_at_rest, speed_plot
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
+from sim.shapes import obstacle_words
 
 # Commands that were sent so long before contradict each other; fewer may come of noise.
 _LATELY_NS = NS
@@ -56,7 +57,7 @@ def why_touched(recording: Recording) -> Cause | None:
         return None
     step, before = recording.truth[index], recording.truth[max(index - 1, 0)]
     when_s = recording.since_launch_s(step.time_ns)
-    name = step.contact or "something"
+    name = obstacle_words(step.contact or "")
     if abs(before.linear_m_s) < 1e-3:
         motion = f"while turning at {turn(before.angular_rad_s)}"
     else:
@@ -68,7 +69,7 @@ def why_touched(recording: Recording) -> Cause | None:
         command = "although the last command was to stop: too late"
     reason = cause_of(Contact(recording, step, before))
     return Cause(
-        f"drove into {code(name)} {motion}, {when_s:.2f} s after launch, {command}{reason.words}",
+        f"drove into {name} {motion}, {when_s:.2f} s after launch, {command}{reason.words}",
         reason.hint,
         evidence_at(recording, f"contact with {name}", step.time_ns, speed_plot(recording)),
     )

@@ -181,12 +181,14 @@ def robot_not_matched(symptom: NotMoved) -> Cause | None:
 
 @explanation(NotMoved)
 def only_zeros(symptom: NotMoved) -> Cause | None:
-    """All commands are zero, perhaps because a scan was misread."""
+    """linear.x and angular.z of all commands are 0, perhaps because a scan was misread."""
     recording, sent = symptom.recording, symptom.sent
     if not all(is_zero(item.twist) for item in sent):
         return None
     topic = code(command_topic(recording))
-    seen = f"{_STILL}: all of {counted(len(sent), 'command')} on {topic} are zero"
+    seen = (
+        f"{_STILL}: in all {counted(len(sent), 'command')} on {topic}, linear.x and angular.z are 0"
+    )
     last = recording.truth[-1]
     misread = misreading(recording, last)
     if misread is not None:

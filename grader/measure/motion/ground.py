@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from grader.recording.simulated import Scene, Truth
 from sim.motion import Pose, compose
-from sim.shapes import Capsule, point_clearance_m
+from sim.shapes import Capsule, obstacle_words, point_clearance_m
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,13 @@ def ahead(scene: Scene | None, step: Truth) -> Sight | None:
         return cos * dx + sin * dy, cos * dy - sin * dx
 
     found: Sight | None = None
-    for name, (x1, y1, x2, y2, radius) in _things(scene, step.time_ns):
+    for label, (x1, y1, x2, y2, radius) in _things(scene, step.time_ns):
         begin = into_frame(x1, y1)
         distance_m = (
             _ray_circle_m(*begin, radius) if radius else _ray_wall_m(*begin, *into_frame(x2, y2))
         )
         if distance_m is not None and (found is None or distance_m < found.distance_m):
-            found = Sight(name, distance_m)
+            found = Sight(obstacle_words(label), distance_m)
     return found
 
 
@@ -51,12 +51,12 @@ def nearest(scene: Scene, step: Truth) -> Sight | None:
     """The nearest thing in any direction, or None in an empty world."""
     eye = _eye(scene, step)
     found: Sight | None = None
-    for name, capsule in _things(scene, step.time_ns):
+    for label, capsule in _things(scene, step.time_ns):
         distance_m = abs(point_clearance_m(eye.x_m, eye.y_m, capsule))
         if found is None or distance_m < found.distance_m:
             x, y = _foot(eye.x_m, eye.y_m, capsule)
             bearing_rad = math.atan2(y - eye.y_m, x - eye.x_m) - step.yaw_rad
-            found = Sight(name, distance_m, math.remainder(bearing_rad, math.tau))
+            found = Sight(obstacle_words(label), distance_m, math.remainder(bearing_rad, math.tau))
     return found
 
 
@@ -67,8 +67,8 @@ def _eye(scene: Scene, step: Truth) -> Pose:
 
 def _things(scene: Scene, time_ns: int) -> Iterator[tuple[str, Capsule]]:
     """Walls, which have no radius, and circles, whose segment is a point."""
-    for name, capsules in scene.outlines.items():
-        yield from ((name, capsule) for capsule in capsules)
+    for label, capsules in scene.outlines.items():
+        yield from ((label, capsule) for capsule in capsules)
     for obstacle in scene.moving:
         pose = obstacle.pose_at(time_ns - scene.began_ns)
         if pose is not None:

@@ -7,7 +7,6 @@ from bisect import bisect_right
 from collections.abc import Callable
 from typing import NamedTuple
 
-from grader.checks.wording import code
 from grader.measure.motion.command import number, scans
 from grader.measure.motion.ground import nearest
 from grader.measure.motion.quantities import metres, side
@@ -88,7 +87,7 @@ def _beside(recording: Recording, scan: Message, step: Truth) -> Misreading | No
     if abs(near.bearing_rad) <= _CONE_RAD or _drove_on(recording, step, is_as_near):
         return None
     return Misreading(
-        f"the nearest thing, {code(near.name)}, was then {metres(near.distance_m)} away, "
+        f"the nearest thing, {near.name}, was then {metres(near.distance_m)} away, "
         f"{side(near.bearing_rad)}",
         "Which range does the callback compare? min(ranges) is the nearest one anywhere. The beam "
         "straight ahead has the index round(-angle_min / angle_increment).",

@@ -18,8 +18,8 @@ from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
 from grader.report.drawing import ground_plan, svg
 from grader.report.drawing.ground_plan import View, disc, track
-from grader.safe_text import one_line
 from sim.motion import Pose, compose
+from sim.shapes import obstacle_words
 
 STRIDE = 5
 """Steps of 10 ms from one drawn point to the next."""
@@ -157,7 +157,7 @@ def _went(way_m: float, stopped: tuple[Truth, float] | None, touched: Sequence[T
     if stopped is not None:
         text += f" and stopped with an obstacle {metres(stopped[1])} ahead of its LiDAR"
     if touched:
-        names = listing(one_line(step.contact or "") for step in touched)
+        names = listing(obstacle_words(step.contact or "") for step in touched)
         text += f"; {counted(len(touched), 'contact')} with {names} (marked ×)"
     return text
 
