@@ -13,14 +13,7 @@ from grader.report.model.grade_part import GRADE, differences, grade_json
 from grader.report.model.result_model import CheckPart, Result
 from tests.report.sample import lost_points
 
-MEASURED = {
-    "schema",
-    "rosgrade_version",
-    "environment",
-    "started",
-    "duration_s",
-}
-"""Of a result; of its parts, see the tests."""
+MEASURED = {"schema", "rosgrade_version", "environment", "started", "duration_s"}
 MEASURED_OF_A_CHECK = {"observed", "disturbed", "traceback", "evidence"}
 
 
@@ -69,10 +62,7 @@ def test_measurements_are_no_part_of_it(other: Result) -> None:
         (with_check(expected="another"), ".expected: "),
         (changed(result(), checks=result().checks[1:]), "checks: "),
         (changed(result(), build=None), "build: "),
-        (
-            changed(result(), scenarios=(changed(result().scenarios[0], seed=8),)),
-            "].seed: ",
-        ),
+        (changed(result(), scenarios=(changed(result().scenarios[0], seed=8),)), "].seed: "),
     ],
 )
 def test_a_difference_is_named_with_its_place(other: Result, place: str) -> None:
