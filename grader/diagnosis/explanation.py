@@ -40,6 +40,7 @@ class Explanation:
 
     Attributes:
         sentence: What it explains: the text of the documentation.
+        example: How Python says it, or nothing.
     """
 
     symptom: type[Symptom[Any]]
@@ -48,6 +49,7 @@ class Explanation:
     module: str
     sentence: str
     is_general: bool = False
+    example: str = ""
 
 
 def add(entry: Explanation) -> None:

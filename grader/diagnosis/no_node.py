@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.checks.finding import Evidence, Moment
+from grader.checks.finding import Evidence
 from grader.checks.first_seen import nodes_seen, until_the_end
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
@@ -45,11 +45,6 @@ class NoNode(Symptom[Cause]):
     def process(self) -> Process:
         """The process that ran without a node."""
         return self.recording.processes[0]
-
-    @property
-    def nothing(self) -> Moment:
-        """That there was still no node."""
-        return until_the_end(self.recording, "still no node when the observation ended")
 
     def declares(self, kind: str) -> bool:
         """Whether the process declared something of a kind."""
@@ -158,7 +153,7 @@ def main_does_not_come_to_it(symptom: NoNode) -> Cause:
         "time.sleep() or input() before that, also at the top level of a module: a launched node "
         "has no keyboard.",
         Evidence(
-            moments=(symptom.nothing,),
+            moments=(until_the_end(recording, "still no node when the observation ended"),),
             places=(place,) if place else (),
             log=lines[-_LOG_LINES:],
         ),

@@ -100,7 +100,7 @@ def not_imported(symptom: Raised) -> str | None:
 
 
 for _row in TABLE.exceptions:
-    add(Explanation(Raised, _row.mistake, _row, __name__, _row.mistake))
+    add(Explanation(Raised, _row.mistake, _row, __name__, _row.mistake, example=_row.example))
 
 
 @explanation(Raised, general=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 from grader.diagnosis.process.raised import Failure
@@ -31,32 +30,23 @@ class Table(Model):
 TABLE = read_source(Path(__file__).with_suffix(".yaml")).read(Table)
 
 
-@dataclass(frozen=True)
-class NewerName:
-    """A name that is right in Jazzy.
+def newer_name(failure: Failure, recording: Recording) -> tuple[str, str] | None:
+    """The name that a failure is about, such as ``enum.StrEnum``, and what has it.
 
-    Attributes:
-        name: As in ``enum.StrEnum``.
-        home: What has it, such as ``Python 3.12``, and what that needs in its turn.
+    Returns:
+        None where it is not there in ROS 2 Jazzy either.
     """
-
-    name: str
-    home: str
-
-
-def newer_name(failure: Failure, recording: Recording) -> NewerName | None:
-    """The name that a failure is about, if only the machine that grades lacks it."""
     if failure.type not in _ERRORS:
         return None
     removed = _REMOVED.match(failure.message)
     found = next(filter(None, (words.match(failure.message) for words in _LACKS)), None)
     home, name = (found["home"], found["name"]) if found else ("numpy", removed and removed[1])
     if removed or name in TABLE.dropped.get(home, "").split():
-        return NewerName(f"numpy.{name}", "numpy 1.26 (for Python 3.12 and older)")
+        return f"numpy.{name}", "numpy 1.26 (for Python 3.12 and older)"
     version = recording.environment.get("python", "")
     if not version or tuple(map(int, version.split(".")[:2])) >= _JAZZY_PYTHON:
         return None
     if name not in TABLE.added.get(home, "").split():
         return None
     home = "pathlib.Path" if home.endswith("Path") else home
-    return NewerName(f"{home}.{name}".removeprefix("."), "Python 3.12")
+    return f"{home}.{name}".removeprefix("."), "Python 3.12"

@@ -217,7 +217,7 @@ def machine_lacks_it(symptom: ProcessExit) -> Cause | None:
     newer = failure and newer_name(failure, recording)
     lacking = failure and lacking_package(failure, recording)
     if newer:
-        name, needs = newer.name, newer.home
+        name, needs = newer
     elif lacking:
         name, needs = lacking, f"`sudo apt install ros-jazzy-{lacking.replace('_', '-')}`"
     else:
