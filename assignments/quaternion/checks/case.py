@@ -35,10 +35,7 @@ class CaseLimits:
 
 @dataclass(frozen=True)
 class Answer:
-    """One answer to a question, with its angle to the right rotation; infinite where it is none.
-
-    Its length is that of a quaternion, and None for angles.
-    """
+    """One answer to a question: its angle to the right rotation, and a quaternion's length."""
 
     row: tuple[float, ...]
     error_rad: float
