@@ -34,11 +34,9 @@ _BRIGHTNESS = 2000.0
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """One turn of the LiDAR, as it is reported.
+    """One turn of the LiDAR, as it is reported: ranges of shape (beams,).
 
-    Attributes:
-        ranges_m: Shape (beams,), float32. What a beam without a distance holds is set by
-            :class:`~sim.description.NoReturn`.
+    What a beam without a distance holds is set by :class:`~sim.description.NoReturn`.
     """
 
     time_ns: int

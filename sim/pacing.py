@@ -26,11 +26,7 @@ class Lateness:
 
 
 class Pacer:
-    """Compares done steps with a clock.
-
-    Step ``k`` (from 1) ends ``k`` steps after the beginning and is never done earlier. No step
-    is left out: simulated time is what it says, to the step.
-    """
+    """Compares done steps with a clock: none is left out, and none is done before its end."""
 
     def __init__(self, begin_ns: int) -> None:
         """Begin at a time of the steady clock."""

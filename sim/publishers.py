@@ -121,12 +121,7 @@ class TransformPublisher:
     def __init__(
         self, node: Node, topic: TransformTopic, odometry: OdometryOptions, lidar: Lidar, tf: Any
     ) -> None:
-        """Create the publishers.
-
-        Args:
-            topic: Names and QoS; the static transform is always transient-local.
-            tf: The type tf2_msgs/msg/TFMessage.
-        """
+        """Create the publishers of ``tf``, the type tf2_msgs/msg/TFMessage."""
         self._moving, self._fixed = TransformStamped(), TransformStamped()
         self._moving.header.frame_id = odometry.frame
         self._moving.child_frame_id = self._fixed.header.frame_id = odometry.child_frame

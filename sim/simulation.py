@@ -27,16 +27,13 @@ STEP_S = STEP_NS / NS
 
 
 class EventKind(str, Enum):
-    """Something worth a line in a recording."""
+    """Something worth a line in a recording; after either of a command the robot stops."""
 
     CONTACT_BEGAN = "contact_began"
     CONTACT_ENDED = "contact_ended"
     COMMAND_REJECTED = "command_rejected"
-    """A command was NaN or infinite; the robot is commanded to stop instead."""
     COMMAND_TIMEOUT = "command_timeout"
-    """No command came for the robot's ``command_timeout``; it is commanded to stop."""
     PUSHED = "pushed"
-    """A push began that moves the robot besides its wheels."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from grader.measure.motion.approach import WRAP_HINT, Approach, long_turns
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.quantities import metres, point, speed, turn
 from grader.measure.motion.track import evidence_at, is_at_rest, turned_rad
-from grader.recording.model import NS, Ending, Recording
+from grader.recording.model import NS, Ending
 from grader.recording.simulated import Truth
 from grader.spec.unit import format_duration
 
@@ -28,11 +28,6 @@ class GoalMissed(Symptom[Cause]):
 
     run: Approach
     position_m: float
-
-    @property
-    def recording(self) -> Recording:
-        """Of the run."""
-        return self.run.recording
 
     @property
     def last(self) -> Truth:
@@ -68,7 +63,7 @@ class GoalMissed(Symptom[Cause]):
     def cause(self, words: str, hint: str) -> Cause:
         """The symptom in words, followed by more, with the distance over time."""
         evidence = evidence_at(
-            self.recording, "nearest to the goal", self.nearest.time_ns, self.run.distance_plot
+            self.run.recording, "nearest to the goal", self.nearest.time_ns, self.run.distance_plot
         )
         return Cause(f"{self.seen}{words}", hint, evidence)
 
@@ -82,7 +77,7 @@ def why_not_there(run: Approach, position_m: float) -> Cause | None:
 @explanation(GoalMissed)
 def no_cpu_time(symptom: GoalMissed) -> Cause | None:
     """The machine gave the run too little CPU time; an error, and never a lost point."""
-    recording, truth = symptom.recording, symptom.run.truth
+    recording, truth = symptom.run.recording, symptom.run.truth
     lost_s = stolen_s(recording, truth[0].time_ns, truth[-1].time_ns)
     is_starved = lost_s > 0.25 * symptom.watched_s and recording.ending is Ending.TIMEOUT
     if symptom.is_at_rest or not is_starved:
@@ -96,7 +91,7 @@ def no_cpu_time(symptom: GoalMissed) -> Cause | None:
 @explanation(GoalMissed)
 def off_course(symptom: GoalMissed) -> Cause | None:
     """The process ended, the robot touched something, or no command came for long."""
-    return why_off_course(symptom.recording)
+    return why_off_course(symptom.run.recording)
 
 
 @explanation(GoalMissed)
@@ -130,7 +125,7 @@ def wrong_place(symptom: GoalMissed) -> Cause | None:
 @explanation(GoalMissed)
 def loop_in_a_callback(symptom: GoalMissed) -> Cause | None:
     """A callback does not return: its loop never sees newer odometry."""
-    stuck = None if symptom.is_at_rest else stuck_callback(symptom.recording)
+    stuck = None if symptom.is_at_rest else stuck_callback(symptom.run.recording)
     if stuck is None:
         return None
     return symptom.cause(

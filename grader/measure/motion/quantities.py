@@ -1,4 +1,4 @@
-"""Measures of motion as people read them: lengths, speeds and angles, each with its unit."""
+"""Measures of motion as people read them, each with its unit."""
 
 from __future__ import annotations
 
