@@ -39,19 +39,18 @@ IDENTITY = {
 def say(status, mark):
     text = f"{mark}said"
     evidence = Evidence(
-        moments=(Moment(f"{text}moment", 0.5),),
-        places=(SourceError(f"{text}.py", 3, f"{text}place"),),
-        log=(f"{text}log",),
-        plots=(Plot(f"{text}plot", f"{text}x", f"{text}y", (0.0, 1.0), (0.0, 2.0)),),
-        tables=(Table(f"{text}table", (text,), ((text,),)),),
+        moments=(Moment(text, 0.5),),
+        places=(SourceError(f"{text}.py", 3, text),),
+        log=(text,),
+        plots=(Plot(text, text, text, (0.0, 1.0), (0.0, 2.0)),),
+        tables=(Table(text, (text,), ((text,),)),),
     )
-    if status == "crashed":
-        return ValueError(f"{text}crash")
-    if status == "passed":
-        return Finding.passed(f"{text}expected", f"{text}observed", evidence)
-    if status == "failed":
-        return Finding.failed(f"{text}expected", f"{text}observed", f"{text}hint", evidence)
-    return Finding.error(f"{text}expected", f"{text}observed", hint=f"{text}hint")
+    return {
+        "crashed": ValueError(text),
+        "passed": Finding.passed(text, text, evidence),
+        "failed": Finding.failed(text, text, text, evidence),
+        "error": Finding.error(text, text, hint=text),
+    }[status]
 
 
 def hidden(name, points):
