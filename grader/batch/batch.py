@@ -64,11 +64,7 @@ class Batch:
     def read(
         self, rows: Sequence[HandedIn], on_read: Callable[[str], None] = lambda _: None
     ) -> tuple[list[Entry], dict[str, Path]]:
-        """Read what was handed in, and find the same among it.
-
-        Raises:
-            UsageError: A key to grade again is not there, or results are of another assignment.
-        """
+        """Read what was handed in, and find the same among it."""
         self._refuse_other()
         unknown = self.retry - {RETRY_ALL, RETRY_ERRORS} - {row.key for row in rows}
         if unknown:
@@ -105,10 +101,6 @@ class Batch:
 
         Yields:
             Every row, in the order in which they are finished; at first those that were.
-
-        Raises:
-            ExecutorLost: There is nobody any more who could grade the others.
-            UsageError: The folder of the results is not there any more.
         """
         for key, entry in self._entries.items():
             if key not in to_do and not entry.same_as:

@@ -57,9 +57,6 @@ def regrade_class(
     Args:
         only: Folder of a row's report: only that one is judged, and what is the same as it; or
             None for all.
-
-    Raises:
-        UsageError: The grades are of another assignment.
     """
     name, entries = ledger.read()
     refuse_other(ledger.out, name, loaded)

@@ -64,11 +64,7 @@ class LocalExecutor:
 
 
 def _connected(address: str, connect: Any) -> Any:
-    """A client of a scheduler.
-
-    Raises:
-        UsageError: None answers.
-    """
+    """A client of a scheduler."""
     answer: Future[Any] = Future()
 
     def ask() -> None:
@@ -97,11 +93,7 @@ class DaskExecutor:
     """
 
     def __init__(self, address: str, order: Order) -> None:
-        """Connect.
-
-        Raises:
-            UsageError: Dask is not installed, or no scheduler answers.
-        """
+        """Connect."""
         try:
             import distributed
         except ImportError as error:

@@ -83,11 +83,7 @@ def write_report(graded: Graded, folder: Path, result: Result) -> Path:
 
 
 def refuse_foreign(folder: Path, *, keep: bool) -> None:
-    """Let no report replace recordings, or an install space, that are not of an earlier report.
-
-    Raises:
-        UsageError: It would.
-    """
+    """Let no report replace recordings, or an install space, that are not of an earlier report."""
     recordings = folder / RECORDINGS_FOLDER
     foreign = any(recordings.glob("*.mcap")) and not (recordings / SUBMISSION_FILE).is_file()
     install = folder / INSTALL_FOLDER
@@ -101,9 +97,6 @@ def keep_install(graded: Graded, folder: Path) -> Path | None:
 
     Returns:
         The copy, or None where nothing was built.
-
-    Raises:
-        UsageError: It cannot be written there.
     """
     install = graded.prepared.install
     if install is None:

@@ -67,11 +67,7 @@ class Grading:
         *,
         seed: int | None = None,
     ) -> None:
-        """Set up.
-
-        Raises:
-            GraderFault: A library that the assignment allows is not installed here.
-        """
+        """Set up."""
         self._loaded = loaded
         self._runner = runner
         self._cache = cache
@@ -95,10 +91,6 @@ class Grading:
 
         Args:
             name: What to call the submission; by default after its folder or archive.
-
-        Raises:
-            UsageError: There is nothing at ``path``.
-            GraderFault: The build could not be tried, or what was built is gone.
         """
         self._type_support.prefixes(on_build)
         sandbox = self._sandbox
@@ -169,9 +161,6 @@ class Grading:
         Args:
             folder: Where the recordings and the submission's facts go; recordings of an
                 earlier run are removed.
-
-        Raises:
-            GraderFault: Somebody deletes what was built while it runs.
         """
         for old in folder.glob("*.mcap"):
             old.unlink()

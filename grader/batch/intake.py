@@ -66,9 +66,6 @@ def take_in(
 
     Returns:
         The rows, sorted by key; those of the roster that handed in nothing are among them.
-
-    Raises:
-        UsageError: There is nothing, or it is one submission and not a folder of them.
     """
     folder = _opened(source, staging)
     _refuse_single(folder, source)
@@ -88,9 +85,6 @@ def take_in_roster(
     Args:
         base: Folder that its paths are relative to.
         staging: An empty folder for clones.
-
-    Raises:
-        UsageError: No row names a submission.
     """
     if not any(student.submission for student in roster.students):
         raise UsageError(

@@ -68,11 +68,7 @@ class Ledger:
 
     @contextmanager
     def opened(self) -> Iterator[Ledger]:
-        """Hold the folder for this process, with nothing half-written in it.
-
-        Raises:
-            UsageError: Another batch writes to it, it holds something else, or it cannot be made.
-        """
+        """Hold the folder for this process, with nothing half-written in it."""
         check_folder(self.out)
         try:
             self.out.mkdir(parents=True, exist_ok=True)
@@ -99,12 +95,7 @@ class Ledger:
                 shutil.rmtree(self.out / _PARTIAL, ignore_errors=True)
 
     def refuse_lost(self) -> None:
-        """Go on only as long as the folder is the one that was opened.
-
-        Raises:
-            UsageError: Somebody has removed it, or put another in its place: what was graded so
-                far is not in it.
-        """
+        """Go on only as long as the folder is the one that was opened."""
         if self._held is None:
             return
         try:
@@ -181,9 +172,6 @@ class Ledger:
 
         Args:
             location: Where it lies; None for one of rosgrade's own.
-
-        Raises:
-            UsageError: The folder is not there any more, or cannot be written.
         """
         self.refuse_lost()
         data = {
@@ -193,20 +181,12 @@ class Ledger:
         write_whole(self.out / BATCH_FILE, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
 
     def read(self) -> tuple[str, tuple[Entry, ...]]:
-        """Read what :meth:`write` wrote: the assignment's id and the rows.
-
-        Raises:
-            UsageError: It is no folder of a batch, or damaged.
-        """
+        """Read what :meth:`write` wrote: the assignment's id and the rows."""
         name, _, entries = self._read()
         return name, entries
 
     def location(self) -> str | None:
-        """Where the assignment lay; None for one of rosgrade's own, or where it is not known.
-
-        Raises:
-            UsageError: As :meth:`read`.
-        """
+        """Where the assignment lay; None for one of rosgrade's own, or where it is not known."""
         return self._read()[1]
 
     def _read(self) -> tuple[str, str | None, tuple[Entry, ...]]:

@@ -34,9 +34,6 @@ def read_references(loaded: LoadedAssignment) -> dict[str, Replay]:
 
     Args:
         loaded: The assignment; it need not have such a file.
-
-    Raises:
-        AssignmentError: The file is damaged.
     """
     found = _read(loaded.folder / REFERENCE_FILE)
     return {
@@ -59,11 +56,7 @@ def stale(loaded: LoadedAssignment) -> tuple[str, ...]:
 def keep_reference(
     loaded: LoadedAssignment, grade: Grade, recordings: Mapping[str, Recording]
 ) -> str:
-    """Keep the runs of the reference, and say where.
-
-    Raises:
-        UsageError: The reference lost points: nothing is kept.
-    """
+    """Keep the runs of the reference, and say where."""
     name = loaded.assignment.id
     if not grade.full_points:
         raise UsageError(f"{name}: the reference does not get full points, so no run is kept")

@@ -41,11 +41,7 @@ class FoundRecordings:
 
     @property
     def assignment(self) -> str:
-        """Id of the assignment that it was recorded for.
-
-        Raises:
-            UsageError: It is not known.
-        """
+        """Id of the assignment that it was recorded for."""
         if self.result is not None:
             return self.result.assignment.id
         for recording in self.recordings.values():
@@ -65,11 +61,7 @@ class FoundRecordings:
 
 
 def find(path: Path) -> FoundRecordings:
-    """Find the recordings at a path.
-
-    Raises:
-        UsageError: There is nothing to judge, or a file is damaged.
-    """
+    """Find the recordings at a path."""
     if not path.exists():
         raise UsageError(f"{path}: does not exist")
     if path.is_file():
@@ -100,9 +92,6 @@ def stored_assignment(path: Path, name: str, location: str | None, *command: str
 
     Args:
         location: Where it lay; None for one of rosgrade's own, or where it is not known.
-
-    Raises:
-        UsageError: It is not there.
     """
     if location is None and name in list_assignments():
         # And not one of that name in the current folder.
@@ -123,11 +112,7 @@ def regrade_command(path: Path, loaded: LoadedAssignment) -> str:
 
 
 def refuse_other(folder: Path, name: str, loaded: LoadedAssignment) -> None:
-    """Let nobody lose all points because a recording is judged as of another assignment.
-
-    Raises:
-        UsageError: It is another one.
-    """
+    """Let nobody lose all points because a recording is judged as of another assignment."""
     if name != loaded.assignment.id:
         raise UsageError(f"{folder}: holds the grades of {name}, not of {loaded.assignment.id}")
 

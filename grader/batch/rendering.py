@@ -32,9 +32,6 @@ def find_reports(out: Path) -> tuple[Path, ...]:
 
     Hidden folders are left out: a batch that still runs writes in them. So is what a batch has
     left in its folder of rows that it does not have any more, or of what was handed in before.
-
-    Raises:
-        UsageError: There is none, or the batch's list of its rows is damaged.
     """
     if not out.exists():
         raise UsageError(f"{out}: does not exist")
@@ -68,11 +65,7 @@ def _of_batch(ledger: Ledger) -> tuple[Path, ...]:
 
 
 def read_class(out: Path) -> list[ClassRow]:
-    """The rows of the class at a path; of a folder of single reports, a row for each.
-
-    Raises:
-        UsageError: There is no result, or one cannot be read.
-    """
+    """The rows of the class at a path; of a folder of single reports, a row for each."""
     results = [read_result(folder / RESULT_FILE) for folder in find_reports(out)]
     if (out / BATCH_FILE).is_file():
         ledger = Ledger(out)
@@ -85,9 +78,6 @@ def render_all(folders: Sequence[Path], assignment: str | None = None) -> Iterat
 
     Args:
         assignment: Id or folder; by default the one that each result names.
-
-    Raises:
-        UsageError: As :func:`render_again`.
     """
     render = partial(_render, assignment=assignment)
     if len(folders) < _MANY or cpu_count() == 1:
@@ -111,10 +101,6 @@ def render_again(folder: Path, assignment: str | None = None) -> Written:
 
     Args:
         assignment: Id or folder; by default the one that the result names.
-
-    Raises:
-        UsageError: Something is missing, or the assignment is no longer the one that was graded
-            with: then only a regrade gives a report that fits.
     """
     found = find(folder)
     result = found.result or read_result(folder / RESULT_FILE)

@@ -112,11 +112,7 @@ def name_forms(name: str) -> tuple[str, ...]:
 
 
 def read_roster(file: Path) -> Roster:
-    """Read a roster: CSV with commas, semicolons or tabs, and a header.
-
-    Raises:
-        UsageError: It cannot be read, or no column names a student.
-    """
+    """Read a roster: CSV with commas, semicolons or tabs, and a header."""
     try:
         data = file.read_bytes()
     except OSError as error:
@@ -134,11 +130,7 @@ def read_roster(file: Path) -> Roster:
 
 
 def parse_roster(text: str, source: str) -> Roster:
-    """Read the text of a roster.
-
-    Raises:
-        UsageError: It is not CSV, or no column names a student.
-    """
+    """Read the text of a roster."""
     lines = text.splitlines(keepends=True)
     delimiter = max(",;\t", key=lines[0].count) if lines else ","
     reader = csv.reader(lines, delimiter=delimiter, strict=True)

@@ -85,12 +85,7 @@ class TrialResult:
 
 
 def trials(loaded: LoadedAssignment, reference: Path | None = None) -> tuple[Trial, ...]:
-    """The trials of an assignment: its reference, its variants, its mutants, its starter.
-
-    Raises:
-        UsageError: It has no reference or no mutants.
-        AssignmentError: Its mutants do not apply.
-    """
+    """The trials of an assignment: its reference, its variants, its mutants, its starter."""
     mutants = load_mutants(loaded.assignment, loaded.folder, reference)
     changes = [*mutants.variants, *mutants.mutants]
     return (

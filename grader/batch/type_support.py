@@ -29,11 +29,7 @@ class TypeSupport:
         self._found: dict[Path, frozenset[str]] | None = None
 
     def prefixes(self, on_build: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
-        """Install spaces of ours for the cell; built where they are not there yet, or any more.
-
-        Raises:
-            GraderFault: They cannot be built here.
-        """
+        """Install spaces of ours for the cell; built where they are not there yet, or any more."""
         with self._lock:
             # The cache may be emptied or damaged while a class is graded, or rosgrade watches.
             if self._found is None or any(

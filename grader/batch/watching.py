@@ -34,11 +34,7 @@ class Worker(Protocol):
         """Get ready; called before a thread of its own calls :meth:`grade`."""
 
     def grade(self) -> Graded:
-        """Grade it.
-
-        Raises:
-            RosgradeError: It could not be graded.
-        """
+        """Grade it."""
 
     def cancel(self) -> None:
         """End :meth:`grade`, which may then return or raise anything."""
@@ -84,11 +80,7 @@ class Watching:
         self._stop = threading.Event()
 
     def events(self) -> Iterator[Began | Cancelled | Ended]:
-        """Watch and grade.
-
-        Raises:
-            GraderFault: The files cannot be watched.
-        """
+        """Watch and grade."""
         with ThreadPoolExecutor(3, "watch") as pool:
             for look in (self._watch_submission, self._watch_assignment):
                 self._watches.append(self._start(pool, look))
@@ -179,11 +171,7 @@ class Watching:
 
 
 def _ended(grading: Future[Graded]) -> Ended:
-    """How a grading ended.
-
-    Raises:
-        Exception: It was a bug.
-    """
+    """How a grading ended."""
     try:
         return Ended(grading.result())
     except RosgradeError as problem:

@@ -48,9 +48,6 @@ def grade_into(grading: Grading, key: str, path: Path, folder: Path) -> Graded:
 
     Args:
         folder: For everything; exists.
-
-    Raises:
-        GraderFault: Not even the reading or the building could be tried.
     """
     clock = Clock()
     graded = grading.grade(path, folder / RECORDINGS_FOLDER, name=key)
@@ -107,12 +104,7 @@ class Parcel:
 
     @classmethod
     def of(cls, key: str, path: Path) -> Parcel:
-        """Pack what was handed in.
-
-        Raises:
-            UsageError: Nothing is there.
-            GraderFault: It cannot be read here, for no fault of the student.
-        """
+        """Pack what was handed in."""
         try:
             with opened(path) as located:
                 if not path.is_dir():
@@ -132,11 +124,7 @@ class Parcel:
 
 
 def grade_remotely(order: Order, parcel: Parcel) -> bytes:
-    """Grade on a worker of a cluster.
-
-    Raises:
-        GraderFault: The worker has another version of the assignment.
-    """
+    """Grade on a worker of a cluster."""
     grading = _grading(order)
     with Scratch("worker") as temporary:
         path = temporary / "in" / parcel.name
@@ -182,9 +170,6 @@ def make_grading(
 
     Args:
         admission: Of cells; by default the machine's load decides.
-
-    Raises:
-        GraderFault: There is no sandbox here, and not having one was not asked for.
     """
     sandbox = _sandbox(order.sandbox)
     runner = Runner(ros.find(), admission or Admission(), sandbox=sandbox)

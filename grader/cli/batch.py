@@ -170,11 +170,7 @@ def _rows(
 
 
 def _refuse_within(out: Path, rows: Sequence[HandedIn]) -> None:
-    """Let no results be written into what is graded: they would be a part of it.
-
-    Raises:
-        UsageError: They would.
-    """
+    """Let no results be written into what is graded: they would be a part of it."""
     from grader.report.files import refuse_part
 
     around = {folder.name for folder in (out.absolute(), *out.absolute().parents)}
@@ -185,11 +181,7 @@ def _refuse_within(out: Path, rows: Sequence[HandedIn]) -> None:
 
 
 def _refuse_more(submissions: Path, others: Sequence[str]) -> None:
-    """Say what to name instead of several submissions, which is what a shell makes of `class/*`.
-
-    Raises:
-        UsageError: There are others.
-    """
+    """Say what to name instead of several submissions, which is what a shell makes of `class/*`."""
     if not others:
         return
     folders = {path.parent for path in (submissions, *map(Path, others))}
@@ -202,11 +194,7 @@ def _refuse_more(submissions: Path, others: Sequence[str]) -> None:
 
 
 def _at_once(jobs: str) -> int | None:
-    """How many at once; None lets the load decide.
-
-    Raises:
-        UsageError: It is neither a number nor `auto`.
-    """
+    """How many at once; None lets the load decide."""
     if jobs == _AUTO:
         return None
     if not (jobs.isdecimal() and int(jobs) > 0):

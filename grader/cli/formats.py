@@ -124,11 +124,7 @@ class Formats:
 
     @contextmanager
     def grading(self) -> Iterator[None]:
-        """While this lasts, what a student's code prints cannot command whoever reads along.
-
-        Raises:
-            UsageError: A file cannot be written, or Classroom 50 did not start this.
-        """
+        """While this lasts, what a student's code prints cannot command whoever reads along."""
         # Each is imported only where it is asked for: together they take 0.2 s.
         if self.classroom50:
             from grader.report.formats import classroom50
@@ -152,11 +148,7 @@ class Formats:
             print(github.resume_commands(token), flush=True)
 
     def write(self, result: Result, submission: Path | None = None) -> None:
-        """Write everything that was asked for.
-
-        Raises:
-            UsageError: A file cannot be read or written.
-        """
+        """Write everything that was asked for."""
         from grader.report.files import write_whole
 
         options = FormatOptions(self.junit_family is JunitFamily.XUNIT1, self.gradescope_metadata)

@@ -26,11 +26,7 @@ SandboxChoice = Annotated[
 
 
 def chosen_sandbox(choice: Choice, progress: Progress) -> Sandbox | None:
-    """The sandbox that was asked for; says which one it is, or that there is none.
-
-    Raises:
-        GraderFault: bwrap was asked for, and does not work here.
-    """
+    """The sandbox that was asked for; says which one it is, or that there is none."""
     from grader.sandbox.trial import choose
 
     sandbox, notice = choose(choice, cache_folder())

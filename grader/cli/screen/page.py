@@ -39,9 +39,6 @@ class ReportPage:
         Args:
             report: The report's file; it need not be there yet.
             port: Of this machine; 0 takes a free one.
-
-        Raises:
-            OSError: The port is taken.
         """
         self._report = report
         self._state = PageState()

@@ -59,11 +59,7 @@ class _Lasting:
 
 @contextmanager
 def lasting_streams() -> Iterator[None]:
-    """Let the block go on, and end with its own status, whoever reads what it writes.
-
-    Raises:
-        GraderFault: Something is missing of what was written to standard output.
-    """
+    """Let the block go on, and end with its own status, whoever reads what it writes."""
     # Else a file or a pipe of ours would take the number, and be closed or written to by others.
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= _ERRORS:
         os.set_inheritable(descriptor, True)
