@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -68,7 +67,9 @@ class Batch:
         self._refuse_other()
         unknown = self.retry - {RETRY_ALL, RETRY_ERRORS} - {row.key for row in rows}
         if unknown:
-            raise UsageError(" ".join(_unknown(name, rows) for name in sorted(unknown)))
+            name = min(unknown)
+            nearest = did_you_mean(name, [row.key for row in rows])
+            raise UsageError(f"--retry: there is no submission called {name}.{nearest}")
         paths: dict[str, Path] = {}
         first: dict[str, str] = {}
         teams = _teams(rows)
@@ -116,7 +117,6 @@ class Batch:
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in finished:
                     key, partial = running.pop(future)
-                    self.ledger.refuse_lost()
                     self._take(key, partial, future)
                     yield from self._finished(key, fresh=True)
         finally:
@@ -154,7 +154,7 @@ class Batch:
     def _refuse_other(self) -> None:
         """Let no batch of another assignment replace these grades."""
         try:
-            name, _ = self.ledger.read()
+            name = self.ledger.read().assignment
         except UsageError:
             # There is none yet, or it is damaged; what it says is written anew from the class.
             return
@@ -225,7 +225,7 @@ class Batch:
         recordings = partial / RECORDINGS_FOLDER
         recordings.mkdir()
         for file in found.files.values():
-            _link(file, recordings / file.name)
+            shutil.copyfile(file, recordings / file.name)
         write_whole(recordings / SUBMISSION_FILE, to_json(record))
         graded = regrade(self.loaded, replace(found, submission=record))
         files = {scenario: recordings / file.name for scenario, file in found.files.items()}
@@ -239,15 +239,6 @@ class Batch:
         )
 
 
-def _unknown(name: str, rows: Sequence[HandedIn]) -> str:
-    """Say that nobody is called so, and who may be meant: students have names beside their keys."""
-    text = f"--retry: there is no submission called {name}."
-    keys = [row.key for row in rows if name.casefold() in (row.key.casefold(), row.name.casefold())]
-    if keys:
-        return f"{text} Did you mean {' or '.join(map(repr, keys[:_MOST_NAMED]))}?"
-    return text + did_you_mean(name, [row.key for row in rows])
-
-
 def _teams(rows: Sequence[HandedIn]) -> dict[str, str]:
     """For each of a team, who share what was handed in: the key of the first of them."""
     shared: dict[Path, list[str]] = {}
@@ -255,10 +246,3 @@ def _teams(rows: Sequence[HandedIn]) -> dict[str, str]:
         if row.path is not None:
             shared.setdefault(row.path, []).append(row.key)
     return {key: keys[0] for keys in shared.values() if len(keys) > 1 for key in keys}
-
-
-def _link(file: Path, target: Path) -> None:
-    try:
-        os.link(file, target)
-    except OSError:
-        shutil.copyfile(file, target)

@@ -58,8 +58,9 @@ def regrade_class(
         only: Folder of a row's report: only that one is judged, and what is the same as it; or
             None for all.
     """
-    name, entries = ledger.read()
-    refuse_other(ledger.out, name, loaded)
+    written = ledger.read()
+    entries = written.entries
+    refuse_other(ledger.out, written.assignment, loaded)
     chosen = {
         entry.same_as or entry.key
         for entry in entries

@@ -75,14 +75,11 @@ def _connected(address: str, connect: Any) -> Any:
 
     threading.Thread(target=ask, name="connect", daemon=True).start()
     wait([answer], _ANSWER_S)
-    error = answer.exception() if answer.done() else None
-    if isinstance(error, OSError | ValueError | TimeoutError):
-        raise UsageError(f"no Dask scheduler answers at {address}: {error}") from error
-    if error is not None or not answer.done():
+    if not answer.done() or answer.exception() is not None:
         raise UsageError(
-            f"no Dask scheduler answers at {address}: something else does; its dashboard has "
-            "another port (8787) than the scheduler itself (8786)"
-        ) from error
+            f"no Dask scheduler answers at {address}; a scheduler's port is 8786, that of its "
+            "dashboard 8787"
+        )
     return answer.result()
 
 

@@ -8,7 +8,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import BuildLimitOptions
@@ -27,10 +26,6 @@ from grader.sandbox.python_tree import check_installed
 from grader.submission.build.bounded import OutputLimits
 from grader.submission.build.colcon import BuildLimits
 from grader.submission.prepare import Prepared, prepare
-from grader.tree import listing
-
-if TYPE_CHECKING:
-    from grader.sandbox.sandbox import Sandbox
 
 RECORDINGS_FOLDER = "recordings"
 SUBMISSION_FILE = "submission.json"
@@ -93,7 +88,9 @@ class Grading:
             name: What to call the submission; by default after its folder or archive.
         """
         self._type_support.prefixes(on_build)
-        sandbox = self._sandbox
+        sandbox = self._runner.sandbox
+        if sandbox is not None:
+            sandbox = sandbox.allowing(self._loaded.assignment.libraries)
         # Each of them takes a CPU or more; beyond that they would only hold up each other.
         with self._builds:
             prepared = prepare(
@@ -115,36 +112,6 @@ class Grading:
         """The sandbox that is in force, in a few words."""
         return self._runner.sandbox.description if self._runner.sandbox else "none"
 
-    @property
-    def _sandbox(self) -> Sandbox | None:
-        sandbox = self._runner.sandbox
-        return sandbox and sandbox.allowing(self._loaded.assignment.libraries)
-
-    def _watched(self, prepared: Prepared) -> Callable[[Mapping[str, Recording]], None]:
-        """See that no point is lost because the cache is emptied or damaged while nodes run.
-
-        Returns:
-            What takes the recordings and raises :class:`GraderFault` if anything that they run
-            with was deleted or changed since.
-        """
-        sandbox = self._sandbox
-        check_python = sandbox.watched() if sandbox is not None and prepared.install else None
-        folders = (*prepared.underlays, *((prepared.install,) if prepared.install else ()))
-        before = [(folder, listing(folder)) for folder in folders]
-
-        def check(recordings: Mapping[str, Recording]) -> None:
-            for folder, files in before:
-                if not files <= listing(folder):
-                    raise GraderFault(
-                        f"files of what was built were deleted or changed in {folder.parent} "
-                        "while it ran, perhaps by somebody who tidied up; grade again"
-                    )
-            # To look at every file of it takes 0.1 s; without one a program ends by itself.
-            if check_python is not None and any(map(_has_died, recordings.values())):
-                check_python()
-
-        return check
-
     def close(self) -> None:
         """End every build and cell that runs; what is being graded ends as interrupted."""
         self._stop.set()
@@ -164,7 +131,6 @@ class Grading:
         """
         for old in folder.glob("*.mcap"):
             old.unlink()
-        check_there = self._watched(prepared)
         write_whole(folder / SUBMISSION_FILE, to_json(prepared.record))
         runs: dict[str, int] = {}
         faults: dict[str, str] = {}
@@ -179,8 +145,6 @@ class Grading:
             self._run_all(run, alone, recordings, faults, alone=True)
             runs.update((name, runs.get(name, 0) + 1) for name in (*again, *alone))
             result = grade(self._loaded, prepared.record, recordings, faults)
-            if not result.full_points:
-                check_there(recordings)
             renamed = [name for name, known in remaps.items() if not result.remaps[name] <= known]
             if attempt < MOST_RUNS and renamed:
                 remaps = {name: known | result.remaps[name] for name, known in remaps.items()}
@@ -262,10 +226,6 @@ class Grading:
             # A full disk, a folder that somebody removed: it is tried again, and the others go on.
             told = GraderFault(f"this machine: {str(error)[:_LONGEST_WORDS]}")
             raise machine_fault(error) or told from error
-
-
-def _has_died(recording: Recording) -> bool:
-    return any(process.stopped_by == "itself" for process in recording.processes)
 
 
 def _build_limits(options: BuildLimitOptions) -> BuildLimits:

@@ -259,9 +259,7 @@ def _gradescope(file: Path) -> Mapping[str, Any]:
         return {}
     try:
         data = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except RecursionError as error:
-        raise UsageError(f"{file}: cannot be read: lists in lists in lists, too deep") from error
-    except (OSError, ValueError, yaml.YAMLError) as error:
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         # A ValueError: bytes that are no UTF-8, or a date that there is none of.
         raise UsageError(f"{file}: cannot be read: {error}") from error
     return data if isinstance(data, dict) else {}

@@ -58,13 +58,26 @@ class Entry:
     team: str = ""
 
 
+@dataclass(frozen=True)
+class BatchRows:
+    """What a batch consists of.
+
+    Attributes:
+        assignment: Its id.
+        location: Where the assignment lies; None for one of rosgrade's own.
+    """
+
+    assignment: str
+    location: str | None
+    entries: tuple[Entry, ...]
+
+
 class Ledger:
     """The folder of a batch."""
 
     def __init__(self, out: Path) -> None:
         """Name the folder; nothing is made yet."""
         self.out = out
-        self._held: os.stat_result | None = None
 
     @contextmanager
     def opened(self) -> Iterator[Ledger]:
@@ -85,7 +98,6 @@ class Ledger:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
                 raise UsageError(f"{self.out}: another batch is writing to it") from error
-            self._held = os.fstat(lock.fileno())
             self._put_back()
             shutil.rmtree(self.out / _PARTIAL, ignore_errors=True)
             (self.out / _PARTIAL).mkdir()
@@ -93,20 +105,6 @@ class Ledger:
                 yield self
             finally:
                 shutil.rmtree(self.out / _PARTIAL, ignore_errors=True)
-
-    def refuse_lost(self) -> None:
-        """Go on only as long as the folder is the one that was opened."""
-        if self._held is None:
-            return
-        try:
-            same = os.path.samestat((self.out / _LOCK).stat(), self._held)
-        except OSError:
-            same = False
-        if not same:
-            raise UsageError(
-                f"{self.out}: was removed or replaced while the batch ran; the same command grades "
-                "what is missing"
-            )
 
     @classmethod
     def around(cls, report: Path) -> Ledger | None:
@@ -131,7 +129,9 @@ class Ledger:
         target = self.folder(key)
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.exists():
-            _carry_over(target, partial)
+            keep_earlier(target / RESULT_FILE)
+            if (target / _EARLIER).is_dir():
+                shutil.copytree(target / _EARLIER, partial / _EARLIER)
         # Else a power cut could leave a folder in its place with nothing in its files.
         for item in (*partial.rglob("*"), partial):
             _sync(item)
@@ -173,29 +173,20 @@ class Ledger:
         Args:
             location: Where it lies; None for one of rosgrade's own.
         """
-        self.refuse_lost()
         data = {
             "assignment": {"id": assignment, "sha256": assignment_sha256, "location": location},
             "rows": [asdict(entry) for entry in entries],
         }
         write_whole(self.out / BATCH_FILE, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
 
-    def read(self) -> tuple[str, tuple[Entry, ...]]:
-        """Read what :meth:`write` wrote: the assignment's id and the rows."""
-        name, _, entries = self._read()
-        return name, entries
-
-    def location(self) -> str | None:
-        """Where the assignment lay; None for one of rosgrade's own, or where it is not known."""
-        return self._read()[1]
-
-    def _read(self) -> tuple[str, str | None, tuple[Entry, ...]]:
+    def read(self) -> BatchRows:
+        """Read what :meth:`write` wrote."""
         file = self.out / BATCH_FILE
         try:
             data = json.loads(file.read_text(encoding="utf-8"))
-            assignment = data["assignment"]
             entries = tuple(Entry(**row) for row in data["rows"])
-            return str(assignment["id"]), assignment.get("location"), entries
+            assignment = data["assignment"]
+            return BatchRows(str(assignment["id"]), assignment.get("location"), entries)
         except FileNotFoundError as error:
             raise UsageError(f"{self.out}: is not the folder of a batch") from error
         except (OSError, ValueError, KeyError, TypeError) as error:
@@ -217,12 +208,6 @@ def keep_earlier(file: Path) -> None:
         stamp = datetime.fromtimestamp(file.stat().st_mtime, timezone.utc)
         kept = file.parent / _EARLIER / f"{file.stem}-{stamp:%Y%m%dT%H%M%S.%fZ}{file.suffix}"
         write_whole(kept, file.read_bytes())
-
-
-def _carry_over(old: Path, new: Path) -> None:
-    keep_earlier(old / RESULT_FILE)
-    if (old / _EARLIER).is_dir():
-        shutil.copytree(old / _EARLIER, new / _EARLIER, dirs_exist_ok=True)
 
 
 def _sync(path: Path) -> None:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 from grader.assignment.load import load_assignment
@@ -20,10 +17,7 @@ from grader.grade import Grade
 from grader.report.model.class_row import ClassRow
 from grader.report.model.result import read_result
 from grader.report.model.result_model import Result
-from grader.run.host.load import cpu_count
 
-_MANY = 8
-"""Reports from which on more than one process is worth its start."""
 _load = cache(load_assignment)
 
 
@@ -50,9 +44,8 @@ def find_reports(out: Path) -> tuple[Path, ...]:
 
 
 def _of_batch(ledger: Ledger) -> tuple[Path, ...]:
-    _, entries = ledger.read()
     found = []
-    for entry in entries:
+    for entry in ledger.read().entries:
         if entry.fault:
             continue
         result = ledger.result(entry.key)
@@ -69,31 +62,8 @@ def read_class(out: Path) -> list[ClassRow]:
     results = [read_result(folder / RESULT_FILE) for folder in find_reports(out)]
     if (out / BATCH_FILE).is_file():
         ledger = Ledger(out)
-        return class_rows([standing(ledger, entry) for entry in ledger.read()[1]], ledger)
+        return class_rows([standing(ledger, entry) for entry in ledger.read().entries], ledger)
     return class_rows([Done(Entry(one.submission.id), one, fresh=False) for one in results])
-
-
-def render_all(folders: Sequence[Path], assignment: str | None = None) -> Iterator[Path]:
-    """Render the reports of a class again, on all CPUs.
-
-    Args:
-        assignment: Id or folder; by default the one that each result names.
-    """
-    render = partial(_render, assignment=assignment)
-    if len(folders) < _MANY or cpu_count() == 1:
-        yield from map(render, folders)
-        return
-    # What a fork of this process needs is imported and loaded before.
-    _load(assignment or _stored(folders[0], read_result(folders[0] / RESULT_FILE)))
-    pool = ProcessPoolExecutor(cpu_count(), multiprocessing.get_context("fork"))
-    try:
-        yield from pool.map(render, folders)
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _render(folder: Path, assignment: str | None) -> Path:
-    return render_again(folder, assignment).report
 
 
 def render_again(folder: Path, assignment: str | None = None) -> Written:

@@ -12,7 +12,6 @@ from grader.assignment.load import LoadedAssignment
 from grader.ros import RosInstallation
 from grader.submission.build.build_cache import BuildCache
 from grader.submission.build.underlay import completed, install_prefix
-from grader.tree import listing
 
 _WORD = re.compile(r"\w+")
 
@@ -26,17 +25,15 @@ class TypeSupport:
         self._ros = ros
         self._cache = cache
         self._lock = threading.Lock()
-        self._found: dict[Path, frozenset[str]] | None = None
+        self._found: tuple[Path, ...] | None = None
 
     def prefixes(self, on_build: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
         """Install spaces of ours for the cell; built where they are not there yet, or any more."""
         with self._lock:
-            # The cache may be emptied or damaged while a class is graded, or rosgrade watches.
-            if self._found is None or any(
-                not path.is_dir() or files != listing(path) for path, files in self._found.items()
-            ):
-                self._found = {path: listing(path) for path in self._built(on_build)}
-            return tuple(self._found)
+            # The cache may be emptied while a class is graded, or rosgrade watches.
+            if self._found is None or not all(path.is_dir() for path in self._found):
+                self._found = self._built(on_build)
+            return self._found
 
     def _built(self, on_build: Callable[[str], None]) -> tuple[Path, ...]:
         cache = BuildCache(self._cache)

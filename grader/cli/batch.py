@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 NOT_GRADED = 3
 _AUTO = "auto"
-_MOST_PROBLEMS = 20
 
 
 def batch(
@@ -76,7 +75,10 @@ def batch(
     from grader.run.admission import Admission
 
     at_once = _at_once(jobs)
-    _refuse_more(submissions, context.args)
+    if context.args:
+        # What a shell makes of `class/*`.
+        count = 1 + len(context.args)
+        raise UsageError(f"batch takes one folder, not {count} submissions: name the folder of all")
     refuse_swapped(assignment, submissions)
     refuse_inputs([out], [*assignment_places(assignment), submissions, roster])
     check_folder(out)
@@ -91,13 +93,12 @@ def batch(
         if grading is not None and not quiet:
             progress.note(f"sandbox: {grading.process_sandbox}")
         names, rows = _rows(submissions, roster, out, staging, progress)
-        problems = names.problems if names else ()
-        for problem in problems[:_MOST_PROBLEMS]:
+        for problem in names.problems if names else ():
             progress.note(f"{roster or submissions}: {problem}")
-        if len(problems) > _MOST_PROBLEMS:
-            more = f"{len(problems) - _MOST_PROBLEMS} more such rows"
-            progress.note(f"{roster or submissions}: {more}")
-        _refuse_within(out, rows)
+        for row in rows:
+            if row.path is not None:
+                # Results within a submission would be a part of it.
+                refuse_part(out, row.path, f"the submission of {row.key}")
         with Ledger(out).opened() as ledger:
             work = Batch(loaded, ledger, frozenset(retry or ()))
             progress.begin("reading", len(rows))
@@ -167,30 +168,6 @@ def _rows(
         progress.say(f"names are read as {prefix}LOGIN")
 
     return read, take_in(submissions, staging, read, left_out, out, say_prefix)
-
-
-def _refuse_within(out: Path, rows: Sequence[HandedIn]) -> None:
-    """Let no results be written into what is graded: they would be a part of it."""
-    from grader.report.files import refuse_part
-
-    around = {folder.name for folder in (out.absolute(), *out.absolute().parents)}
-    for row in rows:
-        # To resolve each path of a class takes long.
-        if row.path is not None and (row.path.name in around or row.path.is_symlink()):
-            refuse_part(out, row.path, f"the submission of {row.key}")
-
-
-def _refuse_more(submissions: Path, others: Sequence[str]) -> None:
-    """Say what to name instead of several submissions, which is what a shell makes of `class/*`."""
-    if not others:
-        return
-    folders = {path.parent for path in (submissions, *map(Path, others))}
-    remedy = (
-        f"name the folder that holds them, {folders.pop()}"
-        if len(folders) == 1
-        else "put them into one folder, or into the column `submission` of a roster (.csv)"
-    )
-    raise UsageError(f"batch takes one folder, not {1 + len(others)} submissions: {remedy}")
 
 
 def _at_once(jobs: str) -> int | None:

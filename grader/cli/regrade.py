@@ -61,7 +61,7 @@ def _one(path: Path, assignment: str | None) -> None:
 
     found = find(path)
     batch = Ledger.around(found.folder) if found.result is not None else None
-    location = (batch.location() if batch is not None else None) or found.location
+    location = (batch.read().location if batch is not None else None) or found.location
     name = assignment or stored_assignment(path, found.assignment, location, "regrade", str(path))
     loaded = load_assignment(name)
     if found.result is not None:
@@ -131,13 +131,13 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
     began_s = time.monotonic()
     rows = []
     with Ledger(path).opened() as ledger, Progress(quiet).shown() as progress:
-        name, entries = ledger.read()
+        written = ledger.read()
         stored = assignment or stored_assignment(
-            path, name, ledger.location(), "regrade", str(path)
+            path, written.assignment, written.location, "regrade", str(path)
         )
         loaded = load_assignment(stored)
         console.print(f"Assignment: {loaded.file}", soft_wrap=True)
-        progress.begin("judging", len(entries))
+        progress.begin("judging", len(written.entries))
         for row in regrade_class(loaded, ledger):
             rows.append(row)
             progress.advance(row.done.entry.key)

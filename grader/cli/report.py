@@ -38,7 +38,7 @@ def report(
     """
     from grader.batch.files import REPORT_FILE, RESULT_FILE
     from grader.batch.grading import RECORDINGS_FOLDER
-    from grader.batch.rendering import find_reports, render_again, render_all
+    from grader.batch.rendering import find_reports, render_again
     from grader.errors import UsageError
     from grader.report.files import refuse_inputs
 
@@ -50,12 +50,9 @@ def report(
             "name a report's own folder"
         )
     console = output_console()
-    if len(folders) > 1:
-        for path in render_all(folders, assignment):
-            console.print(f"Report: {path}", soft_wrap=True)
-        return
-    read = [folders[0] / RESULT_FILE, folders[0] / RECORDINGS_FOLDER, gradescope_metadata]
-    refuse_inputs([folders[0] / REPORT_FILE, *files.values()], read)
-    written = render_again(folders[0], assignment)
-    console.print(f"Report: {written.report}", soft_wrap=True)
-    formats.write(written.result)
+    for folder in folders:
+        read = [folder / RESULT_FILE, folder / RECORDINGS_FOLDER, gradescope_metadata]
+        refuse_inputs([folder / REPORT_FILE, *files.values()], read)
+        written = render_again(folder, assignment)
+        console.print(f"Report: {written.report}", soft_wrap=True)
+        formats.write(written.result)

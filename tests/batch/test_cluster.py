@@ -163,7 +163,7 @@ def test_what_is_no_scheduler_is_not_waited_for(
         threading.Thread(target=answer, daemon=True).start()
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         order = Order(ASSIGNMENT, "", None, Choice.NONE)
-        with pytest.raises(UsageError, match=rf"no Dask scheduler answers at {address}: "):
+        with pytest.raises(UsageError, match=rf"no Dask scheduler answers at {address}; "):
             DaskExecutor(address, order)
         over.set()
 

@@ -19,10 +19,10 @@ from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch import grading as grading_module
 from grader.batch.class_regrading import regrade_class
 from grader.batch.files import REPORT_FILE, RESULT_FILE, write_graded
-from grader.batch.grading import RECORDINGS_FOLDER, Graded, Grading
+from grader.batch.grading import Graded, Grading
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import compare, find, regrade
-from grader.batch.rendering import find_reports, render_all
+from grader.batch.rendering import find_reports
 from grader.batch.selftest import Role, Trial, mutation_score, run_trial
 from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
@@ -264,23 +264,6 @@ def test_a_bug_in_one_run_ends_no_other(lesson: LoadedAssignment, tmp_path: Path
     assert not runner._aborted
 
 
-def test_a_cache_that_is_emptied_while_nodes_run_costs_nobody_points(
-    lesson: LoadedAssignment, tmp_path: Path
-) -> None:
-    install = tmp_path / "cache" / "install"
-    install.mkdir(parents=True)
-    (install / "bot").touch()
-
-    class Emptied(ScriptedRunner):
-        def run(self, *arguments: object, alone: bool = False, **more: object) -> None:
-            shutil.rmtree(tmp_path / "cache")
-            super().run(*arguments, alone=alone, **more)
-
-    grading = Grading(lesson, Emptied(recording(stop_s=9.0)), tmp_path / "cache")
-    with pytest.raises(GraderFault, match=r"deleted or changed in .* while it ran"):
-        grading.grade_prepared(Prepared(SUBMISSION, install), tmp_path / "recordings")
-
-
 def test_what_does_not_build_is_not_run(lesson: LoadedAssignment, tmp_path: Path) -> None:
     build = BuildRecord(succeeded=False, duration_s=1.0, log="error")
     record = dataclasses.replace(SUBMISSION, build=build)
@@ -446,7 +429,7 @@ def test_what_cannot_be_read_again_keeps_its_grade_and_is_told(
         assert row.problem == "there is no result of it; run the batch again"
         assert row.done.result is None
     assert not eli.problem and eli.done.entry.problem == "handed in nothing"
-    assert ledger.read()[1][0].problem == ""
+    assert ledger.read().entries[0].problem == ""
 
 
 def test_a_class_is_not_judged_again_as_of_another_assignment(
@@ -471,24 +454,3 @@ def test_a_folder_without_recordings_is_a_wrong_use(tmp_path: Path) -> None:
     for missing in (find, find_reports):
         with pytest.raises(UsageError, match="nowhere: does not exist"):
             missing(tmp_path / "nowhere")
-
-
-def test_the_reports_of_a_class_are_rendered_again_in_their_order(
-    grade: Grade, lesson: LoadedAssignment, tmp_path: Path
-) -> None:
-    folders = []
-    for number in range(9):
-        graded, _ = grade(recording(stop_s=0.1 * number))
-        folder = tmp_path / "class" / f"student {number}"
-        shutil.copytree(tmp_path / "recordings", folder / RECORDINGS_FOLDER)
-        files = {"run": folder / RECORDINGS_FOLDER / "run.mcap"}
-        write_graded(dataclasses.replace(graded, files=files), folder, Clock())
-        (folder / REPORT_FILE).unlink()
-        folders.append(folder)
-    found = list(render_all(folders, str(lesson.folder)))
-    assert found == [folder / REPORT_FILE for folder in folders]
-    pages = [path.read_text(encoding="utf-8") for path in found]
-    assert len(set(pages)) == 9
-    (folders[4] / RESULT_FILE).write_text("{}", encoding="utf-8")
-    with pytest.raises(UsageError, match=r"student 4/result\.json"):
-        list(render_all(folders, str(lesson.folder)))

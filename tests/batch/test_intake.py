@@ -208,7 +208,7 @@ def test_a_link_that_leads_to_itself_is_left_out(course: Path, staging: Path) ->
     assert ([row.key for row in rows], left_out) == (["ana"], ["loop"])
 
 
-@pytest.mark.parametrize("metadata", ["[" * 3_000, "submission_11: 2026-13-41", "\tx: y"])
+@pytest.mark.parametrize("metadata", ["submission_11: 2026-13-41", "\tx: y"])
 def test_a_broken_export_of_gradescope_is_refused(
     metadata: str, course: Path, staging: Path
 ) -> None:

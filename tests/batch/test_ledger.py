@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from grader.batch.ledger import BATCH_FILE, Entry, Ledger, folder_name, keep_earlier
+from grader.batch.ledger import BATCH_FILE, BatchRows, Entry, Ledger, folder_name, keep_earlier
 from grader.errors import UsageError
 
 
@@ -112,7 +112,7 @@ def test_rows_come_back_as_they_were_written(tmp_path: Path) -> None:
     ledger = Ledger(tmp_path)
     entries = (Entry("ana", late=True), Entry("b\n🤖", sha256="0" * 64, same_as="ana"))
     ledger.write(entries, "timed_publisher", "1" * 64)
-    assert ledger.read() == ("timed_publisher", entries)
+    assert ledger.read() == BatchRows("timed_publisher", None, entries)
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"rows": [{"nobody": 1}]}'])

@@ -33,8 +33,6 @@ def shell(folder: Path, command: str) -> subprocess.CompletedProcess[str]:
     [
         "2>&1 | head -1",
         "2>/dev/full",
-        "<&- >&- 2>&-",
-        "<&- >&- --sandbox none",
     ],
 )
 def test_a_check_is_done_and_keeps_its_status(tmp_path: Path, redirected: str) -> None:
@@ -81,16 +79,6 @@ def test_output_that_is_lost_on_a_full_disk_is_told(tmp_path: Path) -> None:
 def test_what_nobody_reads_to_the_end_is_no_fault(tmp_path: Path) -> None:
     ended = shell(tmp_path, f"{ROSGRADE} schema | head -1")
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "{\n", "")
-
-
-def test_a_pipe_that_somebody_made_non_blocking_is_waited_for(tmp_path: Path) -> None:
-    program = (
-        "import os; os.set_blocking(1, False); os.set_blocking(2, False)\n"
-        "from grader.cli.screen.streams import lasting_streams\n"
-        "with lasting_streams(): print(os.get_blocking(1), os.get_blocking(2))\n"
-    )
-    ended = shell(tmp_path, f'{sys.executable} -c "{program}"')
-    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "True True\n", "")
 
 
 def test_unbuffered_output_comes_at_once() -> None:

@@ -1,4 +1,4 @@
-"""Standard streams that cannot stop a grading: closed, full, or a pipe that nobody reads."""
+"""Standard streams that cannot stop a grading: full, or a pipe that is not read to its end."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import Any, TextIO, TypeVar, cast
 
 from grader.errors import GraderFault
 
-_OUTPUT, _ERRORS = 1, 2
 # Nobody wants to know the rest: `| head`, and a terminal that was closed.
 _UNREAD = frozenset({errno.EPIPE, errno.EIO})
 
@@ -60,24 +59,12 @@ class _Lasting:
 @contextmanager
 def lasting_streams() -> Iterator[None]:
     """Let the block go on, and end with its own status, whoever reads what it writes."""
-    # Else a file or a pipe of ours would take the number, and be closed or written to by others.
-    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= _ERRORS:
-        os.set_inheritable(descriptor, True)
-    os.close(descriptor)
-    # Somebody who shares a pipe or a terminal with us may have made it non-blocking.
-    os.set_blocking(_OUTPUT, True)
-    os.set_blocking(_ERRORS, True)
-    output = _Lasting(sys.stdout or _opened(_OUTPUT))
+    output = _Lasting(sys.stdout)
     sys.stdout = cast("TextIO", output)
-    sys.stderr = cast("TextIO", _Lasting(sys.stderr or _opened(_ERRORS)))
+    sys.stderr = cast("TextIO", _Lasting(sys.stderr))
     try:
         yield
     finally:
         output.flush()
         if output.lost is not None:
             raise GraderFault(f"standard output cannot be written: {output.lost.strerror}")
-
-
-def _opened(descriptor: int) -> TextIO:
-    """A stream where Python has made none, because there was nothing to write to."""
-    return open(descriptor, "w", encoding="utf-8", errors="backslashreplace", closefd=False)
