@@ -14,5 +14,5 @@ source.onmessage = (event) => {
   shown = state.version;
 };
 source.onerror = () => {
-  status.textContent = "has ended; this is the last report";
+  status.textContent = "has ended. This is the last report.";
 };

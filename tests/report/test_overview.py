@@ -23,7 +23,7 @@ def test_figures_of_the_class():
     assert "student 09: the archive is damaged" in text
     assert re.search(r"It publishes every 300 ms \d+ \(\d+ %\)", text)
     empty = squeezed(render_overview([]))
-    assert "Submissions 0" in empty and "Nobody was graded." in empty
+    assert "Submissions 0" in empty and "No submission was graded." in empty
 
 
 def test_median_and_mean_are_of_those_who_were_graded():

@@ -94,7 +94,7 @@ class Gallery(dict[tuple[Plot, str | None, bool], str]):
 
 
 def _faults(result: Result) -> list[str]:
-    """What went wrong on our side, each cause once."""
+    """What went wrong in the grader or the machine, each cause once."""
     findings = [finding for check in result.checks for finding in check.findings]
     return list(dict.fromkeys(one.observed for one in findings if one.status is Status.ERROR))
 
