@@ -30,16 +30,16 @@ def list_command() -> None:
 def show(
     assignment: AssignmentName,
     html: Annotated[
-        bool, typer.Option("--html", help="Write it as a page, for students to open or print.")
+        bool, typer.Option("--html", help="Write an HTML page that students can open or print.")
     ] = False,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="Where the page goes; by default ID.html, here."),
+        typer.Option("--out", "-o", help="File of the page; by default ID.html, here."),
     ] = None,
 ) -> None:
     """Show the handout of an assignment, with its checks and points.
 
-    Checks that students do not get to see before grading are only counted.
+    Shows only the number of hidden checks.
     """
     from grader.assignment.load import load_assignment
     from grader.errors import UsageError

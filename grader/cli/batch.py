@@ -38,20 +38,18 @@ def batch(
     submissions: Annotated[
         Path,
         typer.Argument(
-            help="A folder of folders, archives or clones, as Canvas, Gradescope or git leave it; "
-            "an archive of it; or a roster (.csv) with a column `submission`."
+            help="A folder of submissions (folders, archives or clones; also from Canvas or "
+            "Gradescope), an archive of it, or a roster (.csv) with a column `submission`."
         ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for all results.")],
     jobs: Annotated[
-        str, typer.Option(help="Submissions at once; auto lets the machine's load decide.")
+        str, typer.Option(help="Submissions at once; auto adapts to the load of the machine.")
     ] = _AUTO,
-    roster: Annotated[
-        Path | None, typer.Option(help="CSV with everybody who should have handed in.")
-    ] = None,
+    roster: Annotated[Path | None, typer.Option(help="CSV with all students of the class.")] = None,
     retry: Annotated[
         list[str] | None,
-        typer.Option(help="Grade this one again; `errors` or `all` for many. May be repeated."),
+        typer.Option(help="Grade this submission again, or `errors`, or `all`. May be repeated."),
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler, such as tcp://host:8786.")
@@ -60,9 +58,9 @@ def batch(
     sandbox: SandboxChoice = Choice.AUTO,
     quiet: Quiet = False,
 ) -> None:
-    """Grade a class. The same command goes on where an earlier one stopped.
+    """Grade a class. The same command continues where it stopped.
 
-    Leaves a report for each submission, an overview (index.html) and grades.csv in OUT. Ends
+    Writes a report for each submission, an overview (index.html) and grades.csv to OUT. Ends
     with 0 if every submission was graded, whatever the grades, and with 3 if one was not.
     """
     from grader.assignment.load import load_assignment, refuse_swapped

@@ -28,7 +28,7 @@ def validate(
 ) -> None:
     """Check assignments without running anything.
 
-    Tells of every mistake its file, its line, and what is allowed.
+    Shows the file and line of every mistake, and what is allowed there.
     """
     from grader.assignment.lint_warnings import lint_warnings
     from grader.assignment.load import load_assignment
@@ -75,12 +75,12 @@ def schema(
 
 
 def checks(
-    name: Annotated[str | None, typer.Argument(help="One check; by default all.")] = None,
+    name: Annotated[str | None, typer.Argument(help="One check; by default all checks.")] = None,
     explanations: Annotated[
-        bool, typer.Option("--explanations", help="List what rosgrade can explain to a student.")
+        bool, typer.Option("--explanations", help="List the explanations of failed checks.")
     ] = False,
 ) -> None:
-    """Show the catalogue of checks with their parameters, or of explanations."""
+    """List the checks with their parameters, or the explanations."""
     from rich.markdown import Markdown
     from rich.table import Table
 

@@ -43,11 +43,11 @@ FULL_POINTS, POINTS_LOST, NOT_GRADED = 0, 1, 3
 def check(
     assignment: AssignmentName,
     submission: Annotated[
-        Path, typer.Argument(help="What was handed in: a folder, a .zip or a .tar.gz.")
+        Path, typer.Argument(help="The submission: a folder, a .zip or a .tar.gz.")
     ],
     report: ReportFolder = Path("rosgrade-report"),
     json_file: Annotated[
-        Path | None, typer.Option("--json", help="Write the result here as well.")
+        Path | None, typer.Option("--json", help="Also write the result to this file.")
     ] = None,
     scenario: Scenarios = None,
     only: Checks = None,
@@ -60,7 +60,8 @@ def check(
     classroom50: Classroom50 = False,
     sandbox: SandboxChoice = Choice.AUTO,
     keep: Annotated[
-        bool, typer.Option("--keep", help="Keep what colcon installed, in the report's folder.")
+        bool,
+        typer.Option("--keep", help="Keep colcon's install space in the report's folder."),
     ] = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -68,7 +69,7 @@ def check(
         bool, typer.Option("--open", help="Open the report in a browser.")
     ] = False,
 ) -> None:
-    """Grade one submission: build, run, judge what was recorded.
+    """Grade one submission: build, run, judge the recording.
 
     Ends with 0 for full points, 1 if points were lost, 3 if it could not be graded.
     """

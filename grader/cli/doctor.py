@@ -8,9 +8,9 @@ from grader.cli.screen.console import output_console
 
 
 def doctor() -> None:
-    """Look at this machine: ROS, colcon, compilers, sandbox.
+    """Check this machine: ROS, colcon, compilers, sandbox.
 
-    Starts two real nodes and measures how long they take to meet. Ends with 0 if submissions
+    Starts two real nodes and measures how long discovery takes. Ends with 0 if submissions
     can be graded here, else with 3.
     """
     from rich.table import Table

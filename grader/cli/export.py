@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from grader.report.model.class_row import RowStatus
 
 Assignment = AssignmentName
-Folder = Annotated[Path, typer.Option("--out", help="Where to.")]
+Folder = Annotated[Path, typer.Option("--out", help="Folder to write to.")]
 Results = Annotated[Path, typer.Argument(help="Folder with the reports of a class.")]
 File = Annotated[Path, typer.Option("--output", "-o", help="File to write.")]
 
@@ -31,13 +31,13 @@ ZeroFor = Annotated[
     list[Zero] | None,
     typer.Option(
         "--zero",
-        help="Give 0 points for what cannot be read, or to who handed in nothing; else they have "
-        "no score. May be repeated.",
+        help="Give 0 points for unreadable or missing submissions; otherwise they have no score. "
+        "May be repeated.",
     ),
 ]
 
 app = typer.Typer(
-    help="Write what other systems take, such as autograders.",
+    help="Write files for other systems: autograders and gradebooks.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -45,7 +45,7 @@ app = typer.Typer(
 
 @app.command()
 def gradescope(assignment: Assignment, out: Folder = Path()) -> None:
-    """Write the autograder zip that is uploaded to Gradescope."""
+    """Write the autograder zip for Gradescope."""
     from grader import export
     from grader.assignment.load import load_assignment
 
@@ -57,7 +57,7 @@ def github(
     assignment: Assignment,
     action: Annotated[
         str,
-        typer.Option(help="Where the course keeps rosgrade: OWNER/REPOSITORY@REF."),
+        typer.Option(help="Your course's copy of rosgrade: OWNER/REPOSITORY@REF."),
     ],
     out: Folder = Path(),
 ) -> None:
@@ -82,7 +82,7 @@ def classroom50(assignment: Assignment, out: Folder = Path()) -> None:
 def csv(out: Results, output: File = Path("grades.csv"), zero: ZeroFor = None) -> None:
     """Write a CSV with a row for each submission and a column for each check.
 
-    Of the folder of a batch it has the columns and the rows of its grades.csv.
+    For the folder of a batch, it has the columns and the rows of its grades.csv.
     """
     from grader.batch.rendering import read_class
     from grader.report.files import refuse_inputs, write_whole
@@ -108,9 +108,9 @@ def canvas(
     ] = None,
     zero: ZeroFor = None,
 ) -> None:
-    """Fill a Canvas gradebook, to import in Canvas under Grades.
+    """Fill a Canvas gradebook. Import it in Canvas under Grades.
 
-    Ends with 1 if somebody has no score in it; who and why is said.
+    Ends with 1 if a student has no score in it, and says who and why.
     """
     from grader.batch.rendering import read_class
     from grader.errors import UsageError

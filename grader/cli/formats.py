@@ -44,16 +44,17 @@ JunitFamilyName = Annotated[
     typer.Option(help="xunit2 is valid for Jenkins; xunit1 also has the student's file and line."),
 ]
 GradescopeMetadata = Annotated[
-    Path | None, typer.Option(help="Gradescope's submission_metadata.json, for its due date.")
+    Path | None, typer.Option(help="Gradescope's submission_metadata.json, with the due date.")
 ]
 Github = Annotated[
-    bool, typer.Option("--github", help="Tell GitHub Actions: annotations, summary, outputs.")
+    bool,
+    typer.Option("--github", help="Write annotations, summary, outputs for GitHub Actions."),
 ]
 Classroom50 = Annotated[
     bool,
     typer.Option(
         "--classroom50",
-        help="Write Classroom 50's result.json and release-body.md here; any grade ends with 0.",
+        help="Write Classroom 50's result.json and release-body.md here; always ends with 0.",
     ),
 ]
 

@@ -15,18 +15,18 @@ def new(
         str,
         typer.Argument(
             metavar="ID",
-            help="Name of the assignment: lower case letters, digits, underscores; or its folder, "
-            "which is called so.",
+            help="Name of the assignment (lower case letters, digits, underscores), or a folder of "
+            "this name.",
         ),
     ],
     folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Where its folder goes; by default here.")
+        Path, typer.Argument(metavar="DIR", help="Parent folder; by default the current folder.")
     ] = Path(),
 ) -> None:
-    """Write a new assignment, which works as it is.
+    """Write a small new assignment that works.
 
-    You change it bit by bit. A folder ID with assignment.yaml, a handout, a reference solution,
-    and mutants: mistakes that the checks must notice. Nothing that is there already is
+    Creates a folder ID with assignment.yaml, a handout, a reference solution, and mutants:
+    mistakes that must lose points. Change it step by step. Existing files are never
     overwritten.
     """
     from grader.scaffold import write_assignment
@@ -36,6 +36,6 @@ def new(
     written = write_assignment(place.name or name, place.parent)
     console = output_console()
     console.print(f"Written: {written}", soft_wrap=True)
-    console.print("\nNext, look at assignment.yaml in it, and after each change:\n")
+    console.print("\nNext, edit assignment.yaml in this folder, and after each change run:\n")
     console.print(f"  rosgrade validate {written}", soft_wrap=True)
     console.print(f"  rosgrade selftest {written}", soft_wrap=True)

@@ -22,18 +22,16 @@ Checks = Annotated[
 ]
 Seed = Annotated[
     int | None,
-    typer.Option(metavar="N", help="Seed of all random values; by default the submission's."),
+    typer.Option(metavar="N", help="Seed of random values; by default made from the submission."),
 ]
 Hidden = Annotated[
     bool,
-    typer.Option("--hidden", help="Run and show the hidden checks too: for instructors."),
+    typer.Option("--hidden", help="Also run and show hidden checks: for instructors."),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")]
 Verbose = Annotated[
     bool,
-    typer.Option(
-        "--verbose", "-v", help="Show the build's log and what your nodes print, as it comes."
-    ),
+    typer.Option("--verbose", "-v", help="Show the build output and what your nodes print."),
 ]
 
 

@@ -25,21 +25,18 @@ NOT_GRADED = 3
 def regrade(
     path: Annotated[
         Path,
-        typer.Argument(
-            help="The folder of a batch or of a report, its recordings folder, or one .mcap file."
-        ),
+        typer.Argument(help="Folder of a batch, of a report or of recordings, or one .mcap file."),
     ],
     assignment: Annotated[
         str | None,
-        typer.Argument(help="Id or folder; by default the one that it was graded with."),
+        typer.Argument(help="Id or folder; by default the one used for grading."),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Judge again from the recordings, with the YAML as it is now. Nothing is run.
+    """Judge the recordings again with the current YAML. Nothing is run.
 
-    Says what changed and why, and writes reports and results anew where there were some; of a
-    class, the results until now are kept beside them, and the gradebook and the overview follow,
-    also where only one submission of it is named.
+    Shows what changed and why, and updates reports and results. For a class, or one submission
+    of it, also updates the gradebook and the overview, and keeps the old results.
     """
     from grader.batch.ledger import BATCH_FILE
 

@@ -14,20 +14,20 @@ from grader.resources import cache_folder
 
 def replay(
     recording: Annotated[Path, typer.Argument(help="A recording, such as recordings/run.mcap.")],
-    submission: Annotated[Path, typer.Argument(help="What is run: a folder or an archive.")],
+    submission: Annotated[Path, typer.Argument(help="Program to run: a folder or an archive.")],
     assignment: Annotated[
         str | None,
-        typer.Argument(help="Id or folder; by default the one that it was recorded for."),
+        typer.Argument(help="Id or folder; by default the one of the recording."),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Give a node the very inputs of a recording again.
+    """Send a node the messages of a recording again.
 
-    What it prints is shown. Messages are given at their recorded times, whatever the node does
-    with them: a simulated robot does not follow it. Services and actions are not replayed. The
-    node runs without a sandbox, as with `ros2 run`, on a ROS domain of its own.
+    Shows what the node prints. The messages come at their recorded times: a simulated robot
+    does not react to the node. Services and actions are not replayed. The node runs without a
+    sandbox, as with `ros2 run`, on its own ROS domain.
 
-    Ends with 0 when all was given, 1 when the node ended before or never listened.
+    Ends with 0 when all messages were sent, 1 when the node ended early or never subscribed.
     """
     from dataclasses import replace
 

@@ -25,16 +25,16 @@ def report(
     out: Annotated[Path, typer.Argument(help="A report folder, or the folder of a class.")],
     assignment: Annotated[
         str | None,
-        typer.Argument(help="Id or folder; by default the one that it was graded with."),
+        typer.Argument(help="Id or folder; by default the one used for grading."),
     ] = None,
     files: FormatFiles = MappingProxyType({}),
     junit_family: JunitFamilyName = JunitFamily.XUNIT2,
     gradescope_metadata: GradescopeMetadata = None,
     github: Github = False,
 ) -> None:
-    """Render reports again, with other formats if you like. Nothing is run, no grade changes.
+    """Write reports again, also in other formats. Nothing is run, no grade changes.
 
-    The options of the formats are for one report; of a class every report is rendered.
+    The options of the formats work for one report. For a class, every report is written.
     """
     from grader.batch.files import REPORT_FILE, RESULT_FILE
     from grader.batch.grading import RECORDINGS_FOLDER

@@ -19,8 +19,8 @@ SandboxChoice = Annotated[
     Choice,
     typer.Option(
         "--sandbox",
-        help="Build and run the submission in a sandbox: auto (where bubblewrap works), bwrap "
-        "(or do not run it at all), none.",
+        help="Sandbox to build and run the submission in: auto (if bubblewrap works), bwrap "
+        "(an error if it does not work), none.",
     ),
 ]
 

@@ -27,17 +27,17 @@ def selftest(
         list[str] | None, typer.Argument(help="Ids or folders; by default all.")
     ] = None,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Submissions at once; by default two per CPU.")
+        int | None, typer.Option(min=1, help="Submissions at once; by default two for each CPU.")
     ] = None,
     record: Annotated[
         bool,
-        typer.Option("--record", help="Grade only the reference, and keep its runs for reports."),
+        typer.Option("--record", help="Grade only the reference; keep its recordings for reports."),
     ] = False,
     keep: Annotated[
         Path | None,
         typer.Option(
             file_okay=False,
-            help="Folder for the submissions and recordings of what was judged wrongly.",
+            help="Folder for submissions that were judged wrongly, and their recordings.",
         ),
     ] = None,
     sandbox: SandboxChoice = Choice.AUTO,
@@ -45,9 +45,9 @@ def selftest(
 ) -> None:
     """Grade the reference, variants and mutants of an assignment.
 
-    The reference and every variant must get full points, every mutant must lose exactly the
-    checks that it names, and the untouched starter package must get 15 % of the points at most.
-    Ends with 0 only if all of that is so.
+    The reference and every variant must get full points. Every mutant must lose exactly the
+    checks that it names. The unchanged starter package must get at most 15 % of the points. Ends
+    with 0 only if all of this is true.
     """
     from grader import ros
     from grader.assignment.load import list_assignments, load_assignment

@@ -10,25 +10,26 @@ import typer
 
 def sim(
     world: Annotated[Path, typer.Argument(help="World file (YAML).")],
-    robot: Annotated[str | None, typer.Option(help="burger or waffle.")] = None,
-    pose: Annotated[str | None, typer.Option(help="Start, such as '1, 0.5, 90 deg'.")] = None,
+    robot: Annotated[str | None, typer.Option(help="Model of the robot: burger or waffle.")] = None,
+    pose: Annotated[str | None, typer.Option(help="Start pose, such as '1, 0.5, 90 deg'.")] = None,
     options: Annotated[
-        Path | None, typer.Option(help="YAML with robot, lidar, odometry and topics.")
+        Path | None, typer.Option(help="YAML file with robot, lidar, odometry and topics.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of noise and drift.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of noise and drift.")] = 0,
     domain_id: Annotated[
         int | None, typer.Option(help="ROS domain; by default ROS_DOMAIN_ID.")
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="End after so many simulated seconds.")
+        float | None, typer.Option(help="End after this simulated time, in seconds.")
     ] = None,
     values: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value of the world.")
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Value of the world.")
     ] = None,
 ) -> None:
     """Simulate a robot in a world, with a live view, until Ctrl-C.
 
-    In real time. It listens to /cmd_vel and speaks on /odom and /scan, like a TurtleBot3 in Gazebo.
+    Runs in real time. The robot subscribes to /cmd_vel and publishes /odom and /scan, like a
+    TurtleBot3 in Gazebo.
     """
     from sim.live import run
 

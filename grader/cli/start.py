@@ -16,13 +16,13 @@ def start(
     folder: Annotated[
         Path,
         typer.Argument(
-            metavar="DIR", help="Where the package goes, such as the src of your workspace."
+            metavar="DIR", help="Folder for the package, such as the src of your workspace."
         ),
     ] = Path(),
 ) -> None:
-    """Write a package to begin with: it builds and runs.
+    """Create a package to start from: it builds and runs.
 
-    You fill in what it does. Nothing that is there already is overwritten.
+    You write what it does. Existing files are never overwritten.
     """
     from grader.assignment.load import load_assignment
     from grader.starter import write_starter
@@ -30,6 +30,6 @@ def start(
     console = output_console()
     for written in write_starter(load_assignment(assignment), folder):
         console.print(f"Written: {written}", soft_wrap=True)
-    console.print("\nNext, read what is asked for, and then let every saved file be graded:\n")
+    console.print("\nNext, read the task, then grade your work after every save:\n")
     console.print(f"  rosgrade show {assignment}", soft_wrap=True)
     console.print(f"  rosgrade watch {assignment} {folder}", soft_wrap=True)

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 def watch(
     assignment: AssignmentName,
     submission: Annotated[
-        Path, typer.Argument(help="What you work on: a package, a workspace or its src.")
+        Path, typer.Argument(help="Your package, workspace, or its src.")
     ] = Path(),
     report: ReportFolder = Path("rosgrade-report"),
     scenario: Scenarios = None,
@@ -54,7 +54,7 @@ def watch(
     port: Annotated[
         int,
         typer.Option(
-            min=0, max=65535, metavar="N", help="Port of the report page; 0 takes a free one."
+            min=0, max=65535, metavar="N", help="Port of the report page; 0 means any free port."
         ),
     ] = 0,
     quiet: Quiet = False,
@@ -63,10 +63,10 @@ def watch(
         bool, typer.Option("--open", help="Open the report page in a browser.")
     ] = False,
 ) -> None:
-    """Grade now, and again whenever you save a file, until Ctrl-C.
+    """Grade now, and again after every save, until Ctrl-C.
 
-    Tells what changed since the grade before. The report page follows by itself. A save during
-    a run ends the run and begins anew. The files of the assignment are watched too.
+    Shows what changed since the last grade. The report page updates itself. A save during a run
+    starts the run again. The files of the assignment are watched too.
     """
     from grader import ros
     from grader.assignment.load import load_assignment, refuse_swapped

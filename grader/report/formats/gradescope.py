@@ -1,4 +1,4 @@
-"""Write Gradescope's results.json, before the run as well.
+"""Write Gradescope's results.json, also before the run.
 
 Gradescope itself shows each test to students when its ``visibility`` says so, and the hidden
 ones only to staff; so this is made from the whole result, and only its summary from the

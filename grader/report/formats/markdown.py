@@ -1,4 +1,4 @@
-"""Write Markdown, for a comment.
+"""Write Markdown for a pull request comment.
 
 GitHub-flavoured; also for a job summary and a release.
 
