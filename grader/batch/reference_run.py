@@ -43,16 +43,6 @@ def read_references(loaded: LoadedAssignment) -> dict[str, Replay]:
     }
 
 
-def stale(loaded: LoadedAssignment) -> tuple[str, ...]:
-    """Ids of the scenarios with a robot whose reference must be recorded again."""
-    fresh = read_references(loaded)
-    return tuple(
-        scenario.id
-        for scenario in loaded.assignment.scenarios
-        if scenario.world is not None and scenario.id not in fresh
-    )
-
-
 def keep_reference(
     loaded: LoadedAssignment, grade: Grade, recordings: Mapping[str, Recording]
 ) -> str:

@@ -13,7 +13,6 @@ from grader.batch.reference_run import (
     REFERENCE_FILE,
     keep_reference,
     read_references,
-    stale,
     write_references,
 )
 from grader.errors import AssignmentError, UsageError
@@ -32,6 +31,16 @@ def make(folder: Path, says=None):
     assignment = loaded.assignment.model_copy(update={"scenarios": (scenario,)})
     loaded = replace(loaded, assignment=assignment, file=folder / "assignment.yaml")
     return loaded, {"drive": replace(ahead_until(0.2), submission=make_submission())}
+
+
+def stale(loaded):
+    """Scenarios with a robot whose reference must be recorded again."""
+    fresh = read_references(loaded)
+    return tuple(
+        one.id
+        for one in loaded.assignment.scenarios
+        if one.world is not None and one.id not in fresh
+    )
 
 
 @pytest.mark.parametrize("name", list_assignments())

@@ -354,6 +354,7 @@ class TestOtherValues:
     def test_nothing_is_kept_of_the_loggers_own_numbers(self):
         assert "none shows" in front(lines("[INFO] [1.834] [bot]: hello", SCAN_TIMES_S))
 
+
 class TestWhatKeepsLinesBack:
     def test_lines_of_several_threads_in_another_order(self):
         values = (1.25, 2.5, 3.75, 4.5)

@@ -18,10 +18,12 @@ from tests.checks.builder import (
     failing,
     join,
     judge,
+    messages,
     reader,
     recording,
     sent,
     stimulus,
+    taken,
 )
 from tests.checks.requests import acting, action, asked, goal, service, serving
 
@@ -41,6 +43,15 @@ def gone(item, time_s=0.9):
 def deaf(**changes):
     """A run in which the subscription to /chatter was destroyed."""
     return recording(**{"endpoints": (gone(LISTENER), endpoint(), reader(), stimulus()), **changes})
+
+
+def test_a_subscription_that_was_destroyed_after_the_first_messages():
+    # At any load: what was sent after it cannot have been answered.
+    slow = taken(0.5, 2.6, waited_s=1.0)
+    run = deaf(
+        sent=sent(every(0.1, 20, 0.5)), messages=messages(every(0.1, 4, 0.51)), disturbance=slow
+    )
+    assert f"the subscription to `/chatter` {WORDS}" in failing("timing.latency", run, **LATENCY)
 
 
 def test_a_subscription_that_was_destroyed_after_what_was_sent_before_the_launch():

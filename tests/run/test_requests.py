@@ -247,9 +247,14 @@ def test_what_a_node_destroys_in_the_middle_is_seen_and_named(run_node: RunNode)
         until={"stimuli": "done"},
         timeout="20 s",
     )
-    finding = judge("service.responds", recording, service="/enable")
-    assert finding.status is Status.FAILED, finding
-    assert "the service `/enable` was destroyed" in finding.observed
+    latency = {"stimulus": "/chatter", "topic": "/echo", "most": "1 s"}
+    for check, parameters, destroyed in [
+        ("timing.latency", latency, "the subscription to `/chatter` was destroyed"),
+        ("service.responds", {"service": "/enable"}, "the service `/enable` was destroyed"),
+    ]:
+        finding = judge(check, recording, **parameters)
+        assert finding.status is Status.FAILED, finding
+        assert destroyed in finding.observed
 
 
 def ros_with(*packages: str, folder: Path) -> RosInstallation:

@@ -12,6 +12,7 @@ from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.need import Published, Recorded
 from grader.checks.wording import code, counted
+from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_messages import why_not_sent, why_silent
 from grader.diagnosis.process.blocked_executor import left_s
 from grader.recording.model import NS, Message, Recording
@@ -110,6 +111,15 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
     is_missing = len(missing) > parameters.unanswered
     if not is_missing and not parameters.is_too_slow(times):
         return Finding.passed(expected, figures, evidence)
+    observed = (
+        f"{len(missing)} of {counted(len(found), 'message')} on {code(parameters.stimulus)} "
+        f"had no answer within {format_duration(parameters.within)}"
+    )
+    if is_missing:
+        last_ns = missing[-1 - parameters.unanswered]
+        destroyed = why_unsubscribed(recording, parameters.stimulus, observed, last_ns)
+        if destroyed is not None:
+            return destroyed.finding(expected)
     own_s = [max(0.0, left_s(recording, *wait)) for wait in waits]
     unexcused = sum(recording.stolen_s(at, at + within_ns) <= 0.0 for at in missing)
     if unexcused <= parameters.unanswered and not parameters.is_too_slow(own_s):
@@ -128,10 +138,6 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
     hint = (
         "Publish one answer in every call of the subscription's callback, with no condition that "
         "leaves one out."
-    )
-    observed = (
-        f"{len(missing)} of {counted(len(found), 'message')} on {code(parameters.stimulus)} "
-        f"had no answer within {format_duration(parameters.within)}"
     )
     observed += f"; of the others {figures}" if times else ""
     return Finding.failed(expected, observed, hint, evidence)

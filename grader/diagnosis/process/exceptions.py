@@ -55,13 +55,6 @@ class Row(Model):
             return None
         return Template(self.hint).safe_substitute(names)
 
-    @property
-    def example_failure(self) -> Failure:
-        """The exception of the example."""
-        type_, _, message = self.example.partition(": ")
-        frame = Frame(f"/opt/ros/jazzy/{self.raised_in or 'bot/node.py'}", 1, "f", self.line)
-        return Failure(type_, message, (frame,))
-
 
 class Table(Model):
     """The whole of ``exceptions.yaml``.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Iterator
+from itertools import accumulate
 
 from grader.checks.topic.topic import PROBE, Untouched
 from grader.checks.wording import code, codes, counted
@@ -54,7 +55,17 @@ def _excess(recording: Recording) -> Iterator[str]:
         yield f"the submission joined another ROS domain: {others}"
     for topic, messages in recording.messages.items():
         times = [message.stamp_ns for message in messages]
-        most = max((bisect_left(times, time + NS) - at for at, time in enumerate(times)), default=0)
+        numbers = [*range(len(messages))]
+        if len(recording.student_endpoints(Kind.PUBLISHER, topic)) == 1:
+            # A publisher numbers its messages: a gap is as many that were lost on the way.
+            numbers = [*accumulate((message.sequence for message in messages), max)]
+        most = max(
+            (
+                numbers[bisect_left(times, time + NS) - 1] - number + 1
+                for time, number in zip(times, numbers, strict=True)
+            ),
+            default=0,
+        )
         if most > _FLOOD:
             yield f"{most} messages were sent on {code(topic)} within 1 s"
     for process in recording.processes:
