@@ -69,6 +69,26 @@ importlib.import_module("other")
 """
 
 
+_SPAWNS = """
+import multiprocessing
+
+if __name__ == "__main__":
+    child = multiprocessing.get_context("spawn").Process(target=print)
+    child.start()
+    child.join()
+    with open(__file__ + ".pid", "w") as file:
+        file.write(str(child.pid))
+"""
+
+
+def test_a_process_that_multiprocessing_spawns_is_heard(tmp_path: Path) -> None:
+    program = tmp_path / "program"
+    program.write_text(_SPAWNS)
+    lines = [json.loads(line) for line in run_traced(str(program)).splitlines()]
+    child = int((tmp_path / "program.pid").read_text())
+    assert child in [line["pid"] for line in lines if line["kind"] == "started"]
+
+
 def test_what_the_code_itself_imports_is_told_where_it_needs_it(tmp_path: Path) -> None:
     folder = tmp_path / "install" / "lib" / "package"
     folder.mkdir(parents=True)

@@ -165,7 +165,7 @@ def keeps_driving(recording: Recording, parameters: KeepsDriving) -> Finding:
     Judged by the way ahead along its true path; what it drives backwards is taken off.
     """
     wanted_m = parameters.distance
-    expected = f"drives {metres(wanted_m)} ahead without stopping, for nothing is near ahead"
+    expected = f"drives {metres(wanted_m)} ahead without stopping, because nothing is near ahead"
     cause = why_not_moved(recording)
     if cause is not None:
         return cause.finding(expected)

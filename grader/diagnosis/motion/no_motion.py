@@ -66,7 +66,8 @@ class NotMoved(Symptom[Cause]):
     @property
     def evidence(self) -> Evidence:
         """When that command came."""
-        return evidence_at(self.recording, "first command to move", self.first.time_ns)
+        label = "first command" if is_zero(self.first.twist) else "first command to move"
+        return evidence_at(self.recording, label, self.first.time_ns)
 
 
 def why_not_moved(recording: Recording) -> Cause | None:

@@ -124,6 +124,15 @@ def _patch_subprocess(module: Any) -> None:
     module.Popen.__init__ = made
 
 
+def _patch_multiprocessing(module: Any) -> None:
+    start = module.spawnv_passfds
+
+    def started(path: Any, args: Any, passfds: Any) -> Any:
+        return start(path, args, {*passfds, _FD} if pipe_at(_FD) == _PIPE else passfds)
+
+    module.spawnv_passfds = started
+
+
 def _patch_rclpy(module: Any) -> None:
     import rosgrade_rclpy  # type: ignore[import-not-found]
 
@@ -132,6 +141,7 @@ def _patch_rclpy(module: Any) -> None:
 
 _PATCHES = {
     "subprocess": _patch_subprocess,
+    "multiprocessing.util": _patch_multiprocessing,
     **dict.fromkeys(
         (
             "rclpy.context",
