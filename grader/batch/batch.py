@@ -35,11 +35,7 @@ RETRY_ALL, RETRY_ERRORS = "all", "errors"
 
 @dataclass(frozen=True)
 class Done:
-    """A row that is finished.
-
-    Attributes:
-        result: Its result; None where nothing could be graded.
-    """
+    """A row that is finished."""
 
     entry: Entry
     result: Result | None
@@ -97,9 +93,6 @@ class Batch:
     def grade(self, to_do: dict[str, Path], executor: BatchExecutor | None) -> Iterator[Done]:
         """Grade, and put each result into place as soon as it is there.
 
-        Args:
-            executor: Who does it; needed where there is anything to do.
-
         Yields:
             Every row, in the order in which they are finished; at first those that were.
         """
@@ -152,7 +145,6 @@ class Batch:
         return not (RETRY_ERRORS in self.retry and not result.graded)
 
     def _refuse_other(self) -> None:
-        """Let no batch of another assignment replace these grades."""
         try:
             name = self.ledger.read().assignment
         except UsageError:
@@ -162,7 +154,6 @@ class Batch:
             raise UsageError(f"{self.ledger.out}: holds the grades of {name}; name a new folder")
 
     def _refuse_changed(self, keys: Iterable[str]) -> None:
-        """Let no grade of an earlier version of the assignment stand beside those of this one."""
         changed = sorted(key for key in keys if not self._is_of_this_version(key))
         if not changed:
             return

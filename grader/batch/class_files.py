@@ -16,14 +16,12 @@ from grader.report.files import write_whole
 from grader.report.formats.gradebook import grades_csv
 from grader.report.html.overview import render_overview
 from grader.report.model.class_row import ClassRow
-from grader.report.model.result_model import Result
 from grader.safe_text import one_line
 
 GRADES_FILE = "grades.csv"
 OVERVIEW_FILE = "index.html"
 NO_RESULT = "there is no result of it; run the batch again"
 _MOST_TWINS = 5
-_LONGEST_WHY = 200
 
 
 def notes(done: Sequence[Done]) -> dict[str, str]:
@@ -52,16 +50,10 @@ def _original(entry: Entry) -> str:
 
 
 def _hand(entry: Entry) -> str:
-    """Who handed it in: a team did so once."""
     return entry.team or entry.key
 
 
 def _note(done: Done, same: Sequence[Entry]) -> str:
-    """What to say of a row.
-
-    Args:
-        same: All rows that have the same submission, itself and its team among them; or none.
-    """
     parts = [done.entry.fault or done.entry.problem]
     others = [entry.key for entry in same if _hand(entry) != _hand(done.entry)]
     if others:
@@ -73,14 +65,9 @@ def _note(done: Done, same: Sequence[Entry]) -> str:
     if done.result is not None and done.result.submission.problem:
         parts.append(done.result.submission.problem)
     if done.result is not None and not done.result.graded:
-        parts.append(f"not graded: {_why_not_graded(done.result)}")
+        errors = (one.observed for one in done.result.checks if one.status is Status.ERROR)
+        parts.append(f"not graded: {one_line(next(errors, ''))}")
     return "; ".join(part for part in parts if part)
-
-
-def _why_not_graded(result: Result) -> str:
-    """What went wrong on our side, as much of it as a row can hold."""
-    why = next((one_line(c.observed) for c in result.checks if c.status is Status.ERROR), "")
-    return f"{why[: _LONGEST_WHY - 1]}…" if len(why) > _LONGEST_WHY else why
 
 
 def standing(ledger: Ledger, entry: Entry) -> Done:
@@ -95,11 +82,7 @@ def standing(ledger: Ledger, entry: Entry) -> Done:
 
 
 def class_rows(done: Sequence[Done], ledger: Ledger | None = None) -> list[ClassRow]:
-    """What is shown of a class, sorted by key.
-
-    Args:
-        ledger: The folder of the batch, for links to reports; None where there is none.
-    """
+    """What is shown of a class, sorted by key."""
     said = notes(done)
     rows = sorted(done, key=lambda item: item.entry.key)
     return [

@@ -98,6 +98,5 @@ def _regrade(loaded: LoadedAssignment, ledger: Ledger, entry: Entry, before: Res
 
 
 def _not_judged(entry: Entry, before: Result | None, why: str) -> Regraded:
-    """A row that keeps the result that it has, if any, and says so."""
     told = "; ".join(part for part in (entry.problem, f"not judged again: {why}") if part)
     return Regraded(Done(replace(entry, problem=told), before, fresh=False), before, problem=why)

@@ -51,7 +51,7 @@ class LocalExecutor:
 
     def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
         """See :class:`BatchExecutor`."""
-        return self._pool.submit(self._grade, key, path, folder)
+        return self._pool.submit(grade_into, self._grading, key, path, folder)
 
     def close(self) -> None:
         """See :class:`BatchExecutor`."""
@@ -59,12 +59,8 @@ class LocalExecutor:
         self._grading.close()
         self._pool.shutdown()
 
-    def _grade(self, key: str, path: Path, folder: Path) -> None:
-        grade_into(self._grading, key, path, folder)
-
 
 def _connected(address: str, connect: Any) -> Any:
-    """A client of a scheduler."""
     answer: Future[Any] = Future()
 
     def ask() -> None:

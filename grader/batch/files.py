@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-from dataclasses import dataclass
 from pathlib import Path
 
 from grader import __version__
@@ -25,26 +24,10 @@ RESULT_FILE = "result.json"
 INSTALL_FOLDER = "install"
 
 
-@dataclass(frozen=True)
-class Written:
-    """What was written of a grade.
-
-    Attributes:
-        result: What ``result.json`` says.
-    """
-
-    report: Path
-    result: Result
-
-
 def write_graded(
     graded: Graded, folder: Path, clock: Clock, json_file: Path | None = None
-) -> Written:
-    """Write report and result of a submission.
-
-    Args:
-        json_file: One more place for the result, or None.
-    """
+) -> Result:
+    """Write report and result of a submission."""
     first = next(iter(graded.recordings.values()), None)
     facts = RunFacts(
         started=clock.started,
@@ -55,15 +38,15 @@ def write_graded(
         runs=graded.runs,
     )
     result = make_result(graded.grade, graded.recordings, facts)
-    report = write_report(graded, folder, result)
+    write_report(graded, folder, result)
     # Last: where it says what the grade is, the report beside it says the same.
     for file in (folder / RESULT_FILE, json_file):
         if file is not None:
             write_whole(file, result_json(result))
-    return Written(report, result)
+    return result
 
 
-def write_report(graded: Graded, folder: Path, result: Result) -> Path:
+def write_report(graded: Graded, folder: Path, result: Result) -> None:
     """Write ``report.html``, and a Foxglove layout beside the recordings.
 
     Where checks are hidden, the copy that a student may see is written too.
@@ -71,15 +54,14 @@ def write_report(graded: Graded, folder: Path, result: Result) -> Path:
     if graded.recordings and (folder / RECORDINGS_FOLDER).is_dir():
         layout = render_layout(graded.recordings.values())
         write_whole(folder / RECORDINGS_FOLDER / LAYOUT_FILE, layout)
-    report = folder / REPORT_FILE
-    write_whole(report, render_report(graded.grade, result, graded.recordings, graded.references))
+    whole = render_report(graded.grade, result, graded.recordings, graded.references)
+    write_whole(folder / REPORT_FILE, whole)
     copy, file = for_student(result), folder / STUDENT_FILE
     if copy is result:
         file.unlink(missing_ok=True)
     else:
         text = render_report(graded.grade, copy, graded.recordings, graded.references)
         write_whole(file, text)
-    return report
 
 
 def refuse_foreign(folder: Path, *, keep: bool) -> None:

@@ -36,11 +36,7 @@ _LONGEST_WORDS = 300
 
 @dataclass(frozen=True)
 class Graded:
-    """A graded submission with all that its grade rests on.
-
-    Attributes:
-        faults: Why a scenario has no recording, by scenario; ours or the machine's.
-    """
+    """A graded submission with all that its grade rests on."""
 
     grade: Grade
     prepared: Prepared
@@ -82,11 +78,7 @@ class Grading:
         name: str | None = None,
         on_output: Callable[[str], None] = lambda _: None,
     ) -> Graded:
-        """Grade one submission.
-
-        Args:
-            name: What to call the submission; by default after its folder or archive.
-        """
+        """Grade one submission."""
         self._type_support.prefixes(on_build)
         sandbox = self._runner.sandbox
         if sandbox is not None:
@@ -123,12 +115,7 @@ class Grading:
         return self._runner.successor()
 
     def grade_prepared(self, prepared: Prepared, folder: Path) -> Graded:
-        """Run and judge a submission that is built already.
-
-        Args:
-            folder: Where the recordings and the submission's facts go; recordings of an
-                earlier run are removed.
-        """
+        """Run and judge a submission that is built already."""
         for old in folder.glob("*.mcap"):
             old.unlink()
         write_whole(folder / SUBMISSION_FILE, to_json(prepared.record))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import subprocess
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,6 @@ from typing import Any
 
 import yaml
 
-from grader.batch.clone import clone
 from grader.batch.handed_in import (
     FOREIGN,
     Entry,
@@ -41,6 +41,7 @@ _MOODLE = re.compile(r"(?P<name>[^_]+)_\d+_assignsubmission_file_.*", re.DOTALL)
 # What Canvas adds to the name of a file that was handed in again: ws-1.zip.
 _AGAIN = re.compile(r"-\d+(?=(\.tar)?\.[^.]+$)")
 _REPOSITORY = re.compile(r"(https?|ssh|git|file)://|[\w.-]+@[\w.-]+:")
+_CLONE_LIMIT_S = 120.0
 # A class's archive holds what many students handed in.
 _CLASS_LIMITS = ArchiveLimits(total_bytes=8192 * MIB, members=500_000)
 
@@ -54,15 +55,6 @@ def take_in(
     on_prefix: Callable[[str], None] = lambda _: None,
 ) -> list[HandedIn]:
     """Find out who handed in what.
-
-    Args:
-        source: A folder of folders and archives, as a learning platform gives it, or an archive
-            of such a folder.
-        staging: An empty folder for what has to be unpacked, copied together or cloned.
-        roster: Who should have handed in; without one everybody who did is a row.
-        out: Folder of the results; in ``source`` it is no submission.
-        on_prefix: Told what all names of repositories begin with, where what follows is taken
-            for a login of the roster.
 
     Returns:
         The rows, sorted by key; those of the roster that handed in nothing are among them.
@@ -80,12 +72,7 @@ def take_in(
 def take_in_roster(
     roster: Roster, base: Path, staging: Path, on_taken: Callable[[str], None] = lambda _: None
 ) -> list[HandedIn]:
-    """Take in what a roster itself names, as paths or URLs of git repositories.
-
-    Args:
-        base: Folder that its paths are relative to.
-        staging: An empty folder for clones.
-    """
+    """Take in what a roster itself names, as paths or URLs of git repositories."""
     if not any(student.submission for student in roster.students):
         raise UsageError(
             "the roster names no submissions; give it a column `submission` with paths or URLs, "
@@ -111,7 +98,7 @@ def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn |
         return replace(row, path=cloned.path, fault=cloned.fault)
     if _REPOSITORY.match(student.submission):
         target = staging / f"clone-{student.row}"
-        problem = clone(student.submission, target)
+        problem = _clone(student.submission, target)
         return replace(row, fault=problem) if problem else replace(row, path=target)
     path = base / student.submission
     try:
@@ -125,9 +112,36 @@ def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn |
     return replace(row, fault=fault)
 
 
+def _clone(url: str, target: Path) -> str:
+    safe = ["-c", "core.hooksPath=/dev/null", "-c", "protocol.ext.allow=never"]
+    options = ["--quiet", "--depth", "1", "--no-recurse-submodules"]
+    quiet = {"GIT_TERMINAL_PROMPT": "0", "GIT_LFS_SKIP_SMUDGE": "1", "LC_ALL": "C"}
+    try:
+        subprocess.run(
+            ["git", *safe, "clone", *options, "--", url, str(target)],
+            env={**os.environ, **quiet},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_CLONE_LIMIT_S,
+            check=True,
+        )
+    except FileNotFoundError:
+        return "git is not installed"
+    except subprocess.TimeoutExpired:
+        return f"git clone took longer than {_CLONE_LIMIT_S:.0f} s"
+    except subprocess.CalledProcessError as error:
+        # Advice follows below the reason.
+        lines = error.stderr.strip().split("\n")
+        reason = next((line for line in lines if line.startswith("fatal: ")), lines[-1])
+        return f"git clone failed: {shown(reason.removeprefix('fatal: '))}"
+    return ""
+
+
 def _opened(source: Path, staging: Path) -> Path:
     if source.is_dir():
-        return _export_in(source) or source
+        return _inner(source, is_unpacked=False)
     if not source.is_file():
         raise UsageError(f"{source}: does not exist")
     if not source.name.lower().endswith(SUFFIXES):
@@ -138,18 +152,16 @@ def _opened(source: Path, staging: Path) -> Path:
         unpack(source, target, _CLASS_LIMITS)
     except RosgradeError as error:
         raise UsageError(str(error)) from error
-    # An archive of a folder holds that folder alone.
-    inside = [item for item in target.iterdir() if not is_ignored(item)]
-    alone = len(inside) == 1 and inside[0].is_dir() and _manifest_of_one(inside[0]) is None
-    return inside[0] if alone else target
+    return _inner(target, is_unpacked=True)
 
 
-def _export_in(folder: Path) -> Path | None:
-    """The folder of Gradescope's export where there is nothing else, as unpacking may leave it."""
+def _inner(folder: Path, *, is_unpacked: bool) -> Path:
+    """The only folder in a folder, where it is that of the class: an archive or an export of it."""
     inside = [item for item in folder.iterdir() if not is_ignored(item)]
-    if len(inside) == 1 and (inside[0] / GRADESCOPE_METADATA).is_file():
-        return inside[0]
-    return None
+    if len(inside) != 1 or not inside[0].is_dir():
+        return folder
+    is_export = (inside[0] / GRADESCOPE_METADATA).is_file()
+    return inside[0] if is_export or (is_unpacked and not _manifest_of_one(inside[0])) else folder
 
 
 def _refuse_single(folder: Path, source: Path) -> None:
@@ -194,7 +206,6 @@ def _entries(
 
 
 def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> Entry:
-    """One student's files: the only one, or all of them in a folder."""
     match = files[0][1]
     named = _names(files)
     path, fault = only_archive(named), ""
@@ -214,12 +225,10 @@ def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> Entry:
 def _names(files: list[tuple[Path, re.Match[str]]]) -> dict[str, Path]:
     """Each file under the name that it was handed in with, as far as that tells them apart."""
     plain = [_AGAIN.sub("", named["file"]) for _, named in files]
-    names = {
+    return {
         name if plain.count(name) == 1 else named["file"]: file
         for name, (file, named) in zip(plain, files, strict=True)
     }
-    # The same name twice, which Canvas does not give: nothing of it may be lost.
-    return names if len(names) == len(files) else {file.name: file for file, _ in files}
 
 
 def _gather(files: Mapping[str, Path], folder: Path) -> str:
@@ -243,7 +252,6 @@ def _gather(files: Mapping[str, Path], folder: Path) -> str:
 
 
 def _unpacked(file: Path, folder: Path) -> bool:
-    """Unpack an archive into a new folder; whether it is one."""
     folder.mkdir()
     try:
         unpack(file, folder)
@@ -254,7 +262,6 @@ def _unpacked(file: Path, folder: Path) -> bool:
 
 
 def _gradescope(file: Path) -> Mapping[str, Any]:
-    """What Gradescope's export says of each submission, by folder."""
     if not file.is_file():
         return {}
     try:

@@ -168,11 +168,7 @@ class Ledger:
         assignment_sha256: str,
         location: str | None = None,
     ) -> None:
-        """Write down what the batch consists of.
-
-        Args:
-            location: Where it lies; None for one of rosgrade's own.
-        """
+        """Write down what the batch consists of."""
         data = {
             "assignment": {"id": assignment, "sha256": assignment_sha256, "location": location},
             "rows": [asdict(entry) for entry in entries],

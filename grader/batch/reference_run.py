@@ -31,9 +31,6 @@ def read_references(loaded: LoadedAssignment) -> dict[str, Replay]:
     """Replays of the reference by scenario id.
 
     A scenario that has changed since is left out: its run would mislead.
-
-    Args:
-        loaded: The assignment; it need not have such a file.
     """
     found = _read(loaded.folder / REFERENCE_FILE)
     return {

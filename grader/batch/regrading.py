@@ -26,12 +26,7 @@ from grader.submission.record import SubmissionRecord, read_record
 
 @dataclass(frozen=True)
 class FoundRecordings:
-    """What there is to judge again.
-
-    Attributes:
-        folder: The report's folder; for single recordings the folder that they are in.
-        result: The result until now, or None where there is none.
-    """
+    """What there is to judge again."""
 
     folder: Path
     recordings: Mapping[str, Recording]
@@ -88,11 +83,7 @@ def find(path: Path) -> FoundRecordings:
 
 
 def stored_assignment(path: Path, name: str, location: str | None, *command: str) -> str:
-    """Name the assignment that something was graded with, to load it again.
-
-    Args:
-        location: Where it lay; None for one of rosgrade's own, or where it is not known.
-    """
+    """Name the assignment that something was graded with, to load it again."""
     if location is None and name in list_assignments():
         # And not one of that name in the current folder.
         return str(resources.assignments() / name)

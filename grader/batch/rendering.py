@@ -9,7 +9,7 @@ from grader.assignment.load import load_assignment
 from grader.assignment.selection import select, visible_part
 from grader.batch.batch import Done
 from grader.batch.class_files import class_rows, standing
-from grader.batch.files import RESULT_FILE, Written, write_report
+from grader.batch.files import RESULT_FILE, write_report
 from grader.batch.ledger import BATCH_FILE, Entry, Ledger
 from grader.batch.regrading import find, regrade, regrade_command, stored_assignment
 from grader.errors import UsageError
@@ -29,8 +29,6 @@ def find_reports(out: Path) -> tuple[Path, ...]:
     """
     if not out.exists():
         raise UsageError(f"{out}: does not exist")
-    if not out.is_dir():
-        raise UsageError(f"{out}: is a file; name the folder that {RESULT_FILE} is in")
     if (out / RESULT_FILE).is_file():
         return (out,)
     if (out / BATCH_FILE).is_file():
@@ -66,12 +64,8 @@ def read_class(out: Path) -> list[ClassRow]:
     return class_rows([Done(Entry(one.submission.id), one, fresh=False) for one in results])
 
 
-def render_again(folder: Path, assignment: str | None = None) -> Written:
-    """Render the report of one submission again from its result and its recordings.
-
-    Args:
-        assignment: Id or folder; by default the one that the result names.
-    """
+def render_again(folder: Path, assignment: str | None = None) -> Result:
+    """Render the report of one submission again from its result and its recordings."""
     found = find(folder)
     result = found.result or read_result(folder / RESULT_FILE)
     loaded = _load(assignment or _stored(folder, result))
@@ -88,7 +82,8 @@ def render_again(folder: Path, assignment: str | None = None) -> Written:
             f"{folder}: judged again it is not what the result says ({', '.join(changed)}): "
             f"{regrade_command(folder, loaded)} writes both anew"
         )
-    return Written(write_report(graded, folder, result), result)
+    write_report(graded, folder, result)
+    return result
 
 
 def _stored(folder: Path, result: Result) -> str:

@@ -21,8 +21,6 @@ _COLUMNS = {
     "submission": ("submission", "path", "file", "folder", "repository", "repo", "url"),
 }
 _POINTS_POSSIBLE = "points possible"
-_EXCEL = "Windows-1252"
-"""What Excel writes in Western Europe and America, unless it is asked for UTF-8."""
 _NO_LETTER = re.compile(r"[\W_]+")
 
 
@@ -119,14 +117,8 @@ def read_roster(file: Path) -> Roster:
         raise UsageError(f"{file}: cannot be read: {error.strerror}") from error
     try:
         return parse_roster(data.decode("utf-8-sig"), str(file))
-    except UnicodeDecodeError:
-        # Another encoding of one byte for a letter would be read as well, with other letters.
-        doubt = f"is not UTF-8 and was read as {_EXCEL}: look at letters with accents"
-    try:
-        roster = parse_roster(data.decode(_EXCEL), str(file))
     except UnicodeDecodeError as error:
         raise UsageError(f"{file}: is not UTF-8; save it as “CSV UTF-8”") from error
-    return replace(roster, problems=(doubt, *roster.problems))
 
 
 def parse_roster(text: str, source: str) -> Roster:

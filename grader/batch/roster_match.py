@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 
 from grader.batch.handed_in import Entry, HandedIn, row_of, stem_of, with_problem
 from grader.batch.roster import Roster, Student, name_forms, resemblance, written
@@ -105,14 +105,9 @@ def matched(
     rows: list[HandedIn] = []
     handed: dict[str, list[tuple[int, str]]] = {}
     doubtful: dict[str, list[str]] = {}
-    given: set[Path] = set()
     for entry in entries:
         # What the roster says itself needs no guess, and a team may have handed in one for all.
         told = named.get(entry.path.name, set()) | named.get(stem_of(entry.path), set())
-        if told and entry.path in given:
-            # Gradescope's export names a team too; the roster has named all of it already.
-            continue
-        given.add(entry.path)
         keys = told or names.exact(entry)
         if not told and len(keys) != 1:
             may_be = sorted(keys or names.alike(entry))

@@ -53,12 +53,7 @@ class Role(str, Enum):
 
 @dataclass(frozen=True)
 class Trial:
-    """One submission to grade, with the outcome that it must have.
-
-    Attributes:
-        id: ``reference``, ``starter``, or the id of the change.
-        change: What differs from the reference; None for the reference and the starter.
-    """
+    """One submission to grade, with the outcome that it must have."""
 
     role: Role
     id: str
@@ -68,12 +63,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """How a trial went, without its recordings: an assignment has a hundred trials and more.
-
-    Attributes:
-        verdict: How the checks ended against how they must.
-        told: What the checks said that ended otherwise than they must.
-    """
+    """How a trial went, without its recordings: an assignment has a hundred trials and more."""
 
     trial: Trial
     verdict: MutantVerdict
@@ -187,14 +177,7 @@ def selftest(
     on_start: Callable[[Trial], None] = lambda _: None,
     on_graded: Callable[[Graded], None] = lambda _: None,
 ) -> Iterator[TrialResult]:
-    """Run every trial of an assignment.
-
-    Args:
-        jobs: Submissions at the same time; the cells are admitted by the runner.
-        reference: Folder of the reference solution, by default rosgrade's own.
-        keep: Where the submissions and recordings of trials go that ended otherwise than they
-            must, a folder for each.
-    """
+    """Run every trial of an assignment."""
     base = load_mutants(loaded.assignment, loaded.folder, reference).reference
     with Scratch("selftest") as folder:
 
@@ -228,11 +211,7 @@ def _keep(folder: Path, target: Path) -> None:
 
 @dataclass(frozen=True)
 class MutationScore:
-    """How well an assignment tells right from wrong.
-
-    Attributes:
-        starter_right: Whether the untouched starter got as little as it must.
-    """
+    """How well an assignment tells right from wrong."""
 
     killed: int
     mutants: int

@@ -52,12 +52,7 @@ class Cancelled:
 
 @dataclass(frozen=True)
 class Ended:
-    """A grading ended by itself.
-
-    Attributes:
-        graded: What came of it, or None.
-        problem: Why nothing came of it, or None.
-    """
+    """A grading ended by itself."""
 
     graded: Graded | None = None
     problem: RosgradeError | None = None
@@ -115,14 +110,12 @@ class Watching:
         return future
 
     def _next(self) -> Future[Any] | None:
-        """Wait for a save, or for the end of the grading."""
         news = self._news.get()
         if news in self._watches and (error := news.exception()):
             raise GraderFault(f"the files cannot be watched: {error}")
         return news
 
     def _cancel(self, grading: Future[Graded]) -> None:
-        """End a grading, however it ends."""
         self._worker.cancel()
         wait([grading])
         while not self._news.empty():
@@ -171,7 +164,6 @@ class Watching:
 
 
 def _ended(grading: Future[Graded]) -> Ended:
-    """How a grading ended."""
     try:
         return Ended(grading.result())
     except RosgradeError as problem:

@@ -14,7 +14,7 @@ from pathlib import Path
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.files import write_graded
-from grader.batch.grading import RECORDINGS_FOLDER, Graded, Grading
+from grader.batch.grading import RECORDINGS_FOLDER, Grading
 from grader.errors import GraderFault, SubmissionError
 from grader.report.model.facts import Clock
 from grader.resources import cache_folder
@@ -30,12 +30,7 @@ from grader.submission.prepare import Prepared, refused
 
 @dataclass(frozen=True)
 class Order:
-    """What every worker of a batch needs to know.
-
-    Attributes:
-        sha256: Of the assignment; another one on a worker is a fault.
-        seed: Base of all seeds, or None.
-    """
+    """What every worker of a batch needs to know."""
 
     assignment: str
     sha256: str
@@ -43,16 +38,10 @@ class Order:
     sandbox: Choice
 
 
-def grade_into(grading: Grading, key: str, path: Path, folder: Path) -> Graded:
-    """Grade a submission and write report, result and recordings.
-
-    Args:
-        folder: For everything; exists.
-    """
+def grade_into(grading: Grading, key: str, path: Path, folder: Path) -> None:
+    """Grade a submission and write report, result and recordings."""
     clock = Clock()
-    graded = grading.grade(path, folder / RECORDINGS_FOLDER, name=key)
-    write_graded(graded, folder, clock)
-    return graded
+    write_graded(grading.grade(path, folder / RECORDINGS_FOLDER, name=key), folder, clock)
 
 
 def pack(folder: Path) -> bytes:
@@ -125,7 +114,8 @@ class Parcel:
 
 def grade_remotely(order: Order, parcel: Parcel) -> bytes:
     """Grade on a worker of a cluster."""
-    grading = _grading(order)
+    with _held:
+        grading = _make_grading(order)
     with Scratch("worker") as temporary:
         path = temporary / "in" / parcel.name
         folder = temporary / "out"
@@ -146,14 +136,9 @@ def grade_remotely(order: Order, parcel: Parcel) -> bytes:
 _held = threading.Lock()
 
 
-def _grading(order: Order) -> Grading:
-    """The one of this process: its builds, cells and limits are shared by all of its tasks."""
-    with _held:
-        return _make_grading(order)
-
-
 @functools.cache
 def _make_grading(order: Order) -> Grading:
+    """The one of this process: its builds, cells and limits are shared by all of its tasks."""
     loaded = load_assignment(order.assignment)
     if loaded.sha256 != order.sha256:
         raise GraderFault(
@@ -166,11 +151,7 @@ def _make_grading(order: Order) -> Grading:
 def make_grading(
     order: Order, loaded: LoadedAssignment, admission: Admission | None = None
 ) -> Grading:
-    """Set up grading on this machine.
-
-    Args:
-        admission: Of cells; by default the machine's load decides.
-    """
+    """Set up grading on this machine."""
     sandbox = _sandbox(order.sandbox)
     runner = Runner(ros.find(), admission or Admission(), sandbox=sandbox)
     return Grading(loaded, runner, cache_folder(), seed=order.seed)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from grader.cli.options import AssignmentName
-from grader.cli.screen.console import output_console
+from grader.cli.screen.console import output_console, say
 
 
 def list_command() -> None:
@@ -55,7 +55,7 @@ def show(
         file = out or Path(f"{handout.id}.html")
         refuse_inputs([file], [loaded.folder])
         write_whole(file, render_handout(handout))
-        console.print(f"Handout: {file}", soft_wrap=True)
+        say(f"Handout: {file}")
         return
     from rich.markdown import Markdown
     from rich.table import Table

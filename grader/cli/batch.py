@@ -5,19 +5,17 @@ from __future__ import annotations
 import signal
 import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.options import AssignmentName, Quiet, Seed, assignment_places
-from grader.cli.sandbox import Choice, SandboxChoice
-from grader.cli.screen.console import output_console
+from grader.cli.options import AssignmentName, Quiet, SandboxChoice, Seed, assignment_places
+from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
 from grader.errors import UsageError
+from grader.sandbox.choice import Choice
 from grader.scratch import Scratch
 
 if TYPE_CHECKING:
@@ -114,12 +112,16 @@ def batch(
                     done.append(item)
                     progress.advance(item.entry.key, _said(item), fresh=item.fresh)
             except (KeyboardInterrupt, ExecutorLost):
-                with _undisturbed():
-                    progress.note(
-                        f"interrupted; {len(done)} of {len(entries)} are in {out}, and the same "
-                        "command goes on with the others"
-                    )
-                    write_class([*done, *work.left(done)], ledger)
+                # A second Ctrl-C takes away nothing of what is written because of the first.
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+                signal.signal(signal.SIGTERM, signal.SIG_IGN)
+                progress.note(
+                    f"interrupted; {len(done)} of {len(entries)} are in {out}, and the same "
+                    "command goes on with the others"
+                )
+                write_class([*done, *work.left(done)], ledger)
+                signal.signal(signal.SIGINT, signal.default_int_handler)
+                signal.signal(signal.SIGTERM, signal.default_int_handler)
                 raise
             finally:
                 if executor is not None:
@@ -127,24 +129,12 @@ def batch(
             overview = write_class(done, ledger)
     console = output_console()
     console.print(_summary(done, time.monotonic() - began_s), soft_wrap=True)
-    console.print(f"Overview: {overview}", soft_wrap=True)
-    console.print(f"Grades: {overview.with_name(GRADES_FILE)}", soft_wrap=True)
+    say(f"Overview: {overview}")
+    say(f"Grades: {overview.with_name(GRADES_FILE)}")
     graded = all(
         item.result.graded if item.result is not None else not item.entry.fault for item in done
     )
     raise typer.Exit(0 if graded else NOT_GRADED)
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Let a second Ctrl-C take away nothing of what is written because of the first."""
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, signal.SIG_IGN) for number in numbers]
-    try:
-        yield
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
 
 
 def _rows(
@@ -169,7 +159,6 @@ def _rows(
 
 
 def _at_once(jobs: str) -> int | None:
-    """How many at once; None lets the load decide."""
     if jobs == _AUTO:
         return None
     if not (jobs.isdecimal() and int(jobs) > 0):
@@ -178,7 +167,6 @@ def _at_once(jobs: str) -> int | None:
 
 
 def _said(done: Done) -> str:
-    """What came of a row, in a few words."""
     if done.result is None:
         return done.entry.fault or done.entry.problem or "not graded"
     if done.result.submission.problem:
@@ -189,7 +177,6 @@ def _said(done: Done) -> str:
 
 
 def _summary(done: Sequence[Done], wall_s: float) -> str:
-    """The class in one line."""
     from grader.batch.class_files import class_rows, copies
     from grader.report.model.class_row import RowStatus
 

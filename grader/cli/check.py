@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable, Mapping
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from grader.cli.ahead import while_it_starts
 from grader.cli.formats import (
     Classroom50,
     FormatFiles,
@@ -26,15 +28,17 @@ from grader.cli.options import (
     Hidden,
     Quiet,
     ReportFolder,
+    SandboxChoice,
     Scenarios,
     Seed,
     Verbose,
     assignment_places,
+    chosen_sandbox,
 )
-from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
-from grader.cli.screen.console import output_console
+from grader.cli.screen.console import open_page, output_console, say
 from grader.cli.screen.progress import Progress
 from grader.resources import cache_folder
+from grader.sandbox.choice import Choice
 
 FULL_POINTS, POINTS_LOST, NOT_GRADED = 0, 1, 3
 
@@ -79,9 +83,10 @@ def check(
     from grader.run.runner import Runner
 
     clock = Clock()
+    page = report / "report.html"
     formats = Formats(files, junit_family, gradescope_metadata, github, classroom50)
     refuse_inputs(
-        (report, report / "report.html", json_file, *files.values()),
+        (report, page, json_file, *files.values()),
         (*assignment_places(assignment), submission, gradescope_metadata),
     )
     with formats.grading():
@@ -89,7 +94,7 @@ def check(
         installation = ros.find()
         runner = Runner(
             installation,
-            progress=while_it_starts(progress.narrate),
+            progress=_while_it_starts(progress.narrate),
             sandbox=chosen_sandbox(sandbox, progress),
             verbose=verbose,
         )
@@ -126,17 +131,44 @@ def check(
             raise
         finally:
             runner.close()
-        written = write_graded(graded, report, clock, json_file)
+        result = write_graded(graded, report, clock, json_file)
         console = output_console()
-        print_grade(console, graded.grade.assignment.title, written.result)
-        console.print(f"Report: {written.report}", soft_wrap=True)
+        print_grade(console, graded.grade.assignment.title, result)
+        say(f"Report: {page}")
         if keep:
-            console.print(f"Installed: {keep_install(graded, report)}", soft_wrap=True)
-    formats.write(written.result, submission)
+            say(f"Installed: {keep_install(graded, report)}")
+    formats.write(result, submission)
     if open_report:
-        from grader.cli.screen.browser import open_page
-
-        open_page(written.report.resolve().as_uri())
+        open_page(page.resolve().as_uri())
     grade = graded.grade
     status = FULL_POINTS if grade.full_points or classroom50 else POINTS_LOST
     raise typer.Exit(status if grade.graded else NOT_GRADED)
+
+
+Narrate = Callable[[str, Mapping[str, Any]], None]
+
+
+def _while_it_starts(narrate: Narrate) -> Narrate:
+    """Import what is needed after a run while the student's node starts.
+
+    A node takes a CPU for a third of a second to start, and the command has nothing else to do.
+    """
+    begun = threading.Event()
+
+    def tell(scenario: str, event: Mapping[str, Any]) -> None:
+        narrate(scenario, event)
+        if event["event"] == "launching" and not begun.is_set():
+            begun.set()
+            threading.Thread(target=_get_ready, name="ahead", daemon=True).start()
+
+    return tell
+
+
+def _get_ready() -> None:
+    for module in ("grader.batch.files", "grader.report.text.terminal"):
+        import_module(module)
+    from grader.recording import mcap_reader
+    from grader.report.html import page
+
+    mcap_reader.get_ready()
+    page.environment()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from grader.cli.options import AssignmentName
-from grader.cli.screen.console import output_console, print_error, print_warning
+from grader.cli.screen.console import print_error, print_warning, say
 
 if TYPE_CHECKING:
     from grader.report.model.class_row import RowStatus
@@ -49,7 +49,7 @@ def gradescope(assignment: Assignment, out: Folder = Path()) -> None:
     from grader import export
     from grader.assignment.load import load_assignment
 
-    _say(f"Upload to Gradescope: {export.gradescope(load_assignment(assignment), out)}")
+    say(f"Upload to Gradescope: {export.gradescope(load_assignment(assignment), out)}")
 
 
 @app.command()
@@ -65,7 +65,7 @@ def github(
     from grader import export
     from grader.assignment.load import load_assignment
 
-    _say(f"Commit and push: {export.github(load_assignment(assignment), out, action)}")
+    say(f"Commit and push: {export.github(load_assignment(assignment), out, action)}")
 
 
 @app.command()
@@ -75,7 +75,7 @@ def classroom50(assignment: Assignment, out: Folder = Path()) -> None:
     from grader.assignment.load import load_assignment
 
     folder = export.classroom50(load_assignment(assignment), out)
-    _say(f"Copy its content to CLASSROOM/autograders/ASSIGNMENT/: {folder}")
+    say(f"Copy its content to CLASSROOM/autograders/ASSIGNMENT/: {folder}")
 
 
 @app.command()
@@ -92,7 +92,7 @@ def csv(out: Results, output: File = Path("grades.csv"), zero: ZeroFor = None) -
     rows = read_class(out)
     write_whole(output, grades_csv(rows, _statuses(zero)))
     graded = sum(row.graded for row in rows)
-    _say(f"{output}: {len(rows)} submissions, {graded} of them graded")
+    say(f"{output}: {len(rows)} submissions, {graded} of them graded")
 
 
 @app.command()
@@ -127,7 +127,7 @@ def canvas(
     export = read_canvas(text, str(canvas))
     filled = canvas_csv(read_class(out), export, column, _statuses(zero))
     write_whole(output, filled.text)
-    _say(f"{output}: {filled.filled} scores")
+    say(f"{output}: {filled.filled} scores")
     for doubt in filled.doubts:
         print_warning(doubt)
     for problem in filled.problems:
@@ -137,7 +137,6 @@ def canvas(
 
 
 def _read_of(out: Path) -> list[Path]:
-    """The files that hold the grades of a class."""
     from grader.batch.files import RESULT_FILE
     from grader.batch.ledger import BATCH_FILE
     from grader.batch.rendering import find_reports
@@ -149,7 +148,3 @@ def _statuses(zero: list[Zero] | None) -> set[RowStatus]:
     from grader.report.model.class_row import RowStatus
 
     return {RowStatus(one.value) for one in zero or ()}
-
-
-def _say(text: str) -> None:
-    output_console().print(text, soft_wrap=True)

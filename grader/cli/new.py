@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.screen.console import output_console
+from grader.cli.screen.console import say
 
 
 def new(
@@ -34,8 +34,7 @@ def new(
     # A name alone is its own last part, and leaves the folder as it is.
     place = folder / name
     written = write_assignment(place.name or name, place.parent)
-    console = output_console()
-    console.print(f"Written: {written}", soft_wrap=True)
-    console.print("\nNext, edit assignment.yaml in this folder, and after each change run:\n")
-    console.print(f"  rosgrade validate {written}", soft_wrap=True)
-    console.print(f"  rosgrade selftest {written}", soft_wrap=True)
+    say(f"Written: {written}")
+    say("\nNext, edit assignment.yaml in this folder, and after each change run:\n")
+    say(f"  rosgrade validate {written}")
+    say(f"  rosgrade selftest {written}")

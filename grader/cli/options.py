@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from grader import resources
+from grader.cli.screen.progress import Progress
+from grader.sandbox.choice import Choice
+
+if TYPE_CHECKING:
+    from grader.sandbox.sandbox import Sandbox
 
 AssignmentName = Annotated[str, typer.Argument(help="Id of the assignment, or its folder.")]
 ReportFolder = Annotated[
@@ -33,8 +38,25 @@ Verbose = Annotated[
     bool,
     typer.Option("--verbose", "-v", help="Show the build output and what your nodes print."),
 ]
+SandboxChoice = Annotated[
+    Choice,
+    typer.Option(
+        "--sandbox",
+        help="Sandbox to build and run the submission in: auto (if bubblewrap works), bwrap "
+        "(an error if it does not work), none.",
+    ),
+]
 
 
 def assignment_places(name: str) -> tuple[Path, Path]:
     """Where an assignment may lie: at that path, or among those of rosgrade's own."""
     return Path(name), resources.assignments() / name
+
+
+def chosen_sandbox(choice: Choice, progress: Progress) -> Sandbox | None:
+    """The sandbox that was asked for; says which one it is, or that there is none."""
+    from grader.sandbox.trial import choose
+
+    sandbox, notice = choose(choice, resources.cache_folder())
+    progress.say(notice or f"sandbox: {sandbox.description if sandbox else 'none'}")
+    return sandbox

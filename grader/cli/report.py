@@ -17,7 +17,7 @@ from grader.cli.formats import (
     JunitFamilyName,
     with_file_formats,
 )
-from grader.cli.screen.console import output_console
+from grader.cli.screen.console import say
 
 
 @with_file_formats
@@ -49,10 +49,8 @@ def report(
             f"{out} has {len(folders)} reports, and a file of one of the formats holds one: "
             "name a report's own folder"
         )
-    console = output_console()
     for folder in folders:
         read = [folder / RESULT_FILE, folder / RECORDINGS_FOLDER, gradescope_metadata]
         refuse_inputs([folder / REPORT_FILE, *files.values()], read)
-        written = render_again(folder, assignment)
-        console.print(f"Report: {written.report}", soft_wrap=True)
-        formats.write(written.result)
+        formats.write(render_again(folder, assignment))
+        say(f"Report: {folder / REPORT_FILE}")

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.options import Quiet
-from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
-from grader.cli.screen.console import output_console
+from grader.cli.options import Quiet, SandboxChoice, chosen_sandbox
+from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
 from grader.resources import cache_folder
+from grader.sandbox.choice import Choice
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -90,16 +90,15 @@ def selftest(
                     f"{result.trial.id}: {'ok' if result.verdict.right else 'WRONG'}"
                 )
         if record:
-            console.print(kept[0], soft_wrap=True)
+            say(kept[0])
             continue
         score = mutation_score(results)
         perfect = perfect and score.perfect
         _print(console, loaded.assignment.id, results)
-        console.print(
+        say(
             f"{loaded.assignment.id}: {score.accepted} of {score.right} right solutions with "
             f"full points, {score.killed} of {score.mutants} mutants judged as they must: "
-            f"mutation score {score.percent:.0f} %",
-            soft_wrap=True,
+            f"mutation score {score.percent:.0f} %"
         )
     raise typer.Exit(0 if perfect else 1)
 
@@ -126,4 +125,4 @@ def _print(console: Console, assignment: str, results: list[TrialResult]) -> Non
     console.print(table)
     for result in results:
         for line in result.told:
-            console.print(f"{result.trial.id}: {line}", markup=False, soft_wrap=True)
+            say(f"{result.trial.id}: {line}")

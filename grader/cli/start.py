@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from grader.cli.options import AssignmentName
-from grader.cli.screen.console import output_console
+from grader.cli.screen.console import say
 
 
 def start(
@@ -27,9 +27,8 @@ def start(
     from grader.assignment.load import load_assignment
     from grader.starter import write_starter
 
-    console = output_console()
     for written in write_starter(load_assignment(assignment), folder):
-        console.print(f"Written: {written}", soft_wrap=True)
-    console.print("\nNext, read the task, then grade your work after every save:\n")
-    console.print(f"  rosgrade show {assignment}", soft_wrap=True)
-    console.print(f"  rosgrade watch {assignment} {folder}", soft_wrap=True)
+        say(f"Written: {written}")
+    say("\nNext, read the task, then grade your work after every save:\n")
+    say(f"  rosgrade show {assignment}")
+    say(f"  rosgrade watch {assignment} {folder}")

@@ -17,15 +17,17 @@ from grader.cli.options import (
     Hidden,
     Quiet,
     ReportFolder,
+    SandboxChoice,
     Scenarios,
     Seed,
     Verbose,
     assignment_places,
+    chosen_sandbox,
 )
-from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
-from grader.cli.screen.console import output_console, print_error
+from grader.cli.screen.console import open_page, output_console, print_error, say
 from grader.cli.screen.progress import Progress
 from grader.resources import cache_folder
+from grader.sandbox.choice import Choice
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -72,7 +74,6 @@ def watch(
     from grader.assignment.load import load_assignment, refuse_swapped
     from grader.assignment.selection import select, visible_part
     from grader.batch.files import refuse_foreign
-    from grader.cli.screen.browser import open_page
     from grader.cli.screen.page import ReportPage
     from grader.errors import UsageError
     from grader.report.files import check_folder, refuse_inputs
@@ -107,7 +108,7 @@ def watch(
             raise UsageError(f"--port {port}: {error.strerror}") from error
         stack.callback(page.close)
         console = output_console()
-        console.print(f"Report page: {page.url}", soft_wrap=True)
+        say(f"Report page: {page.url}")
         if open_report:
             open_page(page.url)
         try:
@@ -190,7 +191,7 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
                 print_error(str(event.problem))
                 page.tell(f"not graded: {event.problem}", f"! {title}")
             else:
-                result = write_graded(event.graded, work.report, clock).result
+                result = write_graded(event.graded, work.report, clock)
                 console.rule(f"{time.strftime('%H:%M:%S')}, after {clock.elapsed_s:.1f} s")
                 if before is None:
                     print_grade(console, title, result)

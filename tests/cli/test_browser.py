@@ -13,7 +13,7 @@ from tests.cli.conftest import ROOT, Rosgrade
 from tests.cli.test_check import REFERENCE
 
 URL = "http://127.0.0.1:8123/"
-OPEN = f"from grader.cli.screen.browser import open_page; open_page({URL!r})"
+OPEN = f"from grader.cli.screen.console import open_page; open_page({URL!r})"
 
 
 def opened(folder: Path, browser: str | None) -> subprocess.CompletedProcess[str]:
@@ -56,7 +56,7 @@ def test_a_browser_that_fails_is_told_with_the_address(tmp_path: Path, browser: 
     ended = opened(tmp_path, f"{script(tmp_path, browser)} %s")
     assert ended.returncode == 0
     assert ended.stderr == (
-        f"rosgrade: warning: --open: the browser could not be started; the page is {URL}\n"
+        f"rosgrade: warning: --open: no browser could be started; the page is {URL}\n"
     )
 
 
@@ -74,7 +74,7 @@ def test_a_machine_without_a_browser_names_the_page(tmp_path: Path) -> None:
     ended = opened(tmp_path, None)
     assert ended.returncode == 0
     assert ended.stderr == (
-        f"rosgrade: warning: --open: there is no browser on this machine; the page is {URL}\n"
+        f"rosgrade: warning: --open: no browser could be started; the page is {URL}\n"
     )
 
 

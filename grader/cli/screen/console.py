@@ -1,11 +1,17 @@
-"""Where the commands write: results on standard output, progress and errors on the other."""
+"""Where the commands write: results on standard output, errors on the other, pages in a browser."""
 
 from __future__ import annotations
 
+import os
+import sys
+import threading
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+_SETTLED_S = 2.0
+"""A browser that has not failed by then is one that stays."""
 
 
 def output_console() -> Console:
@@ -13,6 +19,11 @@ def output_console() -> Console:
     from rich.console import Console
 
     return Console(highlight=False, emoji=False, markup=False)
+
+
+def say(text: str) -> None:
+    """One message on standard output, on as many lines as it needs."""
+    output_console().print(text, soft_wrap=True)
 
 
 def print_error(message: str) -> None:
@@ -31,3 +42,19 @@ def _print(label: str, style: str, message: str) -> None:
 
     console = Console(stderr=True, highlight=False, emoji=False, soft_wrap=True)
     console.print(Text.assemble((label, style), message))
+
+
+def open_page(url: str) -> None:
+    """Open a page in the user's browser, or say that it has to be opened by hand."""
+    import webbrowser
+
+    # Without a display only browsers for terminals are found, and they would take ours.
+    shown = any(os.environ.get(name) for name in ("BROWSER", "DISPLAY", "WAYLAND_DISPLAY"))
+    failed = [sys.platform.startswith("linux") and not shown]
+    if not failed[0]:
+        # Some browsers keep the program that starts them until they are closed.
+        work = threading.Thread(target=lambda: failed.append(not webbrowser.open(url)), daemon=True)
+        work.start()
+        work.join(_SETTLED_S)
+    if any(failed):
+        print_warning(f"--open: no browser could be started; the page is {url}")

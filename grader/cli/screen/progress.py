@@ -34,12 +34,7 @@ class Progress:
     """Shows on standard error what a command does."""
 
     def __init__(self, quiet: bool = False, verbose: bool = False) -> None:
-        """Prepare.
-
-        Args:
-            quiet: Say only what must be known.
-            verbose: Show what the build and the student's processes print.
-        """
+        """Set up; nothing is shown yet."""
         self._quiet = quiet
         self._verbose = verbose
         self._bars: Bars | None = None
@@ -83,11 +78,7 @@ class Progress:
             _print(text)
 
     def begin(self, work: str, total: int, already: int = 0) -> None:
-        """Begin to count a piece of work.
-
-        Args:
-            already: How many were done by an earlier run; they say nothing of the rate.
-        """
+        """Begin to count a piece of work."""
         self._work, self._count, self._total, self._fresh = work, 0, total, 0
         self._began_s = time.monotonic()
         if self._bars is not None:
@@ -135,7 +126,6 @@ class Progress:
     def _show(
         self, name: str, text: str, *, completed: int | None = None, total: int | None = None
     ) -> None:
-        """Set the line of a scenario, or of all else the first one."""
         with self._lock:
             if self._bars is None:
                 return
@@ -146,7 +136,6 @@ class Progress:
             self._bars.update(self._tasks[name], description=text, completed=completed, total=total)
 
     def _rate(self) -> str:
-        """Rate and time left, once a few are done."""
         if self._fresh < _LEAST_FOR_RATE:
             return ""
         each_s = (time.monotonic() - self._began_s) / self._fresh
@@ -154,7 +143,6 @@ class Progress:
 
 
 def _make_bars() -> Bars:
-    """A line for each task, with a sign that turns until it is done."""
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn
     from rich.table import Column
