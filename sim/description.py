@@ -75,13 +75,13 @@ class OdometryOrigin(str, Enum):
 class Drive(Model):
     """A velocity command that the robot gets without a message on its topic.
 
-    For scenarios in which the student's node only listens to a robot that moves.
+    For scenarios in which the student's node only subscribes to a moving robot.
     """
 
     at: DurationOrZero = Field(description="Simulated time at which it acts.")
-    linear: Speed = Field(0.0, description="Speed ahead.", validate_default=False)
+    linear: Speed = Field(0.0, description="Forward speed.", validate_default=False)
     angular: AngularSpeed = Field(
-        0.0, description="Turn, counter-clockwise.", validate_default=False
+        0.0, description="Rate of turn, counter-clockwise.", validate_default=False
     )
 
 
@@ -102,9 +102,11 @@ class RobotOptions(Model):
 
     model: Literal["burger", "waffle"] = Field("burger", description="Kind of TurtleBot3.")
     pose: PoseInPlane | None = Field(
-        None, description="Start as [x, y, yaw]; if left out, the world's `start`."
+        None, description="Start as [x, y, yaw]; by default the world's `start`."
     )
-    radius: PositiveMetres | None = Field(None, description="Footprint; if left out, the model's.")
+    radius: PositiveMetres | None = Field(
+        None, description="Radius of the footprint; by default the model's."
+    )
     max_speed: Annotated[float, _SPEED] | None = Field(None, description="Instead of the model's.")
     max_angular_speed: Annotated[float, _ANGULAR_SPEED] | None = Field(
         None, description="Instead of the model's."
@@ -117,13 +119,13 @@ class RobotOptions(Model):
     )
     command_timeout: Duration | None = Field(
         None,
-        description="The robot stops when no command came for so long. If left out, the last "
-        "command holds for ever, as in Gazebo.",
+        description="The robot stops after this time without a command. By default the last "
+        "command stays active, as in Gazebo.",
     )
     drives: tuple[Drive, ...] = Field(
-        (), description="Commands that it obeys besides those on its topic; the newest counts."
+        (), description="Commands in addition to those on its topic; the newest counts."
     )
-    pushes: tuple[Push, ...] = Field((), description="Pushes that it gets on its way.")
+    pushes: tuple[Push, ...] = Field((), description="Pushes on its way.")
 
 
 class LidarOptions(Model):
@@ -131,18 +133,19 @@ class LidarOptions(Model):
 
     enabled: bool = Field(True, description="Whether there is one.")
     beams: int = Field(360, ge=1, le=3600, description="Beams of a full turn, evenly spaced.")
-    rate: Rate = Field(5.0, description="Scans in a second, at most 100 Hz.")
-    range_min: PositiveMetres = Field(0.12, description="Least distance that is measured.")
-    range_max: PositiveMetres = Field(3.5, description="Greatest distance that is measured.")
-    layout: Layout = Field(Layout.FROM_ZERO, description="Where the beams begin.")
+    rate: Rate = Field(5.0, description="Scans per second, at most 100 Hz.")
+    range_min: PositiveMetres = Field(0.12, description="Smallest measured distance.")
+    range_max: PositiveMetres = Field(3.5, description="Largest measured distance.")
+    layout: Layout = Field(Layout.FROM_ZERO, description="Range of the beam angles.")
     no_return: NoReturn = Field(NoReturn.INF, description="What a beam without distance reports.")
     noise: LengthOrZero = Field(0.0, description="Standard deviation of a measured distance.")
     intensities: bool = Field(
         True,
         description="Whether `intensities` holds a number for each beam, as from the real LDS-01 "
-        "and in Gazebo: less with the distance, 0 without one. Some drivers leave it empty.",
+        "and in Gazebo: smaller with distance, 0 without a return. Some drivers leave "
+        "it empty.",
     )
-    pose: PoseInPlane = Field(ORIGIN, description="Where it sits on the robot.")
+    pose: PoseInPlane = Field(ORIGIN, description="Pose on the robot.")
     frame: str = Field("base_scan", min_length=1, description="`header.frame_id`.")
     starts: DurationOrZero = Field(0.0, description="No scan before this time.")
     stops: DurationOrZero | None = Field(None, description="No scan from this time on.")
@@ -155,7 +158,7 @@ class LidarOptions(Model):
 
 
 class DriftOptions(Model):
-    """Errors of the wheel odometry, drawn from the seed; all are off unless given."""
+    """Errors of the wheel odometry, drawn from the seed; by default none."""
 
     radius: Ratio = Field(
         0.0, description="Standard deviation of each wheel's radius, constant in a run."
@@ -165,13 +168,13 @@ class DriftOptions(Model):
     )
     slip: LengthOrZero = Field(
         0.0,
-        description="Standard deviation of a wheel's way after one metre; it grows with the "
-        "square root of the way.",
+        description="Standard deviation of a wheel's distance after 1 m; it grows with the square "
+        "root of the distance.",
     )
 
 
 class CovarianceOptions(Model):
-    """Variances that odometry reports, as Gazebo Classic's diff drive does (m² and rad²)."""
+    """Variances that odometry reports, as in Gazebo Classic's diff drive (m² and rad²)."""
 
     x: float = Field(1e-5, ge=0.0)
     y: float = Field(1e-5, ge=0.0)
@@ -182,18 +185,18 @@ class OdometryOptions(Model):
     """The wheel odometry."""
 
     enabled: bool = Field(True, description="Whether there is one.")
-    rate: Rate = Field(30.0, description="Messages in a second, at most 100 Hz.")
+    rate: Rate = Field(30.0, description="Messages per second, at most 100 Hz.")
     frame: str = Field("odom", min_length=1, description="`header.frame_id`.")
     child_frame: str = Field("base_footprint", min_length=1, description="`child_frame_id`.")
     origin: OdometryOrigin = Field(
         OdometryOrigin.WORLD,
-        description="Where `odom` is: with `world` the coordinates of the world file are those "
-        "of odometry.",
+        description="Origin of `odom`: with `world`, odometry uses the coordinates of the world "
+        "file.",
     )
     continuous: bool = Field(
         False,
-        description="The quaternion goes on without a jump when the robot turns, so that its `w` "
-        "is negative after half a turn; by default `w` is never negative. Both say the same.",
+        description="The quaternion is continuous when the robot turns, so `w` can be negative. By "
+        "default `w` is never negative. Both mean the same rotation.",
     )
     drift: DriftOptions = Field(default_factory=DriftOptions, description="Errors.")
     covariance: CovarianceOptions = Field(

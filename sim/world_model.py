@@ -38,7 +38,7 @@ class RoundModel(Model):
 class BoxModel(CornerModel):
     """A filled rectangle."""
 
-    centre: Point = Field(description="Where its middle is.")
+    centre: Point = Field(description="Its centre.")
     yaw: Angle = Field(0.0, description="Counter-clockwise turn.")
 
     def shape(self, label: str, line: int | None) -> Shape:
@@ -49,7 +49,7 @@ class BoxModel(CornerModel):
 class CircleModel(RoundModel):
     """A round pillar."""
 
-    centre: Point = Field(description="Where its middle is.")
+    centre: Point = Field(description="Its centre.")
 
     def shape(self, label: str, line: int | None) -> Shape:
         """What the simulation computes with."""
@@ -79,17 +79,17 @@ class WaypointModel(Model):
     """A place at a time."""
 
     at: DurationOrZero = Field(description="Simulated time since the start.")
-    pose: PoseOrPoint = Field(description="Where it is then; yaw may be left out.")
+    pose: PoseOrPoint = Field(description="Its pose at that time; yaw is optional.")
 
 
 class MovingModel(Model):
-    """An obstacle that follows timed waypoints in straight lines, or just appears."""
+    """An obstacle that moves in straight lines between timed waypoints, or only appears."""
 
     circle: RoundModel | None = Field(None, description="It is a pillar.")
     box: CornerModel | None = Field(None, description="It is a box.")
-    path: tuple[WaypointModel, ...] = Field(min_length=1, description="Where it is when.")
-    appears: DurationOrZero = Field(0.0, description="It is there from this time on.")
-    disappears: DurationOrZero | None = Field(None, description="It is gone from this time on.")
+    path: tuple[WaypointModel, ...] = Field(min_length=1, description="Waypoints with their times.")
+    appears: DurationOrZero = Field(0.0, description="Time at which it appears.")
+    disappears: DurationOrZero | None = Field(None, description="Time at which it disappears.")
     repeat: bool = Field(False, description="Whether the path starts over at its end.")
 
     @model_validator(mode="after")
@@ -137,13 +137,13 @@ class WorldModel(Model):
     )
     values: dict[str, int | float | str] = Field(
         default_factory=dict,
-        description="What `$name` stands for in this file; a scenario may give other values.",
+        description="Values of `$name` in this file. A scenario may set other values.",
     )
     segments: tuple[Ends, ...] = Field((), description="Straight walls without thickness.")
     boxes: tuple[BoxModel, ...] = Field((), description="Filled rectangles.")
     circles: tuple[CircleModel, ...] = Field((), description="Round pillars.")
     polygons: tuple[PolygonModel, ...] = Field((), description="Filled polygons.")
-    moving: tuple[MovingModel, ...] = Field((), description="Obstacles on scripts.")
+    moving: tuple[MovingModel, ...] = Field((), description="Obstacles that move.")
 
 
 def _ns(seconds: float) -> int:

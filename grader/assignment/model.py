@@ -32,7 +32,7 @@ from sim.description import LidarOptions, OdometryOptions, RobotOptions, Topics
 
 _DEFAULTS = SandboxLimits()
 
-_Memory = Annotated[Size, Field(description="Of all processes together.")]
+_Memory = Annotated[Size, Field(description="Memory of all processes together.")]
 _Processes = Annotated[
     int,
     Field(
@@ -43,18 +43,20 @@ _Processes = Annotated[
 ]
 _CpuTime = Annotated[Duration, Field(description="CPU time of all processes together.")]
 _FileSize = Annotated[Size, Field(description="Size of one file.")]
-_Disk = Annotated[Size, Field(description="Everything that is written; it is kept in memory.")]
-_Files = Annotated[int, Field(ge=100, description="Files and folders that are made.")]
+_Disk = Annotated[
+    Size, Field(description="Size of all written files together; they are kept in memory.")
+]
+_Files = Annotated[int, Field(ge=100, description="Number of created files and folders.")]
 _Output = Annotated[
-    Size, Field(description="Output to the terminal; a program that writes more is ended.")
+    Size, Field(description="Output to the terminal. A program that writes more is ended.")
 ]
 
 
 class LimitOptions(Model):
-    """What the processes of a student may take in a sandbox.
+    """Limits of the student's processes in a sandbox.
 
-    Without a sandbox nothing is bounded but time. How long a run lasts is bounded by
-    `discovery`, `timeout` and `shutdown`.
+    Without a sandbox only time is limited. `discovery`, `timeout` and `shutdown` limit the time of
+    a run.
     """
 
     _least_address_bytes: ClassVar[int] = _DEFAULTS.address_bytes
@@ -82,10 +84,9 @@ class LimitOptions(Model):
 
 
 class BuildLimitOptions(LimitOptions):
-    """What the build of a submission may take; `setup.py` and `CMakeLists.txt` are programs, too.
+    """Limits of the build of a submission: `setup.py` and `CMakeLists.txt` are programs too.
 
-    Without a sandbox only `wall_time` and `output` are bounded. A build that passes a limit has
-    failed.
+    Without a sandbox only `wall_time` and `output` are limited. A build that exceeds a limit fails.
     """
 
     _least_address_bytes: ClassVar[int] = BUILD.address_bytes
@@ -95,7 +96,7 @@ class BuildLimitOptions(LimitOptions):
     cpu_time: _CpuTime = BUILD.cpu_s
     wall_time: Duration | None = Field(
         None,
-        description="Of the whole build; by default 2 min where all packages are ament_python, "
+        description="Time of the whole build; by default 2 min if all packages are ament_python, "
         "else 5 min.",
     )
     file_size: _FileSize = BUILD.file_bytes
@@ -167,7 +168,7 @@ NOTHING_WITHHELD = Withheld()
 
 
 class Package(Model):
-    """A package that the student hands in."""
+    """A package that students hand in."""
 
     name: PackageName = Field(description="Name in package.xml.")
     build_type: Literal["ament_python", "ament_cmake"] = Field(
@@ -182,7 +183,7 @@ class Package(Model):
 
 
 class Launch(Model):
-    """A process to start, as `ros2 run` would; or a launch file, as `ros2 launch` would.
+    """A process to start like `ros2 run`, or a launch file to start like `ros2 launch`.
 
     A launch file needs a sourced ROS 2: the wheels have no `ros2 launch`.
     """
@@ -191,10 +192,10 @@ class Launch(Model):
     file: str | None = Field(
         None,
         pattern=r"^[A-Za-z0-9_.-]+\.(py|xml|yaml|yml)$",
-        description="Name of a launch file that the package installs, in place of an executable.",
+        description="Name of a launch file that the package installs, instead of an executable.",
     )
     package: PackageName | None = Field(
-        None, description="Its package; may be left out where the assignment has only one."
+        None, description="Its package; optional if the assignment has only one."
     )
     name: NodeName | None = Field(None, description="Rename the node (`--ros-args -r __node:=`).")
     namespace: Namespace | None = Field(
@@ -207,7 +208,7 @@ class Launch(Model):
         default_factory=dict, description="Remapping rules (`--ros-args -r from:=to`)."
     )
     arguments: tuple[str, ...] = Field(
-        (), description="Arguments of the program itself; of a launch file `name:=value`."
+        (), description="Arguments of the program; for a launch file `name:=value`."
     )
 
     @model_validator(mode="after")
@@ -235,8 +236,8 @@ class RecordedTopic(Model):
 
     topic: TopicName = Field(description="Fully qualified topic name.")
     type: InterfaceName = Field(
-        description="Interface, such as geometry_msgs/msg/Twist. Where the student writes the "
-        "package that it is of, our own copy of that package is in the folder `interfaces` beside "
+        description="Interface, such as geometry_msgs/msg/Twist. If students write its package, "
+        "put your own copy of the package into the folder `interfaces` beside "
         "assignment.yaml."
     )
     reliability: Reliability = Field(
@@ -249,48 +250,50 @@ class RecordedTopic(Model):
 
 
 class Until(Model):
-    """When the observation may end early: as soon as everything that is named here holds.
+    """When the observation may end early: as soon as all of these conditions are true.
 
-    The clock of `elapsed` and `quiet` starts with the first match of an endpoint, never with
-    the launch, so that a slow start costs no point.
+    `elapsed` and `quiet` count from the first match of an endpoint, not from the launch. So a slow
+    start costs no points.
     """
 
     messages: int | None = Field(
-        None, ge=1, description="So many messages on every recorded topic."
+        None, ge=1, description="Number of messages on every recorded topic."
     )
     quiet: Duration | None = Field(
         None,
-        description="No message on any recorded topic for so long, nor one of a stimulus that has "
-        "an end, and every timer that the process declared has had the time to fire.",
+        description="Time without a message on any recorded topic or from a stimulus that has an "
+        "end. Every declared timer must have had time to fire.",
     )
-    elapsed: Duration | None = Field(None, description="So long since the first match.")
+    elapsed: Duration | None = Field(None, description="Time since the first match.")
     at_rest: Duration | None = Field(
-        None, description="The simulated robot has moved and has then been at rest for so long."
+        None, description="Time at rest of the simulated robot, after it has moved."
     )
     travelled: PositiveLength | None = Field(
-        None, description="The simulated robot has gone so far, along its path."
+        None, description="Distance that the simulated robot has driven, along its path."
     )
     stimuli: Literal["done"] | None = Field(
         None,
-        description="`done`: every stimulus that has an end was played, and each answer that it "
-        "asks for is there or was waited for.",
+        description="`done`: every stimulus that has an end is complete, and each of its answers "
+        "has come or timed out.",
     )
-    any: tuple[Until, ...] = Field((), description="One of these holds.")
+    any: tuple[Until, ...] = Field((), description="At least one of these is true.")
 
 
 class Scenario(Model):
-    """One run: what is launched, what is recorded, when it ends."""
+    """One run: what is launched, what is recorded, and when it ends."""
 
     id: Id = Field(description="Short name, unique in the assignment.")
-    title: str = Field("", description="What happens in it, for the report.")
+    title: str = Field("", description="What happens in the run, for the report.")
     launch: tuple[Launch, ...] = Field(min_length=1, description="Processes of the student.")
     record: tuple[RecordedTopic, ...] = Field((), description="Topics to record.")
-    stimuli: tuple[Stimulus, ...] = Field((), description="What the probe does meanwhile.")
+    stimuli: tuple[Stimulus, ...] = Field(
+        (), description="What the probe sends or does during the run."
+    )
     world: str | None = Field(
         None,
-        description="World file, relative to the assignment's folder. With a world there is a "
-        "simulated robot in the scenario; its topics are recorded besides those of `record`. "
-        "Simulated time begins with the first match. One second after a contact the run ends.",
+        description="World file, relative to the assignment's folder. A world adds a simulated "
+        "robot to the scenario. Its topics are recorded too. Simulated time begins at "
+        "the first match. The run ends 1 s after a contact.",
     )
     robot: RobotOptions = Field(default_factory=RobotOptions, description="The simulated robot.")
     lidar: LidarOptions = Field(default_factory=LidarOptions, description="Its LiDAR.")
@@ -308,14 +311,13 @@ class Scenario(Model):
     timeout: Duration = Field(description="End of the observation, counted from the first match.")
     discovery: Duration = Field(
         10.0,
-        description="How long the first node may take to appear; time that the host took "
-        "from it is not counted.",
+        description="Longest time until the first node appears, without delays of the machine.",
     )
     shutdown: DurationOrZero = Field(
-        2.0, description="How long the node may take to end after SIGINT before it gets SIGTERM."
+        2.0, description="Time from SIGINT until a node that still runs gets SIGTERM."
     )
     limits: LimitOptions | None = Field(
-        None, description="What the student may take; by default the assignment's."
+        None, description="Limits of the student's processes; by default the assignment's."
     )
 
     @property
@@ -335,7 +337,9 @@ class CheckSpec(Model):
     """A check with its points."""
 
     id: Id = Field(description="Short name, unique in the assignment.")
-    title: str = Field("", description="One line for the student; by default the check's own.")
+    title: str = Field(
+        "", description="One line for the student; by default the title of the check."
+    )
     uses: str | None = Field(None, description="Name of a check in the catalogue.")
     python: str | None = Field(
         None, description="An own check: `file.py:function`, beside assignment.yaml."
@@ -345,17 +349,15 @@ class CheckSpec(Model):
     )
     scenarios: tuple[Id, ...] = Field(
         (),
-        description="Scenarios whose recordings it judges; by default all. Checks of the "
-        "submission itself have none.",
+        description="Scenarios whose recordings it judges; by default all. Checks of a submission "
+        "have no scenarios.",
     )
     points: float = Field(ge=0, description="Points for passing.")
     requires: tuple[Id, ...] = Field(
-        (), description="Checks that must have passed; otherwise this one is skipped."
+        (), description="Checks that must pass; otherwise this check is skipped."
     )
-    hint: str = Field("", description="What to try when it fails, in the author's words.")
-    visibility: Visibility = Field(
-        Visibility.VISIBLE, description="When the student gets to see it."
-    )
+    hint: str = Field("", description="What to try if the check fails, in the author's words.")
+    visibility: Visibility = Field(Visibility.VISIBLE, description="When students see the check.")
 
     @model_validator(mode="after")
     def _one_check(self) -> CheckSpec:
@@ -369,22 +371,24 @@ class Assignment(Model):
 
     rosgrade: Literal[1] = Field(description="Version of this format.")
     id: Id = Field(description="Name of the assignment and of its folder.")
-    title: str = Field(description="One line for people.")
-    packages: tuple[Package, ...] = Field(min_length=1, description="What is handed in.")
+    title: str = Field(description="Title in one line.")
+    packages: tuple[Package, ...] = Field(
+        min_length=1, description="Packages that students hand in."
+    )
     limits: LimitOptions = Field(
-        default_factory=LimitOptions, description="What the student's processes may take."
+        default_factory=LimitOptions, description="Limits of the student's processes."
     )
     build_limits: BuildLimitOptions = Field(
-        default_factory=BuildLimitOptions, description="What the build of a submission may take."
+        default_factory=BuildLimitOptions, description="Limits of the build of a submission."
     )
     libraries: tuple[LibraryName, ...] = Field(
         (),
-        description="Python libraries that students may import besides the standard library, ROS "
-        "and numpy, by the names that pip knows, such as `[scipy, pillow]`. In a sandbox no other "
-        "is there; on the machine that grades they must be installed.",
+        description="Python libraries that students may import in addition to the standard "
+        "library, ROS and numpy, by their names for pip, such as `[scipy, pillow]`. They must be "
+        "installed on the machine that grades. In a sandbox there are no others.",
     )
     scenarios: tuple[Scenario, ...] = Field((), description="The runs.")
     checks: tuple[CheckSpec, ...] = Field(min_length=1, description="What is judged.")
     points: float | None = Field(
-        None, ge=0, description="Sum of all points, where you want it to be checked."
+        None, ge=0, description="Sum of all points. If given, rosgrade verifies it."
     )

@@ -46,17 +46,17 @@ class Edit(Model):
 
     file: FilePath = Field(description="Path in the reference, with forward slashes.")
     replace: str = Field(
-        min_length=1, description="The text as it stands there; exactly `count` times."
+        min_length=1, description="The text in the file; it occurs exactly `count` times."
     )
-    with_: str = Field(alias="with", description="What stands there instead.")
-    count: int = Field(1, ge=1, description="How often the text stands in the file.")
+    with_: str = Field(alias="with", description="The new text.")
+    count: int = Field(1, ge=1, description="How often the text occurs in the file.")
 
 
 class Change(Model):
     """What is different from the reference: `edits` first, then `files`, then `move`."""
 
     id: Id = Field(description="Short name, unique in the file.")
-    title: str = Field(description="What is different, in the words of a student.")
+    title: str = Field(description="What is different, in plain words.")
     edits: tuple[Edit, ...] = Field((), description="Texts to replace, one after the other.")
     files: dict[FilePath, str | None] = Field(
         default_factory=dict,
@@ -66,7 +66,7 @@ class Change(Model):
         default_factory=dict, description="Files or folders to move: from -> to."
     )
     skip_reason: str = Field(
-        "", description="Why `rosgrade selftest` leaves it out; empty where it does not."
+        "", description="Why `rosgrade selftest` skips it; by default it does not."
     )
 
 
@@ -81,7 +81,7 @@ class Mutant(Change):
 
 
 class Variant(Change):
-    """A right solution that looks different; every check must pass."""
+    """A correct solution in another style; every check must pass."""
 
 
 class MutantFile(Model):
@@ -89,7 +89,7 @@ class MutantFile(Model):
 
     rosgrade: Literal[1] = Field(description="Version of this format.")
     mutants: tuple[Mutant, ...] = Field(min_length=1, description="Mistakes.")
-    variants: tuple[Variant, ...] = Field((), description="Right solutions in another style.")
+    variants: tuple[Variant, ...] = Field((), description="Correct solutions in another style.")
 
 
 def mutate(

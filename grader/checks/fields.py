@@ -25,8 +25,8 @@ _Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 FieldTolerance = Annotated[
     _Amount | dict[FieldPath, _Amount],
     Field(
-        description="Largest difference of two numbers; or by field, such as `{sum: 0.1}`: the "
-        "numbers of other fields must be exact."
+        description="Largest difference of two numbers; or by field, such as `{sum: 0.1}`. Then "
+        "the numbers of other fields must be exact."
     ),
 ]
 

@@ -42,9 +42,9 @@ class Plot:
         x_label: With unit, such as ``time since launch (s)``.
         y_label: With unit.
         x: Abscissas.
-        y: Ordinates, as many.
+        y: Ordinates, as many as abscissas.
         band: Lowest and highest allowed ordinate, or None.
-        histogram: Whether how often each ordinate occurs is worth a look as well.
+        histogram: Whether to show a histogram of the ordinates as well.
     """
 
     title: str
@@ -131,7 +131,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Where a finding can be seen.
+    """What the report shows for a finding.
 
     Attributes:
         moments: Times in the recording.
@@ -139,9 +139,9 @@ class Evidence:
         log: Lines of output that matter, as printed.
         plots: Series to draw.
         tables: Small tables.
-        spans: What lasted how long.
+        spans: Durations to draw.
         cases: Errors of many cases.
-        comparisons: Texts side by side.
+        comparisons: Texts to compare.
     """
 
     moments: tuple[Moment, ...] = ()
@@ -156,20 +156,20 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Finding:
-    """What a check says of one recording or of the submission.
+    """The verdict of a check on one recording or on the submission.
 
     Attributes:
         status: See :class:`Status`.
-        expected: What was asked for, a short phrase with units.
-        observed: What was seen instead, or seen as well; one cause, the deepest.
-        hint: What to try next, in the words of the ROS docs; the author's own hint in the
-            YAML is shown besides.
+        expected: What is expected, a short phrase with units.
+        observed: What was observed, and the deepest cause.
+        hint: What to try next, in the words of the ROS docs. The author's hint in the YAML is
+            shown too.
         credit: Share of the points in [0, 1].
-        evidence: Where to see it.
-        disturbed: The run is worth repeating. For an error: the host took so much that the
-            verdict would not be fair. For a failure: the host may have had a part in it.
-        remap: Of a failure that is a wrong name and nothing else: the rule that puts it right, such
-            as ``/cmdvel:=/cmd_vel``, so that everything else can be judged in a run with it.
+        evidence: What to show.
+        disturbed: The run should be repeated. For an error: the delays of the machine were too
+            large for a fair verdict. For a failure: the machine may be part of the cause.
+        remap: If a wrong name is the only cause of the failure: the rule that corrects it, such
+            as ``/cmdvel:=/cmd_vel``. The other checks are then judged in a run with this rule.
     """
 
     status: Status

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Intervention:
-    """Something that the probe did to a process of the student because the scenario says so.
+    """An action of the scenario on a process of the student.
 
     Attributes:
         time_ns: When.
@@ -81,13 +81,13 @@ class Wait:
 
 @dataclass(frozen=True)
 class Disturbance:
-    """One sample of what the host took from us since the sample before.
+    """Delays of the machine since the previous sample.
 
     Attributes:
         time_ns: When the sample was taken.
         late_ns: How much later the probe's metronome woke up than it asked to.
-        waited_ns: How long threads of the student that were ready to run had to wait for a
-            CPU (the kernel's run delay, /proc/PID/schedstat), the worst thread.
+        waited_ns: How long the worst thread of the student waited for a CPU while it was ready
+            to run (the kernel's run delay, /proc/PID/schedstat).
 
     Of both only what others than the student's own processes can have taken.
     """

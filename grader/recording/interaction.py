@@ -69,15 +69,15 @@ class Goal:
         answered_ns: When that answer was there, or None.
         feedback: In the order of its reception.
         statuses: When the probe received a status of the goal, and which, such as ``executing``.
-        cancel_after_s: It is to be canceled so long after it was accepted; None for not at all.
+        cancel_after_s: Time from acceptance to the cancel request in s; None for no request.
         canceled_ns: When the probe asked to cancel it, or None.
         cancel_answered_ns: When that was answered, or None.
         cancel_accepted: Whether the server agreed to cancel it; None without an answer.
         status: Final status, as in ``statuses``; empty if there was none by the end.
         result: Fields of the result, or None.
         result_ns: When the result was there, or None.
-        preempts: It was sent while the goal before it was still being worked on, on purpose.
-        preempted: A goal was sent while this one was still being worked on, on purpose.
+        preempts: It was sent on purpose while the previous goal was still executed.
+        preempted: Another goal was sent on purpose while this goal was still executed.
         error: Why it could not be sent: ``no server``, or what went wrong in rosgrade.
     """
 

@@ -59,7 +59,7 @@ class Ending(str, Enum):
 
 @dataclass(frozen=True)
 class Qos:
-    """QoS of an endpoint, in the words of the ROS docs; ``unknown`` where DDS does not tell.
+    """QoS of an endpoint, in the words of the ROS docs; ``unknown`` if DDS does not show it.
 
     Attributes:
         reliability: ``reliable``, ``best_effort`` or ``unknown``.
@@ -88,7 +88,7 @@ class Node:
 
     Attributes:
         name: Fully qualified, such as ``/bot_publisher``.
-        owner: Whose it is.
+        owner: Whose it is: the student's, the probe's, ...
         appeared_ns: First time it was seen.
         vanished_ns: First time it was missing again, or None.
     """
@@ -108,15 +108,15 @@ class Endpoint:
         topic: Fully qualified topic name.
         type: Interface name, such as ``geometry_msgs/msg/Twist``.
         node: Fully qualified node name.
-        owner: Whose it is.
+        owner: Whose it is: the student's, the probe's, ...
         qos: As discovered.
         gid: DDS identifier as hex.
-        type_hash: Of the interface's definition (REP-2011), or empty where it is not told.
+        type_hash: Hash of the interface's definition (REP-2011); empty if unknown.
         appeared_ns: First time it was seen.
         vanished_ns: First time it was missing again, or None.
-        kept: Of a reliable publisher the most messages that it kept at one time, as its
-            heartbeats tell (DDSI-RTPS), or None where none was heard.
-        heartbeats: How many of these told of another newest message.
+        kept: Largest number of messages that a reliable publisher kept at one time, from its
+            heartbeats (DDSI-RTPS); None without heartbeats.
+        heartbeats: Number of heartbeats with a new newest message.
     """
 
     kind: Kind
@@ -165,8 +165,9 @@ class Process:
         exited_ns: When it had ended, or None if it could not be ended at all.
         exit_code: As in :mod:`subprocess`: negative for the signal that ended it.
         stopped_by: ``itself``, or the last signal that rosgrade had to send: ``SIGINT``, ...
-        stop_s: Seconds from SIGINT to its end, less what the host took; None if it ended before.
-        survivors: Commands of descendants that had to be killed after it.
+        stop_s: Seconds from SIGINT to its end, minus delays of the machine; None if it ended
+            before.
+        survivors: Commands of its descendant processes that had to be killed after it.
         dropped_bytes: Bytes of output beyond what was kept.
     """
 
@@ -204,7 +205,7 @@ class LogLine:
 class Declaration:
     """Something that the tracer in the student's process reported.
 
-    It is *declared by the process* and never used where the wire can tell.
+    It is *declared by the process* and used only if nothing on the network shows it.
 
     Attributes:
         time_ns: When the probe read it.
@@ -277,13 +278,13 @@ class Recording:
 
     Attributes:
         scenario: Its id.
-        seed: What its random values were made from.
+        seed: Seed of its random values.
         ending: Why the observation ended.
         launched_ns: When the student's first process was started.
         matched_ns: When the first endpoint of the student on a recorded topic was matched.
         stop_ns: When the observation ended and SIGINT was sent.
         end_ns: When everything had ended.
-        submission: What was known before the run.
+        submission: Facts about the submission from before the run.
         messages: By topic, in the order of their source timestamps.
         sent: What the probe published, by topic, in that order; none where no subscription of
             the student's ever matched.
@@ -291,19 +292,19 @@ class Recording:
         joined: What late joiners received, by their names, in the order of their reception.
         unreadable: Topic -> how many messages on it hold other bytes than its type has.
         nodes: Nodes that were seen in the graph, in the order of their appearance.
-        endpoints: Their publishers and subscriptions, likewise.
-        processes: The student's, in the order of `launch`.
-        log: What they wrote and logged, line by line.
-        declarations: What the tracer in the student's processes reported.
+        endpoints: Publishers and subscriptions, in the order of their appearance.
+        processes: The student's processes, in the order of `launch`.
+        log: Their output and log records, line by line.
+        declarations: Reports of the tracer in the student's processes.
         calls: Calls of services by the probe, in order.
-        services: What the student's nodes offer.
+        services: Services that the student's nodes offer.
         goals: Goals that the probe sent.
         waits: Waits of the probe with their limits.
         joins: Late joiners.
         interventions: What the probe did to the student's processes.
         breaches: Limits of the sandbox that were reached.
-        disturbance: What the host took from the run, sample by sample.
-        faults: What went wrong in rosgrade or on the machine, one sentence each.
+        disturbance: Delays of the machine, sample by sample.
+        faults: Faults of rosgrade or of the machine, one sentence each.
         truth: The simulated robot, step by step; empty in a scenario without a world.
         incidents: What the simulator noted.
         scene: World and robot, or None in a scenario without a world.
@@ -347,7 +348,7 @@ class Recording:
 
     @property
     def remaps(self) -> tuple[str, ...]:
-        """Rules such as ``/cmdvel:=/cmd_vel`` that put wrong names right in this run."""
+        """Rules such as ``/cmdvel:=/cmd_vel`` that correct wrong names in this run."""
         return tuple(self.environment.get("remaps", "").split())
 
     def on(self, topic: str) -> tuple[Message, ...]:
@@ -390,7 +391,7 @@ class Recording:
         return (time_ns - self.launched_ns) / NS
 
     def stolen_s(self, begin_ns: int, end_ns: int) -> float:
-        """How much the host took from the run in ``[begin_ns, end_ns]``, at most.
+        """Upper bound of the delay by the machine in ``[begin_ns, end_ns]``, in s.
 
         The sum of the student's waits for a CPU and the worst lateness of the metronome, over
         all samples that overlap the interval.

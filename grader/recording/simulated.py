@@ -18,10 +18,10 @@ class Truth:
         x_m: Position in the world's frame (REP-103: x forward, y left).
         y_m: Position in the world's frame.
         yaw_rad: Heading, counter-clockwise from the x axis, in (-pi, pi].
-        linear_m_s: True speed ahead.
-        angular_rad_s: True turn, counter-clockwise.
-        command_m_s: Commanded speed in force, before any limit.
-        command_rad_s: Commanded turn in force, before any limit.
+        linear_m_s: True forward speed.
+        angular_rad_s: True rate of turn, counter-clockwise.
+        command_m_s: Active commanded speed, before any limit.
+        command_rad_s: Active commanded rate of turn, before any limit.
         contact: What the robot touches, such as ``boxes[2]``, or None.
     """
 
@@ -43,8 +43,8 @@ class Incident:
     Attributes:
         time_ns: When.
         kind: ``contact_began``, ``contact_ended``, ``command_rejected``, ``command_timeout``,
-            ``pushed`` or ``late`` (steps that the host did not let us do in time and that were
-            caught up).
+            ``pushed`` or ``late`` (steps that ran late because of the machine, and were caught
+            up).
         text: For people.
         value: For ``late`` how late in seconds, else None.
     """
@@ -57,20 +57,20 @@ class Incident:
 
 @dataclass(frozen=True)
 class Scene:
-    """What is needed to draw a run and to judge it: the world and the robot.
+    """World and robot of a run, for drawing and judging.
 
     Attributes:
         radius_m: Of the robot's circular footprint.
         max_linear_m_s: Limit of the robot.
         max_angular_rad_s: Limit of the robot.
         outlines: Name of each thing that stands still -> its capsules: x1, y1, x2, y2, radius.
-        moving: Everything that moves, with its shape and its script; where it is at a time is
-            a pure function of simulated time.
+        moving: Everything that moves, with its shape and its script. Its place is a pure
+            function of simulated time.
         began_ns: When simulated time began.
-        lidar: Where the LiDAR sits, in the robot's frame.
+        lidar: Pose of the LiDAR in the robot's frame.
         command_topic: The velocity commands that the robot obeys.
-        odometry_topic: Where it tells its odometry.
-        scan_topic: Where it tells its scans.
+        odometry_topic: Topic of its odometry.
+        scan_topic: Topic of its scans.
         acceleration_m_s2: Limit of the robot, speeding up or braking.
     """
 

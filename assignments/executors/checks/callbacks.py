@@ -68,15 +68,14 @@ class Runs(Reported):
 
 @check("callbacks.run", Subject.RECORDING, Runs)
 def run(recording: Recording, parameters: Runs) -> Finding:
-    """Callbacks run, and as often as they should.
+    """Callbacks run as often as expected.
 
-    A timer's callback starts once in each `period` (the median of the times between its starts);
-    a subscription's callback runs once for each message that the probe sent; messages that still
-    wait at the end because other callbacks work without a pause do not count. Each run must have
-    reported its start and its end. Without `period` and `stimulus` it is enough that each
-    callback ran `at_least` times. A start that is late because callbacks worked without a pause
-    until then counts as on time: whether they should have run at once is judged elsewhere. One
-    that comes before its time is never right, whatever the median is.
+    A timer's callback starts once in each `period` (the median of the times between its starts); a
+    subscription's callback runs once for each message that the probe sent; messages that still wait
+    at the end because other callbacks work without a pause do not count. Each run must have
+    reported its start and its end. Without `period` and `stimulus` it is enough that each callback
+    ran `at_least` times. A start that is late because other callbacks worked without a pause counts
+    as on time: other checks judge overlap. A start before its time is always wrong.
     """
     expected = _run_words(parameters)
     reports = read_reports(recording.on(parameters.topic))
@@ -328,7 +327,7 @@ def _busy(recording: Recording, reports: Reports, callback: str) -> bool:
 class Work(Reported):
     """Parameters of callbacks.work."""
 
-    duration: Duration = Field(description="How long each run of them must last.")
+    duration: Duration = Field(description="Expected duration of each run.")
     tolerance: Tolerance = Field(
         TimeTolerance(0.15, relative=True),
         description="How far the median may be from it: a share of it or a time.",
@@ -337,11 +336,11 @@ class Work(Reported):
 
 @check("callbacks.work", Subject.RECORDING, Work)
 def work(recording: Recording, parameters: Work) -> Finding:
-    """Callbacks work as long as they should.
+    """Callbacks work as long as expected.
 
-    The time between the report of the start and that of the end, by source timestamps: the
-    median of each callback's runs must be the duration within `tolerance`. What the machine took
-    from the process never costs a point.
+    The time between the report of the start and that of the end, by source timestamps: the median
+    of each callback's runs must be the duration within `tolerance`. Delays by the machine cost no
+    points.
     """
     expected = (
         f"{codes(parameters.callbacks)} working {format_duration(parameters.duration)} in each run "

@@ -119,12 +119,12 @@ class Overlapping(Reported):
     """Parameters of callbacks.overlap."""
 
     others: tuple[str, ...] = Field(
-        min_length=1, description="Callbacks with which each of them must overlap, with any."
+        min_length=1, description="Callbacks to overlap with. Each of `callbacks` must overlap with any of these."
     )
     at_least: int = Field(2, ge=1, description="How often.")
     by: Duration = Field(
         0.05,
-        description="How long both must run for it to count, by default 50 ms.",
+        description="Least time that both must overlap.",
         validate_default=False,
     )
 
@@ -138,8 +138,8 @@ def overlap(recording: Recording, parameters: Overlapping) -> Finding:
     the process declared only help to explain.
 
     A MultiThreadedExecutor takes as many threads as there are CPUs; the grader gives it four at
-    least, and os.cpu_count() says so. Where that is not possible and the machine has one CPU, it
-    cannot be judged, which costs no point.
+    least, and os.cpu_count() says so. If that is not possible and the machine has one CPU, this
+    cannot be judged. It then costs no points.
     """
     expected = (
         f"{codes(parameters.callbacks)} running at the same time as "

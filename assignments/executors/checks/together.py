@@ -28,21 +28,20 @@ class Together(Reported):
     at_least: int = Field(1, ge=1, description="How often.")
     by: Duration = Field(
         0.1,
-        description="How long all of them must run for it to count, by default 100 ms.",
+        description="Least time that all of them must overlap.",
         validate_default=False,
     )
 
 
 @check("callbacks.together", Subject.RECORDING, Together)
 def together(recording: Recording, parameters: Together) -> Finding:
-    """Callbacks all run at the same time.
+    """All callbacks run at the same time.
 
-    A run of every one of them lasts at the same moment, at least `at_least` times for `by` or
-    longer. Judged by their reports on the wire; the executor that the process declared only
-    helps to explain.
+    All of the callbacks overlap at least `at_least` times, for `by` or longer. Judged by their
+    reports on the wire; the executor that the process declared only helps to explain.
 
-    Where a MultiThreadedExecutor has one thread because the machine has one CPU, it cannot be
-    judged, which costs no point.
+    If a MultiThreadedExecutor has one thread because the machine has one CPU, this cannot be
+    judged. It then costs no points.
     """
     names = parameters.callbacks
     times = counted(parameters.at_least, "time")

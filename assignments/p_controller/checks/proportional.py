@@ -42,8 +42,8 @@ class Proportional(GoalParameters):
     )
     position: PositiveLength = Field(
         0.1,
-        description="How near the goal the first phase no longer counts: there its direction "
-        "changes faster than odometry tells.",
+        description="Within this distance of the goal, the first phase does not count: there the "
+"direction of the goal changes faster than odometry shows.",
     )
     r2: Ratio = Field(0.9, description="Least coefficient of determination R² of the line.")
     gain_min: Frequency | None = Field(
@@ -54,13 +54,12 @@ class Proportional(GoalParameters):
 
 @check("motion.proportional", Subject.RECORDING, Proportional)
 def proportional(recording: Recording, parameters: Proportional) -> Finding:
-    """The turn is commanded in proportion to the heading error.
+    """angular.z is proportional to the heading error.
 
-    Judged by every published command, against the error at the newest odometry before it (so
-    that the delay of odometry costs nothing), normalised to [-pi, pi]. A line through the
-    origin is laid through them: its slope is the gain, R² tells how well it fits. Commands at a
-    limit (of the robot, or a clamp of your own) and the pause near zero within your tolerance
-    do not count.
+    Judged by every published command, against the error at the newest odometry before it (so that
+    the delay of odometry costs nothing), normalised to [-pi, pi]. A line through the origin is
+    fitted: its slope is the gain, and R² measures the fit. Commands at a limit (of the robot, or a
+    clamp of your own) and the pause near zero within your tolerance do not count.
     """
     phase = parameters.phase
     expected = (

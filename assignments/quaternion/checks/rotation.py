@@ -116,16 +116,15 @@ class Answers(Parameters):
 
 @check("rotation.answers", Subject.RECORDING, Answers)
 def answers(recording: Recording, parameters: Answers) -> Finding:
-    """Rotations are converted rightly.
+    """Rotations are converted correctly.
 
-    The probe sends what to convert, and the node answers. An answer is right if its rotation is
-    the right one within `tolerance`, as scipy computes it, and if a quaternion has length 1.
-    `q` and `-q` are the same rotation; angles are compared as the rotation that they make, so
-    at gimbal lock any roll and yaw that make it are right. A zero axis or a zero quaternion may
-    be answered by no rotation at all (the identity) or by nothing, but not by NaN. Answers may
-    come late or twice: each is paired with the question that it answers, and one that is missing
-    does not shift the others. A node that repeats its last answer for as long as nothing new is
-    asked is wrong.
+    The probe sends what to convert, and the node answers. An answer is right if its rotation is the
+    right one within `tolerance`, as scipy computes it, and if a quaternion has length 1. `q` and
+    `-q` are the same rotation. Angles are compared as rotations, so at gimbal lock every roll and
+    yaw with the right rotation is right. A zero axis or a zero quaternion may be answered by no
+    rotation at all (the identity) or by nothing, but not by NaN. Answers may come late or twice.
+    Each answer is paired with its question, so a missing answer does not shift the others. A node
+    that repeats its last answer without a new question is wrong.
     """
     expected = parameters.words
     sent = recording.sent.get(parameters.stimulus, ())

@@ -52,7 +52,7 @@ class ActionExists(Parameters):
 def exists(recording: Recording, parameters: ActionExists) -> Finding:
     """The node offers the action.
 
-    Judged by the ROS graph: an action server of the student's was there, with this type.
+    Judged by the ROS graph: the student's node had an action server of this type.
     """
     return is_offered(recording, ACTION, parameters.action, parameters.type)
 
@@ -66,8 +66,7 @@ class OfGoals(Parameters):
     action: TopicName = Field(description="Action that a `send_goal` of the scenario sends to.")
     goal: dict[str, Any] = Field(
         default_factory=dict,
-        description="Which goals are judged: those with these fields; by default all that the "
-        "check can be about.",
+        description="Judge only goals with these fields; by default all.",
     )
 
     def named_fields(self) -> Iterator[NamedFields]:
@@ -157,11 +156,11 @@ def rejects(recording: Recording, parameters: Rejects) -> Finding:
 class FeedbackOf(OfGoals):
     """Parameters of action.feedback."""
 
-    at_least: int = Field(1, ge=1, description="Messages of feedback for each goal, at least.")
+    at_least: int = Field(1, ge=1, description="Least number of feedback messages for each goal.")
     rate: Frequency | None = Field(
-        None, description="How often feedback comes, by default at any rate."
+        None, description="Expected rate of the feedback; by default any."
     )
-    tolerance: Ratio = Field(0.1, description="How far the mean rate may be from it.")
+    tolerance: Ratio = Field(0.1, description="How far the mean rate may be from `rate`.")
     last: dict[str, Any] = Field(
         default_factory=dict, description="Expected fields of the last feedback of a goal."
     )
@@ -190,8 +189,8 @@ class FeedbackOf(OfGoals):
 def feedback(recording: Recording, parameters: FeedbackOf) -> Finding:
     """The action gives feedback while it works.
 
-    Judged by the feedback that the probe received for each goal that was accepted and let come
-    to its end: how much, at which mean rate, and the fields of the last.
+    Judged by the feedback that the probe received for each accepted goal that was not canceled or
+    preempted: number, mean rate, and fields of the last feedback.
     """
     goals = answered_goals(recording, parameters, is_undisturbed)
     for goal in goals:
@@ -263,7 +262,7 @@ class Result(OfGoals):
         description="How the goal ends: `succeeded` or `aborted`.",
     )
     tolerance: FieldTolerance = EXACT
-    within: Duration = Field(description="How long after the goal the result may come.")
+    within: Duration = Field(description="Longest time from the goal to its result.")
 
     def named_fields(self) -> Iterator[NamedFields]:
         """The fields of the goal and of the result."""
@@ -279,7 +278,7 @@ class Result(OfGoals):
 def result(recording: Recording, parameters: Result) -> Finding:
     """The action ends with the expected result.
 
-    Judged by the results of the goals that were accepted and let come to their end.
+    Judged by the results of the accepted goals that were not canceled or preempted.
     """
     goals = answered_goals(recording, parameters, is_undisturbed)
     for goal in goals:

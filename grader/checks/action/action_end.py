@@ -25,7 +25,7 @@ class Cancels(OfGoals):
     needs = (GoalSent(having="cancel_after"),)
 
     within: Duration = Field(
-        1.0, description="How soon after it was asked the goal must be canceled, by default 1 s."
+        1.0, description="Longest time from the cancel request to the end of the goal."
     )
 
     def _asked(self) -> str:
@@ -34,7 +34,7 @@ class Cancels(OfGoals):
 
 @check("action.cancels", Subject.RECORDING, Cancels)
 def cancels(recording: Recording, parameters: Cancels) -> Finding:
-    """A goal can be canceled while it is worked on.
+    """A goal can be canceled while it is executed.
 
     Judged by the goals that the probe asked to cancel (`cancel_after`): the server agrees, and
     the goal ends as canceled in time.
@@ -68,7 +68,7 @@ class Preempts(OfGoals):
     needs = (GoalSent(having="preempt"),)
 
     within: Duration = Field(
-        1.0, description="How soon after the new goal the old one must end, by default 1 s."
+        1.0, description="Longest time from the new goal to the end of the old one."
     )
 
     def _asked(self) -> str:
@@ -77,7 +77,7 @@ class Preempts(OfGoals):
 
 @check("action.preempts", Subject.RECORDING, Preempts)
 def preempts(recording: Recording, parameters: Preempts) -> Finding:
-    """A new goal ends the one that is worked on.
+    """A new goal ends the goal that is executed.
 
     Judged by the goals that the probe sent while another one was active (`preempt: true`): the
     new one is accepted, and the old one ends in time, canceled or aborted, without success.

@@ -48,15 +48,15 @@ class Responsive(Parameters):
 
     doubt = Doubt.ANSWER_MISSED
 
-    within: Duration = Field(1.0, description="How long an answer may take, by default 1 s.")
+    within: Duration = Field(1.0, description="Longest time for an answer.")
     share: Ratio = Field(
         0.9,
-        description="Share of the calls that must be answered in time. Of three calls or more "
-        "one may be late, unless it is 100 %.",
+        description="Share of the calls that must be answered in time. With three or more calls, "
+        "one may be late, unless the share is 100 %.",
     )
     typically: Duration | None = Field(
         None,
-        description="How long the median of the answers may take; by default it does not matter.",
+        description="Longest median of the answer times; by default any.",
     )
     node: QualifiedNodeName | None = Field(
         None,
@@ -85,14 +85,14 @@ class _Answers:
 def responsive(recording: Recording, parameters: Responsive) -> Finding:
     """The executor keeps spinning while the node works.
 
-    The probe calls the service `list_parameters` that every node has, and `get_type_description`
-    of a node without parameter services; a node can answer only while its executor spins. Where
-    several nodes have one name, each of them must answer. Calls count from the node's first
-    message on (or, if it publishes nothing, from its appearance); those that were sent too late
-    to be answered before the end do not count. A callback may be busy for a while, as long as
-    answers come in time; with `typically`, only as long as most of them come soon.
+    The probe calls the service `list_parameters` of every node, or `get_type_description` of a node
+    without parameter services. A node can answer only while its executor spins. If several nodes
+    have the same name, each of them must answer. Calls count from the node's first message on (or,
+    if it publishes nothing, from its appearance). Calls at the very end, with too little time for
+    an answer, do not count. A callback may be busy for a while if answers still come in time. With
+    `typically`, also the median of the answers must come soon.
 
-    Where no call can be judged it relies on what the process declared: that it spins and has a
+    If no call can be judged, the check uses what the process declared: that it spins and has a
     timer.
     """
     expected = f"services of the node answer within {format_duration(parameters.within)}"
@@ -311,10 +311,10 @@ class Timer(Parameters):
 def timer(recording: Recording, parameters: Timer) -> Finding:
     """The process has a timer.
 
-    Messages of a thread that sleeps look like those of a timer, so this is judged by what the
-    process declared: a process that created its publisher on the topic and no timer at all does
-    not publish in the callback of one. Any timer with a callback will do, whatever its period.
-    Where the process did not declare its publisher either, it is an error, which costs no point.
+    Messages of a thread that sleeps look like those of a timer. So this is judged by what the
+    process declared: it fails if the process created a publisher on the topic but no timer. Any
+    timer with a callback is right, whatever its period. If the process did not declare its
+    publisher, the check ends as an error and costs no points.
     """
     expected = f"a timer, in whose callback the node publishes on {code(parameters.topic)}"
     messages = recording.on(parameters.topic)

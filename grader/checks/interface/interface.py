@@ -57,8 +57,8 @@ def found(submission: SubmissionRecord, parameters: Found) -> Finding:
     """The definition of the interface is there.
 
     Judged by the files that were handed in: `msg/<Name>.msg` (or `srv/<Name>.srv`,
-    `action/<Name>.action`) beside package.xml. A file from elsewhere counts as well, if the
-    build generated the interface from it.
+    `action/<Name>.action`) beside package.xml. A file in another place also counts if the build
+    generated the interface from it.
     """
     definition = _definition(submission, parameters)
     return Finding.passed(parameters.asked_for, f"found {code(definition.file)}")
@@ -120,9 +120,9 @@ class Fields(Defined):
 def fields(submission: SubmissionRecord, parameters: Fields) -> Finding:
     """The interface has the expected fields.
 
-    Compares name, type, array bound and order of all fields. Comments, blanks, default values
-    and constants do not matter. Two nodes understand each other only if all of this is the same:
-    ROS compares a hash of it.
+    Compares name, type, array bound and order of all fields. Comments, blanks, default values and
+    constants do not matter. Two nodes can communicate only if all of this is the same: ROS compares
+    a hash of it.
     """
     return _compared(submission, parameters, field_differences)
 
@@ -139,7 +139,7 @@ class Constants(Defined):
 def constants(submission: SubmissionRecord, parameters: Constants) -> Finding:
     """The interface has the expected constants.
 
-    Compares name, type and value. Their order does not matter, nor do further constants.
+    Compares name, type and value. Their order and additional constants do not matter.
     """
     return _compared(submission, parameters, constant_differences)
 
@@ -205,14 +205,14 @@ class Manifest(OfInterface):
 
 @check("interface.manifest", Subject.SUBMISSION, Manifest)
 def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding:
-    """package.xml names what an interface package needs.
+    """package.xml names the packages that an interface package needs.
 
     `rosidl_default_generators` by `buildtool_depend` (or `build_depend`, `depend`),
     `rosidl_default_runtime` by `exec_depend` (or `depend`), membership of the group
-    `rosidl_interface_packages`, and each package whose messages the definition uses by `depend`
-    (or by one tag for the build and one for the run). On the machine where all of it is
-    installed the build does without these; on another one it fails. A package that was built must
-    be in ament's index of packages, where `ros2 interface show` looks.
+    `rosidl_interface_packages`, and each package whose messages the definition uses by `depend` (or
+    by one tag for the build and one for the run). Without these entries, the build works only on a
+    machine where all of the packages are installed. A package that was built must be in ament's
+    index of packages, where `ros2 interface show` looks.
     """
     definition = _definition(submission, parameters)
     stop_if(why_no_manifest(submission, parameters.parts.package))

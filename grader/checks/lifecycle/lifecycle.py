@@ -46,9 +46,9 @@ class State(Parameters):
 def state(recording: Recording, parameters: State) -> Finding:
     """The lifecycle node goes through the expected states.
 
-    Judged by the node's own answers to the calls of `get_state` that the scenario makes
-    (`lifecycle_msgs/srv/GetState`), between those of `change_state`.
-    Without the package lifecycle_msgs on the machine that grades, it is an error.
+    Judged by the node's answers to the calls of `get_state` in the scenario
+    (`lifecycle_msgs/srv/GetState`), between those of `change_state`. If the machine that grades
+    lacks the package lifecycle_msgs, the check ends as an error.
     """
     node, service = parameters.node, f"{parameters.node}/get_state"
     stop_if(why_not_node(recording, node))

@@ -44,20 +44,21 @@ class Follows(Parameters):
         "`pose.pose.position.x` or `ranges[0]`.",
     )
     decimals: int = Field(
-        2, ge=0, le=9, description="How many decimals must be right; rounding and cutting off are."
+        2,
+        ge=0,
+        le=9,
+        description="How many decimals must be right. Rounding and truncating are both right.",
     )
     sent: Literal["any", "before_launch", "after_launch"] = Field(
         "any",
-        description="Which messages count: those that a stimulus published before the node was "
-        "launched, those after, or any.",
+        description="Which messages count: those that a stimulus published before the launch of "
+        "the node, after it, or all.",
     )
-    at_least: int = Field(
-        1, ge=1, description="How many messages must be followed, each by log lines of its own."
-    )
+    at_least: int = Field(1, ge=1, description="How many messages must have their own log lines.")
     within: Duration = Field(
         0.5,
-        description="How soon after its message a line must come, by default 500 ms; for a "
-        "message from before the launch it is the time since the first match.",
+        description="Longest time from a message to its line. For a message from before the "
+        "launch, the time counts from the first match.",
         validate_default=False,
     )
     every: Duration | None = Field(
@@ -75,11 +76,11 @@ class Follows(Parameters):
 def follows(recording: Recording, parameters: Follows) -> Finding:
     """The node logs what it receives.
 
-    Lines on stdout and stderr (rclpy's loggers write to stderr) must follow messages on the
-    topic and show the values of their fields. Any formatting is right: one line or several,
-    rounded or exact, the whole message; other numbers and other lines do not matter. Only the
-    name that stands right before a number, as in `x = 1.37`, must not be that of another of the
-    fields. Where the lines come from does not matter either, a callback or a timer.
+    Lines on stdout and stderr (rclpy's loggers write to stderr) must follow messages on the topic
+    and show the values of their fields. Any formatting is right: one line or several, rounded or
+    exact, or the whole message. Other numbers and other lines do not matter. But a name directly
+    before a number, as in `x = 1.37`, must not be the name of another field. The lines may come
+    from a callback or from a timer.
     """
     carried = recording.carried(parameters.topic)
     expected = _words(parameters, carried)

@@ -82,7 +82,7 @@ class Records(Parameters):
     """Part of the parameters of the checks of log records."""
 
     node: QualifiedNodeName | None = Field(
-        None, description="Node whose logger is meant; by default every logger."
+        None, description="Node whose log records count; by default all."
     )
 
     def of(self, recording: Recording) -> list[Logged]:
@@ -104,7 +104,7 @@ class Matching(Records):
     """Part of the parameters of log.contains and log.rate."""
 
     text: str | None = Field(
-        None, min_length=1, description="A text in the record, upper and lower case alike."
+        None, min_length=1, description="A text in the record; upper and lower case do not matter."
     )
     pattern: Annotated[str, AfterValidator(_pattern)] | None = Field(
         None, description="A regular expression of Python that is found in the record."
@@ -138,8 +138,8 @@ class Matching(Records):
 class Contains(Matching):
     """Parameters of log.contains."""
 
-    at_least: int = Field(1, ge=0, description="So many of them at least.")
-    at_most: int | None = Field(None, ge=0, description="So many of them at most.")
+    at_least: int = Field(1, ge=0, description="Least number of such records.")
+    at_most: int | None = Field(None, ge=0, description="Largest number of such records.")
 
     @model_validator(mode="after")
     def _sensible(self) -> Contains:
@@ -152,10 +152,10 @@ class Contains(Matching):
 
 @check("log.contains", Subject.RECORDING, Contains)
 def contains(recording: Recording, parameters: Contains) -> Finding:
-    """The node logs what it must, at the right level.
+    """The node logs the expected text at the expected level.
 
-    Judged by the records of the loggers, on /rosout and in the lines that they write; each
-    counts once, and printed lines do not count.
+    Judged by the log records, on /rosout and in the output. Each record counts once. Printed lines
+    do not count.
     """
     low, high = parameters.at_least, parameters.at_most
     bounds = f"{low} or more" if high is None else f"{low} to {high}" if low < high else str(low)
@@ -225,10 +225,9 @@ class Worst(Records):
 
 @check("log.level", Subject.RECORDING, Worst)
 def level(recording: Recording, parameters: Worst) -> Finding:
-    """Nothing is logged that is more severe than allowed.
+    """The node logs nothing more severe than allowed.
 
-    Judged by the records of the loggers, on /rosout and in the lines that they write, until
-    SIGINT.
+    Judged by the log records, on /rosout and in the output, until SIGINT.
     """
     whose = f" by {code(parameters.node)}" if parameters.node else ""
     expected = f"nothing logged{whose} above {parameters.at_most}"
@@ -253,10 +252,10 @@ def level(recording: Recording, parameters: Worst) -> Finding:
 class Rate(Matching):
     """Parameters of log.rate."""
 
-    rate: Frequency | None = Field(None, description="How often, in the mean.")
+    rate: Frequency | None = Field(None, description="Expected mean rate.")
     tolerance: Ratio = Field(0.1, description="How far the mean rate may be from `rate`.")
-    at_most: Frequency | None = Field(None, description="At most so often, in the mean.")
-    at_least: Frequency | None = Field(None, description="At least so often, in the mean.")
+    at_most: Frequency | None = Field(None, description="Highest mean rate.")
+    at_least: Frequency | None = Field(None, description="Lowest mean rate.")
 
     @model_validator(mode="after")
     def _sensible(self) -> Rate:
@@ -285,11 +284,11 @@ class Rate(Matching):
 
 @check("log.rate", Subject.RECORDING, Rate)
 def rate(recording: Recording, parameters: Rate) -> Finding:
-    """The node logs as often as it must, and no more.
+    """The node logs at the expected rate.
 
-    Judged by the stamps of the records: their mean rate from the first to the last, or, of
-    fewer than three, by how many there are in the time that was observed. With a lowest rate the
-    node must log until the end of the observation: the last two periods may be silent.
+    Judged by the timestamps of the records: their mean rate from the first to the last. With fewer
+    than three records, judged by their number in the observed time. With a lowest rate the node
+    must log until the end of the observation: the last two periods may be silent.
     """
     low_hz, high_hz = parameters.bounds_hz
     expected = f"{parameters.words} at {parameters.often}"

@@ -46,16 +46,14 @@ class Follows(Parameters):
     tolerance: float = Field(
         gt=0, allow_inf_nan=False, description="Largest difference, in the unit of the field."
     )
-    within: Duration = Field(
-        0.5, description="How old the newest values may be.", validate_default=False
-    )
+    within: Duration = Field(0.5, description="Largest age of the values.", validate_default=False)
     settle: Duration = Field(
         2.0,
-        description="So long after the first message of the source a node may still publish what "
-        "it had before it received one.",
+        description="For this time after the first message of the source, a node may still publish "
+        "older values.",
         validate_default=False,
     )
-    at_least: int = Field(5, ge=1, description="How many messages must have come to judge.")
+    at_least: int = Field(5, ge=1, description="Least number of messages needed to judge.")
 
     def named_fields(self) -> Iterator[NamedFields]:
         """The judged fields, and those of the source."""
@@ -71,8 +69,8 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     """The values of the messages follow those of another topic.
 
     Every message must hold the values of one message of the source that was published at most
-    `within` before it; what the machine took from the node is not held against it. Angles are
-    compared on the circle. What is published before the first message of the source does not count.
+    `within` before it. Delays of the machine do not count. Angles are compared on the circle. What
+    is published before the first message of the source does not count.
     """
     topic, source = code(parameters.topic), code(parameters.source)
     pairs = listing(f"{code(field)} = {code(value)}" for field, value in parameters.fields.items())

@@ -43,13 +43,13 @@ class Count(Parameters):
     needs = (Recorded(), Published())
 
     topic: TopicName = Field(description="Fully qualified topic name.")
-    exactly: int | None = Field(None, ge=0, description="So many messages, no more, no fewer.")
-    at_least: int | None = Field(None, ge=1, description="At least so many messages.")
-    at_most: int | None = Field(None, ge=0, description="At most so many messages.")
+    exactly: int | None = Field(None, ge=0, description="Exact number of messages.")
+    at_least: int | None = Field(None, ge=1, description="Least number of messages.")
+    at_most: int | None = Field(None, ge=0, description="Largest number of messages.")
     stimulus: TopicName | None = Field(
         None,
-        description="Topic on which the probe publishes: so many messages for each of the probe's. "
-        "What came before the first of these does not count.",
+        description="Topic on which the probe publishes. The numbers then apply to each message of "
+        "the probe. Messages from before the probe's first message do not count.",
     )
 
     @model_validator(mode="after")
@@ -91,8 +91,7 @@ def count(recording: Recording, parameters: Count) -> Finding:
     """The right number of messages is published.
 
     Counts the messages on the topic in the whole observation, or since the first message of a
-    stimulus that they answer. A message that the writer numbered but that was lost on its way
-    counts as published.
+    stimulus that they answer. A message that was sent but lost in transit counts as published.
     """
     expected = parameters.words
     everything = recording.on(parameters.topic)
@@ -145,10 +144,10 @@ class Equal(Parameters):
         "(`{linear.x: 1.0}`).",
     )
     rest: Literal["zero", "any"] = Field(
-        "zero", description="What every field must be that `value` does not name."
+        "zero", description="Expected value of the fields that `value` does not name."
     )
     tolerance: FieldTolerance = EXACT
-    at_least: int = Field(1, ge=1, description="How many messages must have come to judge.")
+    at_least: int = Field(1, ge=1, description="Least number of messages needed to judge.")
 
     def named_fields(self) -> Iterator[NamedFields]:
         """The expected fields."""
@@ -176,8 +175,8 @@ def _within(tolerance: Tolerance) -> str:
 def equal(recording: Recording, parameters: Equal) -> Finding:
     """Every message has the expected values.
 
-    Compares each field of each message on the topic. It does not matter whether a number was
-    written as an integer.
+    Compares each field of each message on the topic. It does not matter whether a number is an
+    integer or a float.
     """
     messages = recording.on(parameters.topic)
     expected = parameters.words
@@ -263,16 +262,16 @@ class Series(Parameters):
         (), description="The values of the first messages, in order."
     )
     step: float | None = Field(
-        None, description="Instead of `values`: how much larger it is in each message."
+        None, description="Instead of `values`: how much the value grows in each message."
     )
     start: float | None = Field(
-        None, description="With `step`: the value in the very first message; by default any."
+        None, description="With `step`: the value in the first message; by default any."
     )
     tolerance: float = Field(
         1e-9, ge=0, allow_inf_nan=False, description="Largest difference of two numbers."
     )
     at_least: int = Field(
-        3, ge=1, description="With `step`: how many messages must have come to judge."
+        3, ge=1, description="With `step`: least number of messages needed to judge."
     )
 
     @model_validator(mode="after")
@@ -306,9 +305,8 @@ class Series(Parameters):
 def sequence(recording: Recording, parameters: Series) -> Finding:
     """The values come in the right order.
 
-    Compares one field of each message with the value that it should have at its place: counting
-    by a `step`, or a list of `values`. A message that the writer numbered but that was lost on
-    its way leaves its place out.
+    Compares one field of each message with the value that it should have at its place: counting by
+    a `step`, or a list of `values`. A message that was sent but lost in transit keeps its place.
     """
     expected = parameters.words
     messages = recording.on(parameters.topic)

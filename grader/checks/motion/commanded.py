@@ -46,15 +46,15 @@ _HELD_NS = NS
 class WithinLimits(RobotParameters):
     """Parameters of motion.within_limits."""
 
-    share: Ratio = Field(0.0, description="Share of the commands that may be beyond a limit.")
+    share: Ratio = Field(0.0, description="Share of the commands that may exceed a limit.")
 
 
 @check("motion.within_limits", Subject.RECORDING, WithinLimits)
 def within_limits(recording: Recording, parameters: WithinLimits) -> Finding:
     """Every command is within the limits of the robot.
 
-    Judged by the commands as they were published. The robot itself does no more than it can,
-    so that what it is asked for beyond it shows only here.
+    Judged by the commands as they were published. The simulated robot limits its motion itself, so
+    only this check sees commands beyond the limits.
     """
     cause = why_not_judged(recording)
     scene = recording.scene
@@ -115,11 +115,12 @@ class SlowsDown(RobotParameters):
 
 @check("motion.slows_down", Subject.RECORDING, SlowsDown)
 def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
-    """The speed ahead becomes less towards the end of the way.
+    """The robot slows down towards the end of its path.
 
     Judged by linear.x of the commands as they were published: the slowest of the last five that
-    drive must be at most a share of the fastest. A speed in proportion to the distance is so with
-    any gain and any clamp, as long as the goal's tolerance is small enough to leave the clamp.
+    drive must be at most a share of the fastest. A speed proportional to the distance passes with
+    any gain and any limit, if the tolerance of the goal is small enough that the speed falls below
+    the limit.
 
     It is no proportion either where all commands have one of two sizes, each of them several times,
     unless these are next to each other where a command has two decimals, or the lower one comes for

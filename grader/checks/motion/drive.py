@@ -57,11 +57,11 @@ class Drives(RobotParameters):
     """Parameters of motion.drives."""
 
     speed: Speed = Field(description="Expected speed ahead.")
-    tolerance: Ratio = Field(0.10, description="How far the speed may be off: a share of it.")
+    tolerance: Ratio = Field(0.10, description="Largest error of the speed, as a share of it.")
     until_distance: PositiveLength | None = Field(
         None,
-        description="With something straight ahead that is nearer than this, the speed no longer "
-        "counts. By default it always counts.",
+        description="The speed does not count while something straight ahead is nearer than this. "
+        "By default it always counts.",
     )
 
 
@@ -69,9 +69,9 @@ class Drives(RobotParameters):
 def drives(recording: Recording, parameters: Drives) -> Finding:
     """The robot drives ahead at the right speed.
 
-    Judged by the true speed, while nothing is near ahead: after it has sped up (half a second,
-    and what the robot's acceleration needs to that speed), and until it comes to rest for good.
-    The median must be the speed within `tolerance`, and nine tenths of the time must be, too.
+    Judged by the true speed, while nothing is near ahead: after it has sped up (half a second, and
+    what the robot's acceleration needs to that speed), and until it comes to rest for good. The
+    median must be the expected speed within `tolerance`, and so must the speed in 90 % of the time.
     """
     wanted, share = parameters.speed, parameters.tolerance
     expected = f"drives at {speed(wanted)} (within {percent(share)}) while nothing is near ahead"
@@ -153,16 +153,14 @@ def _wrong_speed(
 class KeepsDriving(RobotParameters):
     """Parameters of motion.keeps_driving."""
 
-    distance: PositiveLength = Field(
-        description="How far it must go ahead at least, along its path."
-    )
+    distance: PositiveLength = Field(description="Least forward distance, along its path.")
 
 
 @check("motion.keeps_driving", Subject.RECORDING, KeepsDriving)
 def keeps_driving(recording: Recording, parameters: KeepsDriving) -> Finding:
-    """The robot drives on where nothing is ahead.
+    """The robot drives on while nothing is ahead.
 
-    Judged by the way ahead along its true path; what it drives backwards is taken off.
+    Judged by the forward distance along its true path, minus what it drives backwards.
     """
     wanted_m = parameters.distance
     expected = f"drives {metres(wanted_m)} ahead without stopping, because nothing is near ahead"
@@ -232,10 +230,10 @@ class Straight(RobotParameters):
     """Parameters of motion.straight."""
 
     tolerance: AngularSpeed = Field(
-        0.01, description="Largest angular.z that still counts as zero, either way."
+        0.01, description="Largest angular.z that still counts as zero, in both directions."
     )
     heading: Angle = Field(
-        0.035, description="How far the heading may be off that of the start, either way."
+        0.035, description="Largest change of the heading since the start, in both directions."
     )
 
 
@@ -243,8 +241,8 @@ class Straight(RobotParameters):
 def straight(recording: Recording, parameters: Straight) -> Finding:
     """The robot drives straight ahead.
 
-    Judged by the commands in force and by the true heading: `angular.z` is zero all the time,
-    and the heading stays that of the start.
+    Judged by the active commands and by the true heading: `angular.z` is always zero, and the
+    heading stays the same as at the start.
     """
     expected = f"drives straight: angular.z is zero (within {turn(parameters.tolerance)})"
     cause = why_not_moved(recording)

@@ -30,9 +30,9 @@ from grader.spec.unit import format_duration
 class Reaches(GoalParameters):
     """Parameters of motion.reaches."""
 
-    position: PositiveLength = Field(description="How far from the goal it may end.")
+    position: PositiveLength = Field(description="Largest distance from the goal at the end.")
     heading: Angle | None = Field(
-        None, description="How far off its heading may be; by default it does not count."
+        None, description="Largest heading error; by default the heading does not count."
     )
 
 
@@ -83,7 +83,7 @@ class Settles(RobotParameters):
     """Parameters of motion.settles."""
 
     within: Duration = Field(
-        description="Simulated time until it comes to rest for good, from the beginning."
+        description="Longest simulated time from the beginning until the robot rests for good."
     )
 
 
@@ -91,9 +91,9 @@ class Settles(RobotParameters):
 def settles(recording: Recording, parameters: Settles) -> Finding:
     """The robot comes to rest in time.
 
-    Judged by the true motion: from the beginning of simulated time, which is when the node is
-    first connected, to the moment from which it rests until the end of the run. Where it rests
-    is the matter of motion.reaches.
+    Judged by the true motion: from the beginning of simulated time, which is when the node is first
+    connected, to the moment from which it rests until the end of the run. motion.reaches judges
+    where it rests.
     """
     expected = f"comes to rest for good within {format_duration(parameters.within)}"
     cause = why_not_moved(recording)
@@ -136,7 +136,7 @@ class PathLength(GoalParameters):
 
 @check("motion.path_length", Subject.RECORDING, PathLength)
 def path_length(recording: Recording, parameters: PathLength) -> Finding:
-    """The path to the goal is hardly longer than the straight line.
+    """The path to the goal is not much longer than the straight line.
 
     Judged by the true path of the whole run, against the straight line from its start to the
     goal.
@@ -199,7 +199,7 @@ class Overshoot(GoalParameters):
     """Parameters of motion.overshoot."""
 
     most: PositiveLength | None = Field(
-        None, description="How far it may go away again from where it came nearest."
+        None, description="Largest distance that it may drive away again from its nearest point."
     )
     heading: Angle | None = Field(
         None, description="How far it may turn beyond the goal's heading after it arrived."

@@ -42,17 +42,16 @@ class Stops(RobotParameters):
     distance: PositiveLength = Field(
         description="Distance of the obstacle straight ahead, from the LiDAR."
     )
-    early: Length = Field(0.03, description="How much farther away it may stop.")
-    late: Length = Field(0.05, description="How much nearer it may stop.")
+    early: Length = Field(0.03, description="How much farther away the robot may stop.")
+    late: Length = Field(0.05, description="How much nearer the robot may stop.")
 
 
 @check("motion.stops", Subject.RECORDING, Stops)
 def stops(recording: Recording, parameters: Stops) -> Finding:
-    """The robot stops at the right distance of the obstacle ahead.
+    """The robot stops at the right distance from the obstacle ahead.
 
-    Judged by the true distance from the LiDAR, straight ahead, at the moment the robot came to
-    rest after it had moved.
-    What the machine took from the run never costs a point.
+    Judged by the true distance from the LiDAR, straight ahead, at the moment the robot came to rest
+    after it had moved. Delays of the machine cost no points.
     """
     wanted_m = parameters.distance
     expected = (
@@ -160,7 +159,7 @@ class StaysAtRest(RobotParameters):
 
     after: Literal["start", "stop"] = Field(
         "stop",
-        description="`start`: it never moves at all. `stop`: once it has stopped it stays there.",
+        description="`start`: the robot never moves. `stop`: after it has stopped, it stays there.",
     )
     tolerance: Speed = Field(0.001, description="Speed that still counts as rest.")
 
@@ -235,7 +234,7 @@ class NoContact(RobotParameters):
 
     moving: bool = Field(
         True,
-        description="Whether the robot must also have moved: a robot that always stands touches "
+        description="Whether the robot must also have moved. A robot that never moves touches "
         "nothing.",
     )
 
@@ -244,8 +243,8 @@ class NoContact(RobotParameters):
 def no_contact(recording: Recording, parameters: NoContact) -> Finding:
     """The robot touches nothing.
 
-    Judged by the simulator. Something that runs into a robot at rest does not count.
-    A robot that never moved does not pass, unless `moving` is false.
+    Judged by the simulator. An obstacle that drives into a robot at rest does not count. A robot
+    that never moved does not pass, unless `moving` is false.
     """
     expected = "touches nothing"
     touched = why_touched(recording)

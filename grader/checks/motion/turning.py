@@ -40,7 +40,7 @@ class TwoPhases(GoalParameters):
 
 @check("motion.two_phases", Subject.RECORDING, TwoPhases)
 def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
-    """At the goal's position the robot only turns, it no longer drives.
+    """At the goal's position the robot turns and no longer drives.
 
     Judged by the commands in force and the true way. Within `position` of the goal the robot
     may drive on towards it, as far as its own tolerance says, and turn on the spot towards it;
@@ -111,18 +111,18 @@ class ShortWay(GoalParameters):
 
     tolerance: Angle = Field(
         math.radians(30.0),
-        description="How far it may turn the wrong way before it passes half a turn: near half "
-        "a turn both ways are short.",
+        description="How far it may turn the wrong way before it passes half a turn. Near half a "
+        "turn, both ways are short.",
     )
 
 
 @check("motion.short_way", Subject.RECORDING, ShortWay)
 def short_way(recording: Recording, parameters: ShortWay) -> Finding:
-    """The robot always turns by the short way.
+    """The robot always turns the short way.
 
-    Judged by the true heading, in the first phase against the direction of the goal, in the
-    second (once driving has ended near the goal) against the goal's heading. The long way
-    leads away from the error and through half a turn; overshooting by less is no long way.
+    Judged by the true heading, in the first phase against the direction of the goal, in the second
+    (once driving has ended near the goal) against the goal's heading. The long way goes away from
+    the goal direction and through half a turn. Overshooting by less is not the long way.
     """
     expected = "turns by the short way, never more than half a turn for an error"
     run = approach(recording, parameters.goal)

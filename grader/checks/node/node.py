@@ -59,7 +59,7 @@ class NodeExists(Parameters):
         description="Name of the node: `bot` is `/bot`; with a namespace `/robot/bot`."
     )
     publishes: TopicName | None = Field(
-        None, description="Topic on which this node, and no other one of the student's, publishes."
+        None, description="Topic on which only this node of the student publishes."
     )
 
 
@@ -103,7 +103,7 @@ class Alive(Parameters):
     """Parameters of node.alive."""
 
     name: QualifiedNodeName | None = Field(
-        None, description="Name of the node; by default everything that was launched."
+        None, description="Name of the node; by default all that were launched."
     )
 
     def _asked(self) -> str:
@@ -114,10 +114,10 @@ class Alive(Parameters):
 def alive(recording: Recording, parameters: Alive) -> Finding:
     """The node stays alive until it is asked to end.
 
-    Judged by the process, which must still run when the observation ends, and by the ROS
-    graph, which must not have lost the node before. Of several nodes those count that publish
-    what is recorded, or subscribe to what they are sent; a helper node may come and go. What a
-    sandbox never allows, such as a signal to the process that holds it, ends a node.
+    Judged by the process, which must still run when the observation ends, and by the ROS graph,
+    which must not have lost the node before. Of several nodes, only those count that publish on a
+    recorded topic or subscribe to a topic of a stimulus; a helper node may end earlier. Offences in
+    the sandbox, such as a signal to its first process, end a node.
     """
     name = parameters.name
     process = declarations.process_of(recording, name) if name else None
@@ -183,7 +183,7 @@ def _vanished(recording: Recording, node: Node) -> bool:
 class Ends(Parameters):
     """Parameters of node.ends."""
 
-    within: Duration = Field(description="How long the process may take to end after SIGINT.")
+    within: Duration = Field(description="Longest time from SIGINT to the end of the process.")
 
     def _asked(self) -> str:
         return f"the process ends within {format_duration(self.within)} of SIGINT (Ctrl-C)"
@@ -193,8 +193,8 @@ class Ends(Parameters):
 def ends(recording: Recording, parameters: Ends) -> Finding:
     """The process ends by itself after Ctrl-C.
 
-    Judged by the process: after SIGINT it must end in time, and leave no process behind. Its
-    exit status does not matter, nor does a traceback of KeyboardInterrupt.
+    Judged by the process: after SIGINT it must end in time and leave no process behind. Its exit
+    status and a traceback of KeyboardInterrupt do not matter.
     """
     if not recording.processes:
         stop_if(why_no_node(recording) or Cause("nothing was launched"))

@@ -49,10 +49,9 @@ class PackageFound(OfPackage):
 
 @check("package.found", Subject.SUBMISSION, PackageFound)
 def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding:
-    """The package is there, with a sound package.xml.
+    """The package is there and has a valid package.xml.
 
-    Judged by the files that were handed in: a package.xml with this name, which can be read,
-    and with the expected build type.
+    Judged by the submitted files: a valid package.xml with this name and the expected build type.
     """
     stop_if(why_no_manifest(submission, parameters.package))
     package = existing_package(submission, parameters.package)
@@ -77,9 +76,9 @@ class Builds(OfPackage):
 def builds(submission: SubmissionRecord, parameters: Builds) -> Finding:
     """The package builds with colcon.
 
-    Judged by `colcon build` on a copy of what was handed in. A syntax error in the module of
-    an executable counts too, if the package has no other executable: colcon only prints it and
-    goes on.
+    Judged by `colcon build` on a copy of the submission. A syntax error in the module of an
+    executable counts too, if the package has no other executable: colcon only prints it and
+    continues.
     """
     stop_if(why_not_built(submission, parameters.package))
     stop_if(why_nothing_to_run(existing_package(submission, parameters.package)))
@@ -96,11 +95,11 @@ class Executable(OfPackage):
     needs = (Submitted(executable="executable"),)
     asks = "the executable `{self.executable}`, for `ros2 run {self.package} {self.executable}`"
 
-    executable: str = Field(min_length=1, description="Name that `ros2 run` is given.")
+    executable: str = Field(min_length=1, description="Name in the command `ros2 run`.")
     remap: bool = Field(
         False,
-        description="Where the one executable of the package has another name or lies in bin/, run "
-        "that in its place. This check fails, and what requires it is judged all the same.",
+        description="If the only executable of the package has another name or is in bin/, run "
+        "that instead. This check fails, and checks that require it are still judged.",
     )
 
 
@@ -153,10 +152,9 @@ def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Find
     """package.xml declares the ROS packages that the code imports.
 
     Every ROS package that the Python code imports must be named in package.xml by `depend`,
-    `exec_depend`, `build_depend`, `build_export_depend` or `run_depend`, and every package that
-    is named there must exist. An import that the code can do without (guarded by `try`)
-    needs no entry. Modules that the code names in none of its files, but imports in a run, count
-    as well.
+    `exec_depend`, `build_depend`, `build_export_depend` or `run_depend`, and every package that is
+    named there must exist. An optional import (guarded by `try`) needs no entry. Modules that the
+    code imports only during a run also count.
     """
     stop_if(why_no_manifest(submission, parameters.package))
     package = existing_package(submission, parameters.package)

@@ -55,11 +55,11 @@ class Declared(OfParameter):
         None, description="Its value before it is set; by default any. Lists are exact."
     )
     range: tuple[float, float] | None = Field(
-        None, description="Lowest and highest value that its descriptor allows, [low, high]."
+        None, description="Lowest and highest value in its descriptor, [low, high]."
     )
     step: float | None = Field(None, ge=0, description="Step of the range.")
-    read_only: bool | None = Field(None, description="Whether it can never be set.")
-    described: bool = Field(False, description="Whether its descriptor has to have a description.")
+    read_only: bool | None = Field(None, description="Whether it is read-only.")
+    described: bool = Field(False, description="Whether its descriptor must have a description.")
 
     @model_validator(mode="after")
     def _consistent(self) -> Declared:
@@ -166,7 +166,7 @@ def _evidence(
 class OfSetting(OfParameter):
     """Part of the parameters of parameter.set and parameter.takes_effect."""
 
-    value: Any = Field(description="What a `set_parameters` of the scenario sets it to.")
+    value: Any = Field(description="Value that a `set_parameters` of the scenario sets.")
 
 
 def settings_to(recording: Recording, parameters: OfSetting) -> tuple[Setting, ...]:
@@ -193,9 +193,11 @@ class Set(OfSetting):
 
     needs = (ParameterSet(),)
 
-    accepted: bool = Field(True, description="Whether the node must accept it, or refuse it.")
+    accepted: bool = Field(True, description="Whether the node must accept the value.")
     reason: str = Field(
-        "", description="A word that the reason of a refusal must hold, upper and lower case alike."
+        "",
+        description="A word that the reason of a refusal must contain; upper and lower case do not "
+        "matter.",
     )
 
     def _asked(self) -> str:
@@ -206,10 +208,10 @@ class Set(OfSetting):
 
 @check("parameter.set", Subject.RECORDING, Set)
 def set_(recording: Recording, parameters: Set) -> Finding:
-    """The parameter can be set, or is refused, as expected.
+    """The parameter is set or refused as expected.
 
-    Judged by the node's answer to `set_parameters`, and by the value that its parameter has
-    after it: accepted, it is the new one; refused, it is the one from before.
+    Judged by the node's answer to `set_parameters`, and by the value that its parameter has after
+    it: the new value if it was accepted, the old value if it was refused.
     """
     tried = settings_to(recording, parameters)
     for item in tried:

@@ -47,17 +47,20 @@ class TakesEffect(OfSetting):
 
     needs = (ParameterSet(), Recorded())
 
-    topic: TopicName = Field(description="Recorded topic on which the effect shows.")
+    topic: TopicName = Field(description="Recorded topic that shows the effect.")
     fields: dict[str, Any] = Field(
         default_factory=dict,
-        description="What messages have then, nested or by path; other fields do not matter.",
+        description="Expected fields of the messages after that, nested or by path. Other fields "
+        "do not matter.",
     )
-    period: Duration | None = Field(None, description="Time between two messages then.")
+    period: Duration | None = Field(
+        None, description="Expected time between two messages after that."
+    )
     tolerance: FieldTolerance = EXACT
     period_tolerance: Ratio = Field(
         0.05, description="How far the median of the intervals may be from the period."
     )
-    within: Duration = Field(0.5, description="How soon after it was set, by default 500 ms.")
+    within: Duration = Field(0.5, description="Longest time until the effect.")
 
     def named_fields(self) -> Iterator[NamedFields]:
         """The fields that change."""
@@ -81,10 +84,10 @@ class TakesEffect(OfSetting):
 
 @check("parameter.takes_effect", Subject.RECORDING, TakesEffect)
 def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding:
-    """A parameter that is set changes what the node does.
+    """Setting the parameter changes what the node does.
 
-    Judged by the messages that were published from a moment after the node accepted the value
-    until the same parameter was set again, or the run ended.
+    Judged by the messages from shortly after the node accepted the value until the same parameter
+    was set again or the run ended.
     """
     item = settings_to(recording, parameters)[0]
     set_ns = item.call.answered_ns or 0

@@ -34,12 +34,12 @@ class LateJoiner(Parameters):
     needs = (Joined(),)
 
     topic: TopicName = Field(
-        description="Fully qualified topic name. Where the scenario does not record it, the late "
-        "joiner is the only subscription to it."
+        description="Fully qualified topic name. If the scenario does not record it, the late "
+        "joiner is the only subscription."
     )
     joiner: Id = Field(description="The `name` of a `join` among the stimuli.")
     last: int = Field(
-        ge=0, description="So many of the messages before it joined it must get, and no more."
+        ge=0, description="How many of the messages from before it joined the late joiner must get."
     )
 
     @property
@@ -61,9 +61,9 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     may count on either side.
 
     A scenario that records the topic subscribes to it from the start. In one that does not, there
-    is no subscription until the late joiner's; how many messages came before tell the numbers
-    that the publisher's middleware gives them. So a publisher is found out that publishes only
-    while there is a subscription.
+    is no subscription until the late joiner's; the sequence numbers of the publisher's middleware
+    show how many messages came before. So the check detects a publisher that publishes only while
+    there is a subscription.
     """
     join = next((item for item in recording.joins if item.name == parameters.joiner), None)
     if join is None:

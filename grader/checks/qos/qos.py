@@ -193,7 +193,7 @@ class Depth(Parameters):
     topic: TopicName = Field(description="Fully qualified topic name.")
     depth: int = Field(ge=1, description="Expected queue depth (history keep_last).")
     kind: Literal["publisher", "subscription"] = Field(
-        "publisher", description="Which end of the student's to judge."
+        "publisher", description="Which endpoint of the student to judge."
     )
 
 
@@ -201,9 +201,9 @@ class Depth(Parameters):
 def depth(recording: Recording, parameters: Depth) -> Finding:
     """The queue has the expected depth.
 
-    Discovery does not tell history and depth, so this is judged by what the process declared when
-    it created the endpoint. The heartbeats of a reliable publisher tell how many messages it
-    keeps: what they show counts more.
+    Discovery does not include history and depth. So this is judged by what the process declared
+    when it created the endpoint. The heartbeats of a reliable publisher show how many messages it
+    keeps: they count more.
     """
     kind = Kind(parameters.kind)
     expected = f"queue depth {parameters.depth} of the {kind.value} on {code(parameters.topic)}"
@@ -278,12 +278,12 @@ class Compatible(Parameters):
 
     topic: TopicName = Field(description="Fully qualified topic name.")
     kind: Literal["publisher", "subscription"] = Field(
-        description="Which end is the student's; the peer is the other end."
+        description="Which endpoint is the student's. The peer is the other one."
     )
     joiner: Id | None = Field(
         None,
-        description="The peer is this late joiner (the `name` of a `join`), with the QoS that it "
-        "requests: judged by what happened, too.",
+        description="The peer is this late joiner (the `name` of a `join`) with the QoS that it "
+        "requests. Then the real match counts too.",
     )
     reliability: Reliability | None = Field(
         None, description="Reliability of the peer, by default reliable."
@@ -325,13 +325,13 @@ class Compatible(Parameters):
 
 @check("qos.compatible", Subject.RECORDING, Compatible)
 def compatible(recording: Recording, parameters: Compatible) -> Finding:
-    """A certain peer would match, or would not, as the DDS rules say.
+    """A given peer matches or does not match, by the rules of DDS.
 
     Judged by what DDS discovered of every endpoint of the student's on the topic, by the rule
     "requested against offered": reliability, durability, deadline, liveliness and its lease
     duration. With a late joiner as the peer, it is judged by whether the two did match. A
     subscription with the policy "best available" matches every publisher: it requests what the
-    publishers offer that are there when it is created. Only the process can declare that.
+    publishers offer that are there when it is created. Only the process itself can declare that.
     """
     kind = Kind(parameters.kind)
     other = "subscription" if kind is Kind.PUBLISHER else "publisher"

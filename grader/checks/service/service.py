@@ -44,7 +44,7 @@ class ServiceExists(Parameters):
 def exists(recording: Recording, parameters: ServiceExists) -> Finding:
     """The node offers the service.
 
-    Judged by the ROS graph: a service server of the student's was there, with this type.
+    Judged by the ROS graph: the student's node had a service server of this type.
     """
     return is_offered(recording, SERVICE, parameters.service, parameters.type)
 
@@ -58,7 +58,7 @@ class Responds(Parameters):
     service: TopicName = Field(description="Service that a `call` of the scenario calls.")
     request: dict[str, Any] = Field(
         default_factory=dict,
-        description="Which calls are judged: those whose request has these fields; by default all.",
+        description="Judge only calls whose request has these fields; by default all.",
     )
     response: dict[str, Any] = Field(
         default_factory=dict,
@@ -66,11 +66,11 @@ class Responds(Parameters):
     )
     contains: dict[str, str] = Field(
         default_factory=dict,
-        description="Texts of the response that must hold a word: field -> word, upper and lower "
-        "case alike.",
+        description="Fields of the response that must contain a word: field -> word. Upper and "
+        "lower case do not matter.",
     )
     tolerance: FieldTolerance = EXACT
-    within: Duration = Field(1.0, description="How long the answer may take, by default 1 s.")
+    within: Duration = Field(1.0, description="Longest time for an answer.")
 
     def _asked(self) -> str:
         asked = f" to {words(self.request)}" if self.request else ""
@@ -182,9 +182,9 @@ class Concurrent(Parameters):
     service: TopicName = Field(
         description="Service that a `call` of the scenario calls with `at_once: 2`."
     )
-    takes: Duration = Field(description="How long the service works on one call.")
+    takes: Duration = Field(description="Processing time of one call.")
     calls: Literal["side_by_side", "one_after_another"] = Field(
-        "side_by_side", description="How it works on two calls that come at once."
+        "side_by_side", description="How it processes two calls that come at once."
     )
 
     def _asked(self) -> str:
@@ -196,10 +196,10 @@ class Concurrent(Parameters):
 
 @check("service.concurrent", Subject.RECORDING, Concurrent)
 def concurrent(recording: Recording, parameters: Concurrent) -> Finding:
-    """A second call during a slow one is worked on as expected.
+    """A second call during a slow call is processed as expected.
 
-    Judged by the answers to calls that the probe sent at once: side by side they come together,
-    one after another they are as far apart as one call takes.
+    Judged by the answers to calls that the probe sent at once. Parallel calls are answered
+    together. Calls one after another are answered one processing time apart.
     """
     calls = judged_calls(recording, parameters.service)
     pairs = [

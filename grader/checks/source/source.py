@@ -76,8 +76,8 @@ def class_(submission: SubmissionRecord, parameters: Class) -> Finding:
     """The class is there and inherits Node.
 
     Judged by the syntax of the package's Python files. It does not matter how the base class is
-    imported or called (`rclpy.node.Node`, `import ... as`, an alias), and whether it is
-    inherited at once or through a class of your own, in any file. A lifecycle node is a node.
+    imported or called (`rclpy.node.Node`, `import ... as`, an alias), and whether it is inherited
+    directly or through another class in any file. A lifecycle node is a node.
     """
     package = _judged_package(submission, parameters.package)
     family = Family([file for other in submission.packages for file in other.sources])
@@ -131,7 +131,7 @@ def _place(item: FoundClass, message: str) -> SourceError:
 class _Share(OfPackage):
     """Part of the parameters of source.docstrings and source.type_hints."""
 
-    share: Ratio = Field(1.0, description="Share of them that must have one, by default 100 %.")
+    share: Ratio = Field(1.0, description="Share of them that must have one.")
 
     @field_validator("share")
     @classmethod
@@ -205,7 +205,7 @@ def _is_public(name: str) -> bool:
 class TypeHints(_Share):
     """Parameters of source.type_hints."""
 
-    returns: bool = Field(True, description="Whether what a function returns needs a hint too.")
+    returns: bool = Field(True, description="Whether return values need a hint too.")
 
     def _asked(self) -> str:
         what = "parameters and return types" if self.returns else "parameters"
@@ -216,8 +216,8 @@ class TypeHints(_Share):
 def type_hints(submission: SubmissionRecord, parameters: TypeHints) -> Finding:
     """Functions have type hints.
 
-    Judged by the syntax of the package's Python files: every parameter, and what is returned.
-    `self` and `cls` need no hint, nor does what `__init__` returns, nor a lambda.
+    Judged by the syntax of the package's Python files: every parameter and every return value.
+    `self`, `cls`, the return value of `__init__` and lambdas need no hint.
     """
     package = _judged_package(submission, parameters.package)
     judged = [
@@ -261,10 +261,10 @@ class NoPrint(OfPackage):
 
 @check("source.no_print", Subject.SUBMISSION, NoPrint)
 def no_print(submission: SubmissionRecord, parameters: NoPrint) -> Finding:
-    """Nothing is printed: the node logs.
+    """The code does not call print(): the node logs.
 
-    Judged by the syntax of the package's Python files: `print` is not called, nor handed on as
-    a function. Printing into a file is not meant.
+    Judged by the syntax of the package's Python files: `print` is neither called nor passed as a
+    function. Printing to a file is allowed.
     """
     package = _judged_package(submission, parameters.package)
     places = [
@@ -303,7 +303,9 @@ class Ruff(OfPackage):
     except_: tuple[Annotated[str, AfterValidator(_rule)], ...] = Field(
         (), alias="except", description="Rules of these groups that do not matter."
     )
-    at_most: int = Field(0, ge=0, description="Places that may break a rule, at most 19.", le=19)
+    at_most: int = Field(
+        0, ge=0, description="Number of places that may break a rule, at most 19.", le=19
+    )
 
     def _asked(self) -> str:
         but = f" but {', '.join(self.except_)}" if self.except_ else ""
@@ -319,11 +321,11 @@ class Ruff(OfPackage):
 
 @check("source.ruff", Subject.SUBMISSION, Ruff)
 def ruff(submission: SubmissionRecord, parameters: Ruff) -> Finding:
-    """The code keeps the rules of ruff that are named.
+    """The code follows the given rules of ruff.
 
-    Judged by `ruff check` on the package's Python files, with lines of up to 99 characters as
-    in the style guide of ROS 2, and without any configuration or `# noqa` of the student's.
-    Without ruff on the machine that grades, it is an error, which costs no point.
+    Judged by `ruff check` on the package's Python files, with lines of up to 99 characters as in
+    the style guide of ROS 2, without the student's configuration and `# noqa`. If the machine that
+    grades lacks ruff, the check ends as an error and costs no points.
     """
     lint = _judged_package(submission, parameters.package).lint
     if lint is None or lint.problem is not None:

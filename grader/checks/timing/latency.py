@@ -53,7 +53,7 @@ class Latency(Parameters):
     most: Duration | None = Field(None, description="Longest single latency.")
     within: Duration = Field(
         1.0,
-        description="What comes later than this is no answer any more.",
+        description="An answer that comes later than this does not count.",
         validate_default=False,
     )
     unanswered: int = Field(0, ge=0, description="How many messages may have no answer.")
@@ -90,9 +90,9 @@ class Latency(Parameters):
 def latency(recording: Recording, parameters: Latency) -> Finding:
     """The node answers soon.
 
-    The latency is the time from the probe's publishing of a message to the source timestamp of
-    the node's answer. Answers are taken in their order, one for each message. What the machine
-    took from the process meanwhile is measured, and never costs a point.
+    The latency is the time from the probe's publishing of a message to the source timestamp of the
+    node's answer. Answers are taken in their order, one for each message. Delays by the machine are
+    measured and cost no points.
     """
     expected = parameters.words
     sent = recording.sent.get(parameters.stimulus, ())

@@ -75,10 +75,10 @@ class Period(Parameters):
     )
     outliers: Ratio = Field(
         0.10,
-        description="Share of the intervals that may be irregular: rounded down, but one at "
-        "least, unless it is 0 %.",
+        description="Share of the intervals that may be irregular, rounded down. At least one may "
+        "be, unless the share is 0 %.",
     )
-    at_least: int = Field(5, ge=1, description="Intervals that are needed to judge.")
+    at_least: int = Field(5, ge=1, description="Least number of intervals needed to judge.")
 
     @property
     def limits(self) -> PeriodLimits:
@@ -91,13 +91,12 @@ class Period(Parameters):
 def period(recording: Recording, parameters: Period) -> Finding:
     """Messages come at the expected period.
 
-    Judged by source timestamps, which the publisher's process sets in `publish()`, so that a
-    slow grader or network does not count. The median of the intervals must be the period
-    within `tolerance`; an interval that differs from the median by more than `spread` is
-    irregular, and only few may be (`outliers`). One late message makes an interval too long
-    and the next one too short: that counts once; a pause counts for every message that is
-    missing in it. Messages must go on until the end of the observation. What the machine took
-    from the process is measured, and never costs a point.
+    Judged by source timestamps, which the publisher's process sets in `publish()`, so a slow grader
+    or network does not matter. The median of the intervals must be the period within `tolerance`;
+    an interval that differs from the median by more than `spread` is irregular, and only few may be
+    (`outliers`). One late message makes an interval too long and the next one too short: that
+    counts once. A pause counts once for every missing message. Messages must go on until the end of
+    the observation. Delays by the machine are measured and cost no points.
     """
     limits = parameters.limits
     expected = (
@@ -215,7 +214,7 @@ class Rate(Parameters):
     topic: TopicName = Field(description="Fully qualified topic name.")
     at_least: Frequency | None = Field(None, description="Lowest rate.")
     at_most: Frequency | None = Field(None, description="Highest rate.")
-    messages: int = Field(5, ge=2, description="Messages that are needed to judge.")
+    messages: int = Field(5, ge=2, description="Least number of messages needed to judge.")
     pause: Duration | None = Field(
         None,
         description="Longest time without a message after the first one, until the end of the "
@@ -246,10 +245,9 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     """Messages come at a rate within bounds.
 
     The rate is the number of messages after the first, divided by the time from the first to the
-    last by source timestamps, as `ros2 topic hz` tells it; how regularly they come does not
-    matter (see timing.period), unless `pause` says how long a pause may be. Messages that the
-    writer numbered but that were lost on their way count. What the machine took from the process
-    is measured, and never costs a point.
+    last, by source timestamps. `ros2 topic hz` shows the same. Regularity does not matter (see
+    timing.period), except that `pause` limits the pauses. Messages that were sent but lost in
+    transit count. Delays by the machine are measured and cost no points.
     """
     expected = parameters.words
     messages = recording.on(parameters.topic)

@@ -37,8 +37,7 @@ class Topic(Parameters):
 def published(recording: Recording, parameters: Topic) -> Finding:
     """The node publishes on the topic.
 
-    Judged by the ROS graph: a publisher of the student's was there. Whether and what it
-    publishes is judged elsewhere.
+    Judged by the ROS graph: the student's node had a publisher. Other checks judge its messages.
     """
     return _presence(recording, Kind.PUBLISHER, parameters)
 
@@ -47,7 +46,7 @@ def published(recording: Recording, parameters: Topic) -> Finding:
 def subscribed(recording: Recording, parameters: Topic) -> Finding:
     """The node subscribes to the topic.
 
-    Judged by the ROS graph: a subscription of the student's was there.
+    Judged by the ROS graph: the student's node had a subscription.
     """
     return _presence(recording, Kind.SUBSCRIPTION, parameters)
 
@@ -99,7 +98,7 @@ class Type(Topic):
 
     type: InterfaceName = Field(description="Interface, such as geometry_msgs/msg/Twist.")
     kind: Literal["publisher", "subscription"] = Field(
-        "publisher", description="Which end of the student's to judge."
+        "publisher", description="Which endpoint of the student to judge."
     )
 
 
@@ -107,7 +106,7 @@ class Type(Topic):
 def type_(recording: Recording, parameters: Type) -> Finding:
     """The topic has the expected message type.
 
-    Judged by the ROS graph, for every endpoint of the student's on the topic.
+    Judged by the ROS graph, for every endpoint of the student's nodes on the topic.
     """
     kind, topic, wanted = Kind(parameters.kind), parameters.topic, parameters.type
     expected = f"a {kind.value} of {code(wanted)} on {code(topic)}"
@@ -146,9 +145,9 @@ class Untouched(Parameters):
 def untouched(recording: Recording, parameters: Untouched) -> Finding:
     """Only the robot publishes its sensors.
 
-    Judged by the ROS graph: no node of the student has a publisher on a topic of the robot, or
-    the name of the node that watches the run. Motion is judged by the simulator itself, so
-    that publishing there could gain nothing.
+    Judged by the ROS graph: no node of the student has a publisher on a topic of the robot, or the
+    name of the probe. The simulator itself judges motion, so publishing there would bring no
+    points.
     """
     stop_if(why_no_node(recording))
     for endpoint in recording.student_endpoints(Kind.PUBLISHER):

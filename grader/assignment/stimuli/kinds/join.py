@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 @kind
 class Join(StimulusModel):
-    """Join late: a further subscription of the probe, created in the middle of the run.
+    """Join late: another subscription of the probe, created in the middle of the run.
 
-    Its messages are recorded under its own name, apart from those of `record`. Where `record`
-    leaves the topic out, it is the first subscription to it.
+    Its messages are recorded under its own name, apart from those of `record`. If `record` does not
+    have the topic, this is the first subscription to it.
     """
 
     key = "join"
@@ -29,7 +29,7 @@ class Join(StimulusModel):
     join: TopicName = Field(description="Topic to subscribe to.")
     type: InterfaceName = Field(description="Interface, such as std_msgs/msg/Int64.")
     name: Id = Field(description="Name of what it records, for the checks.")
-    after: DurationOrZero = Field(description="When: so long after the first match.")
+    after: DurationOrZero = Field(description="When, counted from the first match.")
     reliability: Reliability = Field("reliable", description="Requested reliability.")
     durability: Durability = Field("volatile", description="Requested durability.")
     depth: int = Field(100, ge=1, le=10_000, description="Queue depth of the subscription.")

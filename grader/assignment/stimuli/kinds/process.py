@@ -20,8 +20,8 @@ class Kill(StimulusModel):
     key = "kill"
 
     kill: str = Field(description="Name of the executable.")
-    package: PackageName | None = Field(None, description="Its package, where several have it.")
-    after: DurationOrZero = Field(description="When: so long after the first match.")
+    package: PackageName | None = Field(None, description="Its package, if several have it.")
+    after: DurationOrZero = Field(description="When, counted from the first match.")
     signal: Signal = Field("SIGINT", description="The signal: SIGINT is Ctrl-C.")
 
     def order(self, making: Making) -> dict[str, Any]:
@@ -33,13 +33,13 @@ class Kill(StimulusModel):
 
 @kind
 class Restart(StimulusModel):
-    """Start a process of the student again, as it was launched; one that still runs is ended."""
+    """Start a process of the student again. If it still runs, it is ended first."""
 
     key = "restart"
 
     restart: str = Field(description="Name of the executable.")
-    package: PackageName | None = Field(None, description="Its package, where several have it.")
-    after: DurationOrZero = Field(description="When: so long after the first match.")
+    package: PackageName | None = Field(None, description="Its package, if several have it.")
+    after: DurationOrZero = Field(description="When, counted from the first match.")
 
     def order(self, making: Making) -> dict[str, Any]:
         """The process."""

@@ -30,10 +30,10 @@ MOST_MESSAGES = 10_000
 class Publish(StimulusModel):
     """Publish messages.
 
-    The first one goes out when a subscription of the student has matched, and never before.
-    What was published is in the recording's `sent`. The values may use `$name` of `random`, and
-    quantities such as `30 deg` (in SI units); a field that is left out is zero. A time may be
-    `now`. Give the messages in one way: `message`, `messages`, `from` or `python`.
+    The probe publishes the first message when a subscription of the student has matched. Published
+    messages are in the recording's `sent`. Values may use `$name` of `random` and quantities such
+    as `30 deg` (in SI units). An omitted field is zero. A time may be `now`. Give the messages with
+    exactly one of `message`, `messages`, `from` and `python`.
     """
 
     key = "publish"
@@ -53,7 +53,7 @@ class Publish(StimulusModel):
         description="An own function, `file.py:function`, beside assignment.yaml: it takes the "
         "scenario's seed and returns a list of messages, each a dict of its fields.",
     )
-    after: DurationOrZero = Field(0.0, description="Not before so long after the first match.")
+    after: DurationOrZero = Field(0.0, description="Earliest time, counted from the first match.")
     every: Duration | None = Field(
         None,
         description="Time between two messages. One `message` is repeated with it, `count` times "
@@ -64,17 +64,17 @@ class Publish(StimulusModel):
     )
     answer: TopicName | None = Field(
         None,
-        description="Send the next message only when one was received on this recorded topic, or "
-        "when `within` has passed. One that is the same as before may be a copy, and counts a "
-        "moment later.",
+        description="Send the next message only after a message on this recorded topic, or after "
+        "`within`. A message that is equal to the previous one may be a copy, and "
+        "counts slightly later.",
     )
     within: Duration = Field(1.0, description="How long to wait for an `answer`.")
     before_launch: int = Field(
         0,
         ge=0,
         le=MOST_MESSAGES,
-        description="So many of the messages are published at once, before anything of the "
-        "student's is launched; the others follow when a subscription has matched.",
+        description="Number of messages to publish before the launch of the student's processes. "
+        "The others follow after the first subscription has matched.",
     )
     reliability: Reliability = Field("reliable", description="Offered reliability.")
     durability: Durability = Field("volatile", description="Offered durability.")

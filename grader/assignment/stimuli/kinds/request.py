@@ -20,9 +20,9 @@ MOST_CALLS = 1000
 _After = Annotated[
     DurationOrZero,
     Field(
-        description="Not before so long after the first match, nor before the answers to what is "
-        "asked earlier. What has the same `after` is asked in the order of the list; a goal is "
-        "answered when it was accepted or rejected."
+        description="Earliest time, counted from the first match. The probe also waits for the "
+        "answers to earlier requests. Requests with the same `after` are sent in the "
+        "order of the list. The answer to a goal is its acceptance or rejection."
     ),
 ]
 _Within = Annotated[Duration, Field(description="How long to wait for each answer.")]
@@ -32,9 +32,9 @@ _Within = Annotated[Duration, Field(description="How long to wait for each answe
 class ListParameters(StimulusModel):
     """Call the parameter service `list_parameters` of every node of the student.
 
-    It answers only while the node's executor spins, and so shows from outside whether a
-    callback blocks the executor. A node without parameter services is asked for
-    `get_type_description` instead.
+    The service answers only while the node's executor spins. So it shows whether a callback blocks
+    the executor. For a node without parameter services, the probe calls `get_type_description`
+    instead.
     """
 
     key = "call"
@@ -62,9 +62,9 @@ class ListParameters(StimulusModel):
 class CallService(StimulusModel):
     """Call a service.
 
-    The first call goes out when the service is there and its node spins. What was asked and
-    answered is in the recording's `calls`. Values may use `$name` of `random` and quantities
-    such as `30 deg` (in SI units); a field that is left out is zero.
+    The probe sends the first call when the service is there and its node spins. Requests and
+    responses are in the recording's `calls`. Values may use `$name` of `random` and quantities such
+    as `30 deg` (in SI units). An omitted field is zero.
     """
 
     key = "call"
@@ -73,19 +73,22 @@ class CallService(StimulusModel):
     type: InterfaceName = Field(description="Interface, such as std_srvs/srv/SetBool.")
     request: dict[str, Any] | None = Field(None, description="The fields of the request.")
     requests: tuple[dict[str, Any], ...] = Field(
-        (), description="Several requests, one after another, in place of one."
+        (), description="Several requests, one after another, instead of `request`."
     )
     after: _After = 0.0
     every: Duration | None = Field(
         None,
-        description="Time between two calls; by default the next one follows the answer, or "
-        "`within`.",
+        description="Time between two calls; by default the next call follows after the answer or "
+        "after `within`.",
     )
     count: int | None = Field(
         None, ge=1, le=MOST_CALLS, description="How often one `request` is sent."
     )
     at_once: int = Field(
-        1, ge=1, le=10, description="Send so many calls at once: the second during the first."
+        1,
+        ge=1,
+        le=10,
+        description="Number of calls to send at once: the second call comes during the first.",
     )
     within: Duration = Field(2.0, description="How long to wait for an answer.")
 
@@ -186,8 +189,8 @@ def _value(name: str, value: Any, drawn: dict[str, float]) -> Any:
 class SendGoal(StimulusModel):
     """Send a goal to an action.
 
-    It goes out when the action is there and, unless it is to `preempt`, when the goal before it
-    has ended. What became of it is in the recording's `goals`.
+    The probe sends the goal when the action is there and the previous goal has ended (with
+    `preempt`, while it is executed). The outcome is in the recording's `goals`.
     """
 
     key = "send_goal"
@@ -199,9 +202,9 @@ class SendGoal(StimulusModel):
     goal: dict[str, Any] = Field(default_factory=dict, description="The fields of the goal.")
     after: _After = 0.0
     cancel_after: Duration | None = Field(
-        None, description="Ask to cancel it so long after it was accepted."
+        None, description="Time from acceptance of the goal to the cancel request."
     )
-    preempt: bool = Field(False, description="Send it while the goal before it is worked on.")
+    preempt: bool = Field(False, description="Send the goal while the previous goal is executed.")
     within: Duration = Field(10.0, description="How long to wait for its result.")
 
     @property
