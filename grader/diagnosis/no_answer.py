@@ -114,7 +114,7 @@ def server_destroyed(symptom: NoAnswer) -> Cause | None:
 
 @explanation(NoAnswer)
 def no_cpu_time(symptom: NoAnswer) -> Cause | None:
-    """The machine gave the process too little CPU time; an error, and never a lost point."""
+    """The machine gave the process too little CPU time; this is an error and costs no points."""
     recording = symptom.recording
     return why_taken(recording, symptom.what, symptom.asked_ns, recording.stop_ns, symptom.within_s)
 
@@ -136,7 +136,7 @@ def never_spun(symptom: NoAnswer) -> Cause | None:
 
 @explanation(NoAnswer)
 def blocked_executor(symptom: NoAnswer) -> Cause | None:
-    """A callback does not return, such as that of a goal, and blocks the executor."""
+    """A callback does not return and blocks the executor."""
     blocked = None if symptom.spins else symptom.while_busy
     if symptom.spins is False and blocked is None:
         blocked = Cause(
@@ -151,7 +151,7 @@ def blocked_executor(symptom: NoAnswer) -> Cause | None:
 
 @explanation(NoAnswer, general=True)
 def callback_does_not_answer(symptom: NoAnswer) -> Cause:
-    """The callback does not come to its end, or waits for another one of its group."""
+    """The callback does not finish, or waits for another callback of its group."""
     spins = ", although the node's executor spins" if symptom.spins else ""
     return Cause(
         f"{symptom.what}{in_brackets(symptom.place)}{spins}",

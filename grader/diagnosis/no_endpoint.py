@@ -210,7 +210,7 @@ def other_interface(symptom: NoEndpoint) -> Cause | None:
 
 @explanation(NoEndpoint)
 def misspelt_name(symptom: NoEndpoint) -> Cause | None:
-    """Its name is misspelt, private, in a namespace, or in other case."""
+    """Its name is misspelt, private, in a namespace, or in wrong upper or lower case."""
     ended, wanted = crashed(symptom.recording), symptom.name
     # What a process that lives has is no misspelling of what another never came to create.
     suspects = [
@@ -250,14 +250,14 @@ def never_appeared(symptom: NoEndpoint) -> Cause | None:
 
 @explanation(NoEndpoint)
 def exchanged_executables(symptom: NoEndpoint) -> Cause | None:
-    """In setup.py an executable runs the function of another one."""
+    """In setup.py an executable runs the function of another executable."""
     exchanged = why_exchanged(symptom.recording)
     return exchanged and exchanged.after(symptom.seen)
 
 
 @explanation(NoEndpoint)
 def exchanged_kind(symptom: NoEndpoint) -> Cause | None:
-    """The node subscribes where it should publish, or offers an action in place of a service."""
+    """The node subscribes instead of publishing, or offers an action instead of a service."""
     word, other = symptom.word, _OTHER[symptom.word]
     if not any(item.name == symptom.name for item in _of_students(symptom.recording, other)):
         return None
@@ -270,7 +270,7 @@ def exchanged_kind(symptom: NoEndpoint) -> Cause | None:
 
 @explanation(NoEndpoint, general=True)
 def others_only(symptom: NoEndpoint) -> Cause:
-    """The node has others only, perhaps of the right type, or none."""
+    """The node has only others, perhaps of the right type, or none."""
     word, nodes = symptom.word, codes(node.name for node in symptom.recording.student_nodes)
     there = codes(item.name for item in symptom.there)
     same = codes(item.name for item in symptom.there if item.type in symptom.types)

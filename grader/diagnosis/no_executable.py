@@ -15,7 +15,7 @@ from grader.submission.record import PackageRecord, SourceError, SubmissionRecor
 
 @dataclass(frozen=True)
 class NoExecutable(Symptom[Cause]):
-    """An executable is missing, or there is no function behind it."""
+    """An executable is missing, or its function does not exist."""
 
     submission: SubmissionRecord
     package: PackageRecord
@@ -44,7 +44,7 @@ def _at(package: PackageRecord, file: str, what: str) -> Evidence:
 
 @explanation(NoExecutable)
 def no_such_function(symptom: NoExecutable) -> Cause | None:
-    """The entry point names a module or function that is not there, or not installed."""
+    """The entry point names a module or function that does not exist or is not installed."""
     target = dict(symptom.package.missing_targets).get(symptom.name)
     if target is None:
         return None

@@ -117,7 +117,7 @@ def process_ended(symptom: NotLogged) -> Cause | None:
 
 @explanation(NotLogged)
 def no_history(symptom: NotLogged) -> Cause | None:
-    """A late joiner does not ask for the messages from before it was there (transient_local)."""
+    """A late joiner does not request earlier messages (transient_local)."""
     wanted, recording = symptom.wanted, symptom.recording
     if not wanted or wanted[-1].message.stamp_ns >= recording.launched_ns:
         return None
@@ -140,7 +140,7 @@ def no_history(symptom: NotLogged) -> Cause | None:
 
 @explanation(NotLogged)
 def too_few_sent(symptom: NotLogged) -> Cause | None:
-    """Too few messages were sent, because the program destroyed its subscription, or by a fault."""
+    """Too few messages were sent: the program destroyed its subscription, or a fault occurred."""
     number = len(symptom.wanted)
     if number >= symptom.needed:
         return None
@@ -150,7 +150,7 @@ def too_few_sent(symptom: NotLogged) -> Cause | None:
 
 @explanation(NotLogged)
 def no_cpu_time(symptom: NotLogged) -> Cause | None:
-    """The machine gave the process too little CPU time; an error, and never a lost point."""
+    """The machine gave the process too little CPU time; this is an error and costs no points."""
     recording, wanted = symptom.recording, symptom.wanted
     begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].due_ns + symptom.within_ns
     stolen_s = recording.stolen_s(begin_ns, end_ns)
@@ -193,7 +193,7 @@ def blocked_executor(symptom: NotLogged) -> Cause | None:
 
 @explanation(NotLogged)
 def output_dropped(symptom: NotLogged) -> Cause | None:
-    """The program wrote more than is kept; an error, and never a lost point."""
+    """The program wrote more than is kept; this is an error and costs no points."""
     dropped = sum(process.dropped_bytes for process in symptom.recording.processes)
     if not dropped:
         return None
@@ -207,7 +207,7 @@ def output_dropped(symptom: NotLogged) -> Cause | None:
 
 @explanation(NotLogged)
 def callbacks_wait(symptom: NotLogged) -> Cause | None:
-    """The callbacks keep each other waiting, so lines are missing or come too late."""
+    """Callbacks wait for each other, so lines are missing or late."""
     # What a late line shows may look like something else of the message that came before it.
     limit = format_duration(symptom.within_ns / NS)
     late = symptom.seen if symptom.found else f"{symptom.seen} within {limit} of it"
@@ -216,7 +216,7 @@ def callbacks_wait(symptom: NotLogged) -> Cause | None:
 
 @explanation(NotLogged)
 def only_some_logged(symptom: NotLogged) -> Cause | None:
-    """Only some messages are logged: an if, once=True or throttle_duration_sec leave others out."""
+    """Only some messages are logged: an if, once=True or throttle_duration_sec skips the others."""
     recording, topic, found = symptom.recording, symptom.topic, symptom.found
     if not found:
         return None
@@ -235,7 +235,7 @@ def only_some_logged(symptom: NotLogged) -> Cause | None:
 
 @explanation(NotLogged)
 def no_f_string(symptom: NotLogged) -> Cause | None:
-    """The lines show braces in place of values: the f before the quotes is missing."""
+    """The lines show braces instead of values: the f before the quotes is missing."""
     line = _meant(symptom)
     braces = unfilled(line.text) if line else None
     if line is None or braces is None:

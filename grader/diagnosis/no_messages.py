@@ -168,7 +168,7 @@ def no_endpoint(symptom: OnTopic) -> Cause | None:
 
 @explanation(NoMessages, NotDelivered)
 def other_type(symptom: OnTopic) -> Cause | None:
-    """The publisher and the subscription have different message types, or definitions of one."""
+    """The publisher and the subscription have different message types or definitions."""
     wanted = sorted({item.type for item in symptom.others})
     found = sorted({item.type for item in symptom.own})
     misdefined = symptom.recording.misdefined(symptom.topic) and symptom.kind is Kind.PUBLISHER
@@ -188,13 +188,13 @@ def other_type(symptom: OnTopic) -> Cause | None:
 
 @explanation(NoMessages, FewMessages)
 def unreadable(symptom: OnTopic) -> Cause | None:
-    """The program publishes bytes that are no message of the type."""
+    """The program publishes bytes that are not a message of this type."""
     return why_unreadable(symptom.recording, symptom.topic)
 
 
 @explanation(NoMessages, NotDelivered)
 def incompatible_qos(symptom: OnTopic) -> Cause | None:
-    """The publisher's QoS offers less (reliability, durability, deadline) than is requested."""
+    """The publisher's QoS offers less (reliability, durability, deadline) than requested."""
     pairs = [
         (own.qos, other.qos) if symptom.kind is Kind.PUBLISHER else (other.qos, own.qos)
         for own in symptom.own
@@ -218,7 +218,7 @@ def incompatible_qos(symptom: OnTopic) -> Cause | None:
 
 @explanation(NotDelivered, general=True)
 def nothing_sent(symptom: NotDelivered) -> Cause | None:
-    """Nothing was sent before the process ended or destroyed its subscription, or by a fault."""
+    """The process ended or destroyed its subscription before a message was sent."""
     recording, topic = symptom.recording, symptom.topic
     carried = recording.carried(topic)
     if carried and any(
@@ -234,7 +234,7 @@ def nothing_sent(symptom: NotDelivered) -> Cause | None:
 
 @explanation(NoMessages)
 def never_matched(symptom: NoMessages) -> Cause | None:
-    """The busy machine kept the publisher and the probe from discovering each other."""
+    """Because the machine was busy, the publisher and the probe did not discover each other."""
     if not was_held_up(symptom.recording) or not any(
         item.data.get("topic") == symptom.topic and item.data.get("matched") is False
         for item in symptom.recording.declared("held")
@@ -254,7 +254,7 @@ def process_ended(symptom: OnTopic) -> Cause | None:
 
 @explanation(FewMessages)
 def too_little_cpu_time(symptom: FewMessages) -> Cause | None:
-    """With the time that the machine took from the process, it may have published enough."""
+    """Without the delays of the machine, the process may have published enough."""
     number = len(symptom.recording.on(symptom.topic))
     left_to_it_s = symptom.watched_s - symptom.stolen_s
     if symptom.stolen_s <= 0.0 or number * symptom.watched_s < symptom.needed * left_to_it_s:

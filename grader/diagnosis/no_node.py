@@ -25,7 +25,7 @@ _START = "start of "
 
 @dataclass(frozen=True)
 class NoNode(Symptom[Cause]):
-    """No node of the student's appeared."""
+    """No node of the student appeared."""
 
     recording: Recording
 
@@ -53,7 +53,7 @@ class NoNode(Symptom[Cause]):
 
 @dataclass(frozen=True)
 class OtherNode(Symptom[Cause]):
-    """A node has another name than is expected."""
+    """A node does not have the expected name."""
 
     recording: Recording
     wanted: str
@@ -184,14 +184,14 @@ def node_never_appeared(symptom: OtherNode) -> Cause | None:
 
 @explanation(OtherNode)
 def exchanged_executables(symptom: OtherNode) -> Cause | None:
-    """In setup.py an executable runs the function of another one."""
+    """In setup.py an executable runs the function of another executable."""
     exchanged = why_exchanged(symptom.recording)
     return exchanged and exchanged.after(symptom.seen)
 
 
 @explanation(OtherNode, general=True)
 def other_name(symptom: OtherNode) -> Cause:
-    """The node has another name: other case, a namespace, or a misspelling."""
+    """The node has another name: wrong upper or lower case, a namespace, or a misspelling."""
     how = ""
     for name in symptom.names:
         space, _, base = name.rpartition("/")

@@ -57,7 +57,7 @@ def why_not_declared(recording: Recording, node: str, name: str) -> Cause | None
 
 @explanation(NotDeclared)
 def services_not_asked(symptom: NotDeclared) -> Cause | None:
-    """The process ended, or a callback held up the node, before the probe could ask."""
+    """The process ended, or a callback blocked the node, before the probe could ask."""
     found = descriptor(symptom.recording, symptom.node, symptom.name)
     if symptom.asked and (found is not None or symptom.name not in symptom.there):
         return None
@@ -72,7 +72,7 @@ def no_parameters(symptom: NotDeclared) -> Cause | None:
 
 @explanation(NotDeclared)
 def no_value(symptom: NotDeclared) -> Cause | None:
-    """It is declared without a default, and so has no value."""
+    """It is declared without a default, so it has no value."""
     if symptom.name not in symptom.there:
         return None
     return symptom.cause(f"{code(symptom.name)} is declared, but without a value")
@@ -80,7 +80,7 @@ def no_value(symptom: NotDeclared) -> Cause | None:
 
 @explanation(NotDeclared, general=True)
 def other_parameters(symptom: NotDeclared) -> Cause:
-    """Its name is misspelt, or only others are declared."""
+    """Its name is misspelt, or only other parameters are declared."""
     match = nearest(symptom.name, symptom.there)
     there = f"is {code(match)}" if match else f"are {codes(symptom.there)}"
     return symptom.cause(f"declared {there}")

@@ -55,7 +55,7 @@ def why_no_package(submission: SubmissionRecord, name: str) -> Cause | None:
 
 @explanation(NoPackage)
 def no_workspace(symptom: NoPackage) -> Cause | None:
-    """There is no package.xml: an empty archive; or there are two packages of one name."""
+    """There is no package.xml (an empty archive), or two packages have the same name."""
     problem = symptom.submission.problem
     if problem is None and symptom.names:
         return None
@@ -71,7 +71,7 @@ def no_workspace(symptom: NoPackage) -> Cause | None:
 
 @explanation(NoPackage)
 def broken_package_xml(symptom: NoPackage) -> Cause | None:
-    """package.xml cannot be read: broken XML, or an e-mail that is none."""
+    """package.xml cannot be read: broken XML or an invalid e-mail address."""
     errors = [item.manifest_error for item in symptom.submission.packages if item.manifest_error]
     if not errors or symptom.match is not None:
         return None
@@ -175,7 +175,7 @@ def build_takes_too_long(symptom: NotBuilt) -> Cause | None:
 
 @explanation(NotBuilt)
 def machine_lacks_a_package(symptom: NotBuilt) -> Cause | None:
-    """The build needs what the machine lacks; an error, and never a lost point."""
+    """The build needs something that the machine lacks; this is an error and costs no points."""
     if not _failed_itself(symptom.build, symptom.name):
         return None
     lacking = _lacking(symptom.submission, symptom.build, symptom.name)

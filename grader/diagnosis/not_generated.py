@@ -159,7 +159,7 @@ def why_not_generated(
 
 @explanation(NoDefinition)
 def near_definition(symptom: NoDefinition) -> Cause | None:
-    """The file lies in a wrong folder or package, or its name or its suffix is another one."""
+    """The file is in the wrong folder or package, or has the wrong name or suffix."""
     file, name = PurePosixPath(symptom.interface.file), symptom.interface.name
     found = {
         PurePosixPath(item.file): item
@@ -194,7 +194,7 @@ def no_definition(symptom: NoDefinition) -> Cause:
 
 @explanation(NotGenerated)
 def no_cmake(symptom: NotGenerated) -> Cause | None:
-    """The package is none of CMake, which alone generates code for interfaces."""
+    """The package does not use CMake. Only CMake generates code for interfaces."""
     package = symptom.package
     if package.build_type == "ament_cmake" and package.cmake is not None:
         return None
@@ -242,7 +242,7 @@ def not_listed(symptom: NotGenerated) -> Cause | None:
 
 @explanation(NotGenerated)
 def undeclared_package(symptom: NotGenerated) -> Cause | None:
-    """A package whose messages are used is not found, or is not under DEPENDENCIES."""
+    """A package with used messages is not found, or is not listed under DEPENDENCIES."""
     calls = symptom.calls(_GENERATE)
     after = [call.after("DEPENDENCIES", _GENERATE_KEYWORDS) or () for call in calls]
     declared = {name for names in after for name in names}

@@ -56,7 +56,7 @@ def slow_timer(symptom: NoMessages) -> Cause | None:
 
 @explanation(NoMessages)
 def no_cpu_time(symptom: NoMessages) -> Cause | None:
-    """The machine gave the process too little CPU time; an error, and never a lost point."""
+    """The machine gave the process too little CPU time; this is an error and costs no points."""
     recording = symptom.recording
     if symptom.stolen_s < _STARVED * symptom.watched_s:
         return None
@@ -93,7 +93,7 @@ def blocked_executor(symptom: NoMessages) -> Cause | None:
 
 @explanation(NoMessages)
 def no_answer(symptom: NoMessages) -> Cause | None:
-    """The subscription's callback gets its message, but does not publish, or raises."""
+    """The subscription's callback gets a message, but raises an exception or does not publish."""
     recording = symptom.recording
     name = next((name for name in symptom.asked if recording.sent[name]), None)
     if name is None:
@@ -132,7 +132,7 @@ def no_timer(symptom: NoMessages) -> Cause | None:
 
 @explanation(NoMessages, general=True)
 def publish_not_reached(symptom: NoMessages) -> Cause:
-    """The publisher is there, but the program does not come to its publish()."""
+    """The publisher is there, but the program does not reach its publish()."""
     recording = symptom.recording
     heard = _heard(recording, symptom.topic)
     periods = [format_duration(timer.period_s) for timer in _firing(recording)]
@@ -153,7 +153,7 @@ def publish_not_reached(symptom: NoMessages) -> Cause:
 
 @explanation(FewMessages, general=True)
 def publishing_stopped(symptom: FewMessages) -> Cause:
-    """A timer stopped or is too slow, or the program publishes without a timer, and stops."""
+    """A timer stopped or is too slow, or the program publishes without a timer and stops."""
     recording, evidence = symptom.recording, Evidence(moments=symptom.moments)
     period_s = [timer.period_s for timer in declarations.timers(recording)]
     if not period_s:

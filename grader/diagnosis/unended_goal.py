@@ -28,7 +28,7 @@ _LOOK = (
 
 @dataclass(frozen=True)
 class NotCanceled(Symptom[Cause]):
-    """A goal that was asked to cancel was not canceled."""
+    """A goal was not canceled after a cancel request."""
 
     recording: Recording
     goal: Goal
@@ -90,7 +90,7 @@ def execute_callback_raised(symptom: NotCanceled) -> Cause | None:
 
 @explanation(NotCanceled)
 def executor_busy_with_the_goal(symptom: NotCanceled) -> Cause | None:
-    """The executor cannot take in the request to cancel while the execute callback runs."""
+    """The executor cannot process the cancel request while the execute callback runs."""
     if not symptom.is_untaken:
         return None
     goal, recording = symptom.goal, symptom.recording
@@ -106,7 +106,7 @@ def executor_busy_with_the_goal(symptom: NotCanceled) -> Cause | None:
 
 @explanation(NotCanceled, general=True)
 def request_ignored(symptom: NotCanceled) -> Cause:
-    """The loop of the execute callback never looks whether the goal is to be canceled."""
+    """The loop of the execute callback never checks whether the goal should be canceled."""
     if symptom.goal.result_ns is not None:
         seen = f"{symptom.seen}, although the server agreed to cancel"
         return Cause(seen, _LOOK, symptom.evidence)

@@ -32,7 +32,7 @@ _ONE_TIMER = "Create one timer in the constructor, once, and publish once in its
 
 @dataclass(frozen=True)
 class WrongRhythm(Symptom[Cause]):
-    """Messages come at a wrong period, or irregularly.
+    """Messages come at the wrong period, or irregularly.
 
     What a cause observes is a clause that follows the figures, or nothing.
 
@@ -97,7 +97,7 @@ def several_in_each_period(symptom: WrongRhythm) -> Cause | None:
 
 @explanation(WrongRhythm)
 def some_left_out(symptom: WrongRhythm) -> Cause | None:
-    """The period is right, but messages are left out."""
+    """The period is right, but some messages are missing."""
     verdict = symptom.verdict
     if not verdict.period_good or verdict.median_s <= 0.0:
         return None
@@ -113,7 +113,7 @@ def some_left_out(symptom: WrongRhythm) -> Cause | None:
 
 @explanation(WrongRhythm)
 def irregular(symptom: WrongRhythm) -> Cause | None:
-    """The period is right, but many intervals are not: a callback works long, or a loop sleeps."""
+    """The period is right, but many intervals are not: a callback takes long, or a loop sleeps."""
     if not symptom.verdict.period_good:
         return None
     if symptom.timers_s:
@@ -193,7 +193,7 @@ def right_timer_too_late(symptom: WrongRhythm) -> Cause | None:
 
 @explanation(WrongRhythm)
 def sleeping_loop(symptom: WrongRhythm) -> Cause | None:
-    """A loop sleeps for the period, and its work comes on top."""
+    """A loop sleeps for the period, and its work takes additional time."""
     wanted_s, median_s = symptom.limits.period_s, symptom.verdict.median_s
     longer = wanted_s < median_s < 2.0 * wanted_s
     if not longer or not symptom.verdict.regular or symptom.timers_s:
@@ -211,7 +211,7 @@ def sleeping_loop(symptom: WrongRhythm) -> Cause | None:
 
 @explanation(WrongRhythm, general=True)
 def other_period(symptom: WrongRhythm) -> Cause:
-    """Messages come too often or too seldom."""
+    """Messages come too often or too rarely."""
     if symptom.verdict.median_s < symptom.limits.period_s:
         return Cause("messages come too often", _ONE_TIMER)
     return Cause(

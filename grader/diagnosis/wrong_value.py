@@ -30,7 +30,7 @@ _LEAST_NEGATIVE = (1 << 64) - (1 << 8)
 
 @dataclass(frozen=True)
 class WrongValue(Symptom[str]):
-    """A message has other values than are expected.
+    """A message does not have the expected values.
 
     The explanations answer with a clause.
 
@@ -59,7 +59,7 @@ class WrongValue(Symptom[str]):
 
 @explanation(WrongValue)
 def integer_in_a_float_field(symptom: WrongValue) -> str | None:
-    """A field of floats was given an integer, a text or a numpy.float32, which ROS misreads."""
+    """A float field holds an integer, a text or a numpy.float32, which ROS misreads."""
     bad = next((one for one in symptom.numbers if was_integer(one.observed)), None)
     if bad is None:
         return None
@@ -68,7 +68,7 @@ def integer_in_a_float_field(symptom: WrongValue) -> str | None:
 
 @explanation(WrongValue)
 def not_a_number(symptom: WrongValue) -> str | None:
-    """A number is infinite, or none at all: a division by zero, or the root of a negative one."""
+    """A number is inf or NaN: a division by zero, or the square root of a negative number."""
     bad = next((one for one in symptom.numbers if not math.isfinite(one.observed)), None)
     if bad is None or not math.isfinite(bad.expected):
         return None
@@ -88,7 +88,7 @@ def fields_swapped(symptom: WrongValue) -> str | None:
 
 @explanation(WrongValue)
 def every_number_zero(symptom: WrongValue) -> str | None:
-    """Every number is zero, as in a message that was just created."""
+    """Every number is zero, as in a new message."""
     numbers = [value for value in symptom.observed.values() if _is_number(value)]
     if not symptom.wanted or not numbers or any(numbers):
         return None
@@ -98,7 +98,7 @@ def every_number_zero(symptom: WrongValue) -> str | None:
 
 @explanation(WrongValue)
 def in_another_field(symptom: WrongValue) -> str | None:
-    """The value stands in another field."""
+    """The value is in another field."""
     for one, other in product(symptom.wanted, symptom.numbers):
         if other is not one and same(one.expected, other.observed, symptom.tolerance):
             return f"the {value_text(one.expected)} stands in {other.field} instead of {one.field}"
@@ -107,7 +107,7 @@ def in_another_field(symptom: WrongValue) -> str | None:
 
 @explanation(WrongValue)
 def wrong_sign_or_unit(symptom: WrongValue) -> str | None:
-    """The sign is wrong, the value is 10, 100 or 1000 times too large, or in degrees."""
+    """The sign is wrong, the value is 10, 100 or 1000 times too large, or it is in degrees."""
     for one, (factor, words) in product(symptom.wanted, _FACTORS.items()):
         if math.isclose(one.observed, factor * one.expected, rel_tol=_FACTOR_TOLERANCE):
             return f"{one.field} {words}"

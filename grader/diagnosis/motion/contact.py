@@ -77,7 +77,7 @@ def why_touched(recording: Recording) -> Cause | None:
 
 @explanation(Contact)
 def no_scan_for_long(symptom: Contact) -> Reason | None:
-    """No scan had come for long."""
+    """No scan came for a long time."""
     scan = newest(symptom.recording, symptom.step.time_ns)
     since_ns = symptom.step.time_ns - scan.stamp_ns if scan is not None else 0
     if since_ns <= _BLIND_NS:
@@ -91,7 +91,7 @@ def no_scan_for_long(symptom: Contact) -> Reason | None:
 
 @explanation(Contact)
 def old_command(symptom: Contact) -> Reason | None:
-    """The last command, to drive, was long ago, and the robot keeps it."""
+    """The last command was to drive, and the robot keeps it."""
     since_ns = symptom.step.time_ns - symptom.sent[-1].time_ns if symptom.sent else 0
     if since_ns <= _HELD_NS or not symptom.before.command_m_s:
         return None
@@ -105,7 +105,7 @@ def old_command(symptom: Contact) -> Reason | None:
 
 @explanation(Contact)
 def callback_in_a_loop(symptom: Contact) -> Reason | None:
-    """A callback was in a loop or slept, and never saw a newer scan."""
+    """A callback looped or slept and never saw a newer scan."""
     place = stuck_callback(symptom.recording)
     if place is None:
         return None
@@ -118,7 +118,7 @@ def callback_in_a_loop(symptom: Contact) -> Reason | None:
 
 @explanation(Contact)
 def contradicting_commands(symptom: Contact) -> Reason | None:
-    """Two places publish: one stops the robot, the other drives it on."""
+    """Two parts of the code publish: one stops the robot, the other lets it drive."""
     since_ns = symptom.step.time_ns - _LATELY_NS
     lately = [item for item in symptom.sent if item.time_ns >= since_ns]
     stops = sum(is_zero(item.twist) for item in lately)
@@ -133,7 +133,7 @@ def contradicting_commands(symptom: Contact) -> Reason | None:
 
 @explanation(Contact, general=True)
 def decided_to_drive(symptom: Contact) -> Reason:
-    """It went on deciding to drive, or stopped too late."""
+    """The node continued to drive, or stopped too late."""
     return Reason(
         "",
         "Log the range that you compare. Is it the beam straight ahead, whose angle is 0, of the "

@@ -24,7 +24,7 @@ _SIGN_HINT = "Look at the signs: dx = goal's x - x, dy = goal's y - y."
 
 @dataclass(frozen=True)
 class GoalMissed(Symptom[Cause]):
-    """The robot is not at the goal in the end."""
+    """The robot is not at the goal at the end."""
 
     run: Approach
     position_m: float
@@ -76,7 +76,7 @@ def why_not_there(run: Approach, position_m: float) -> Cause | None:
 
 @explanation(GoalMissed)
 def no_cpu_time(symptom: GoalMissed) -> Cause | None:
-    """The machine gave the run too little CPU time; an error, and never a lost point."""
+    """The machine gave the run too little CPU time; this is an error and costs no points."""
     recording, truth = symptom.run.recording, symptom.run.truth
     lost_s = stolen_s(recording, truth[0].time_ns, truth[-1].time_ns)
     is_starved = lost_s > 0.25 * symptom.watched_s and recording.ending is Ending.TIMEOUT
@@ -90,7 +90,7 @@ def no_cpu_time(symptom: GoalMissed) -> Cause | None:
 
 @explanation(GoalMissed)
 def off_course(symptom: GoalMissed) -> Cause | None:
-    """The process ended, the robot touched something, or no command came for long."""
+    """The process ended, the robot touched something, or no command came for a long time."""
     return why_off_course(symptom.run.recording)
 
 
@@ -144,7 +144,7 @@ def yaw_misread(symptom: GoalMissed) -> Cause | None:
 
 @explanation(GoalMissed)
 def angle_not_wrapped(symptom: GoalMissed) -> Cause | None:
-    """It turns the long way round: the error of angle is not wrapped to -pi .. pi."""
+    """It turns the long way: the angle error is not wrapped to -pi .. pi."""
     run = symptom.run
     far = [step for step in run.truth if run.distance_m(step) > symptom.position_m]
     detours = list(long_turns(far, run.bearing_error_rad, _ASTRAY_RAD))
@@ -166,7 +166,7 @@ def angle_not_wrapped(symptom: GoalMissed) -> Cause | None:
 
 @explanation(GoalMissed)
 def drove_on(symptom: GoalMissed) -> Cause | None:
-    """It was at the goal, and drove on."""
+    """It was at the goal and drove on."""
     nearest_m = symptom.run.distance_m(symptom.nearest)
     if nearest_m > symptom.position_m:
         return None

@@ -23,7 +23,7 @@ _AS_SENT_RAD = 0.06
 
 @dataclass(frozen=True)
 class HeadingMissed(Symptom[Cause]):
-    """The robot is at the goal, but looks another way."""
+    """The robot is at the goal with the wrong heading."""
 
     run: Approach
     position_m: float
@@ -54,7 +54,7 @@ def why_not_aligned(run: Approach, position_m: float, heading_rad: float) -> Cau
 
 @explanation(HeadingMissed)
 def off_course(symptom: HeadingMissed) -> Cause | None:
-    """The process ended, the robot touched something, or no command came for long."""
+    """The process ended, the robot touched something, or no command came for a long time."""
     return why_off_course(symptom.run.recording)
 
 
@@ -67,7 +67,7 @@ def heading_misread(symptom: HeadingMissed) -> Cause | None:
 
 @explanation(HeadingMissed)
 def turns_for_ever(symptom: HeadingMissed) -> Cause | None:
-    """It still turns when the observation ends."""
+    """It still turns at the end of the observation."""
     if is_at_rest(symptom.last):
         return None
     return symptom.cause(
@@ -79,7 +79,7 @@ def turns_for_ever(symptom: HeadingMissed) -> Cause | None:
 
 @explanation(HeadingMissed)
 def another_heading(symptom: HeadingMissed) -> Cause | None:
-    """The goal's heading is taken for degrees or 0, or has the wrong sign."""
+    """The goal's heading is read as degrees or as 0, or has the wrong sign."""
     goal_rad = symptom.run.goal.yaw_rad
     headings = (
         (

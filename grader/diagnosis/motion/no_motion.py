@@ -133,7 +133,7 @@ def nothing_published(symptom: NotMoved) -> Cause | None:
 
 @explanation(NotMoved)
 def no_velocity_command(symptom: NotMoved) -> Cause | None:
-    """What was published is no velocity command."""
+    """The published message is not a velocity command."""
     if symptom.sent:
         return None
     recording, topic = symptom.recording, command_topic(symptom.recording)
@@ -147,7 +147,7 @@ def no_velocity_command(symptom: NotMoved) -> Cause | None:
 
 @explanation(NotMoved)
 def not_finite(symptom: NotMoved) -> Cause | None:
-    """The commands are infinite, or not a number."""
+    """The commands are inf or NaN."""
     return why_rejected(symptom.recording)
 
 
@@ -204,7 +204,7 @@ def only_zeros(symptom: NotMoved) -> Cause | None:
 
 @explanation(NotMoved)
 def integer_in_command(symptom: NotMoved) -> Cause | None:
-    """A field of floats was given an integer, which ROS misreads."""
+    """A float field holds an integer, which ROS misreads."""
     twist = symptom.first.twist
     for field, number in (("linear.x", twist.linear_m_s), ("angular.z", twist.angular_rad_s)):
         if was_integer(number):
@@ -219,7 +219,7 @@ def integer_in_command(symptom: NotMoved) -> Cause | None:
 
 @explanation(NotMoved, general=True)
 def moves_too_late(symptom: NotMoved) -> Cause:
-    """The first command to move came at the very end, or was too slow."""
+    """The first command to move came too late or was too slow."""
     recording, first = symptom.recording, symptom.first
     left_s = (recording.truth[-1].time_ns - first.time_ns) / NS
     begin_ns = recording.truth[0].time_ns

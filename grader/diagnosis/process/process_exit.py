@@ -95,7 +95,7 @@ def why_crashed(recording: Recording) -> Cause | None:
 
 @dataclass(frozen=True)
 class ProcessExit(Symptom[Cause]):
-    """A process ended before it was asked to."""
+    """A process ended too early."""
 
     recording: Recording
     process: Process
@@ -174,7 +174,7 @@ def main_returned(symptom: ProcessExit) -> Cause | None:
 
 @explanation(ProcessExit)
 def limit_exceeded(symptom: ProcessExit) -> Cause | None:
-    """It used too much memory, CPU time or output, or did what no node may do."""
+    """It used too much memory, CPU time or output, or did something forbidden."""
     breach = next((item for item in symptom.recording.breaches if item.ended), None)
     if symptom.killed is not signal.SIGKILL or breach is None:
         return None
@@ -212,7 +212,7 @@ def service_without_response(symptom: ProcessExit) -> Cause | None:
 
 @explanation(ProcessExit)
 def machine_lacks_it(symptom: ProcessExit) -> Cause | None:
-    """It needs a ROS 2 package or a newer Python that the machine lacks; it costs no point."""
+    """It needs a ROS 2 package or a newer Python that the machine lacks; this costs no points."""
     failure, recording = symptom.failure, symptom.recording
     newer = failure and newer_name(failure, recording)
     lacking = failure and lacking_package(failure, recording)
@@ -233,7 +233,7 @@ def machine_lacks_it(symptom: ProcessExit) -> Cause | None:
 
 @explanation(ProcessExit, general=True)
 def raised(symptom: ProcessExit) -> Cause | None:
-    """An exception ended it: see below what exceptions mean."""
+    """An exception ended it: see the list of exceptions below."""
     failure = symptom.failure
     if failure is None:
         return None
