@@ -91,11 +91,7 @@ class Batch:
         return list(self._entries.values()), to_do
 
     def grade(self, to_do: dict[str, Path], executor: BatchExecutor | None) -> Iterator[Done]:
-        """Grade, and put each result into place as soon as it is there.
-
-        Yields:
-            Every row, in the order in which they are finished; at first those that were.
-        """
+        """Grade, and put each result into place as soon as it is there."""
         for key, entry in self._entries.items():
             if key not in to_do and not entry.same_as:
                 yield from self._finished(key, fresh=False)
@@ -118,15 +114,15 @@ class Batch:
     def left(self, done: Iterable[Done]) -> list[Done]:
         """What an interrupted batch has not come to, each with the grade that it still has."""
         finished = {item.entry.key for item in done}
-        return [self._left(entry) for entry in self._entries.values() if entry.key not in finished]
-
-    def _left(self, entry: Entry) -> Done:
-        result = self.ledger.result(entry.key)
-        fits = result is not None and result.submission.sha256 == entry.sha256
-        if fits and self._is_of_this_version(entry.key):
-            return Done(entry, result, fresh=False)
-        told = "; ".join(part for part in (entry.problem, NOT_YET) if part)
-        return Done(replace(entry, problem=told), None, fresh=False)
+        left = []
+        for key in self._entries.keys() - finished:
+            entry, result = self._entries[key], self.ledger.result(key)
+            version = (entry.sha256, self.loaded.sha256)
+            if result is None or (result.submission.sha256, result.assignment.sha256) != version:
+                problem = "; ".join(filter(None, (entry.problem, NOT_YET)))
+                entry, result = replace(entry, problem=problem), None
+            left.append(Done(entry, result, fresh=False))
+        return left
 
     def _identified(self, entry: Entry, path: Path) -> Entry:
         try:

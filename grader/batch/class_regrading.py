@@ -19,12 +19,7 @@ from grader.report.model.result_model import Result
 
 @dataclass(frozen=True)
 class Regraded:
-    """A row that was judged again.
-
-    Attributes:
-        before: Its result until now, or None.
-        problem: Why it was not judged again although it was handed in, or empty.
-    """
+    """A row that was judged again."""
 
     done: Done
     before: Result | None
@@ -52,11 +47,8 @@ def regrade_class(
 ) -> Iterator[Regraded]:
     """Judge the rows of a batch with the assignment as it is now.
 
-    A result that changes is kept beside the new one, in ``earlier/``.
-
-    Args:
-        only: Folder of a row's report: only that one is judged, and what is the same as it; or
-            None for all.
+    A result that changes is kept beside the new one, in ``earlier/``. With the folder of a row's
+    report, only that row is judged, and those with the same submission.
     """
     written = ledger.read()
     entries = written.entries

@@ -75,11 +75,7 @@ def refuse_foreign(folder: Path, *, keep: bool) -> None:
 
 
 def keep_install(graded: Graded, folder: Path) -> Path | None:
-    """Copy what colcon installed, so that it can be looked at and sourced.
-
-    Returns:
-        The copy, or None where nothing was built.
-    """
+    """Copy what colcon installed, to look at and source; None where nothing was built."""
     install = graded.prepared.install
     if install is None:
         return None

@@ -13,8 +13,6 @@ from grader.submission.read.manifest import MANIFEST
 # Archives that cannot be read; they are rows all the same, with this as their reason.
 FOREIGN = (".rar", ".7z")
 
-_IGNORED = ("__MACOSX",)
-
 
 @dataclass(frozen=True)
 class HandedIn:
@@ -88,4 +86,4 @@ def only_archive(files: Mapping[str, Path]) -> Path | None:
 
 def is_ignored(item: Path) -> bool:
     """Whether a file is left aside: hidden, or of macOS."""
-    return item.name.startswith(".") or item.name in _IGNORED
+    return item.name.startswith(".") or item.name == "__MACOSX"

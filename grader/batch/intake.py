@@ -42,7 +42,6 @@ _MOODLE = re.compile(r"(?P<name>[^_]+)_\d+_assignsubmission_file_.*", re.DOTALL)
 _AGAIN = re.compile(r"-\d+(?=(\.tar)?\.[^.]+$)")
 _REPOSITORY = re.compile(r"(https?|ssh|git|file)://|[\w.-]+@[\w.-]+:")
 _CLONE_LIMIT_S = 120.0
-# A class's archive holds what many students handed in.
 _CLASS_LIMITS = ArchiveLimits(total_bytes=8192 * MIB, members=500_000)
 
 
@@ -54,11 +53,7 @@ def take_in(
     out: Path | None = None,
     on_prefix: Callable[[str], None] = lambda _: None,
 ) -> list[HandedIn]:
-    """Find out who handed in what.
-
-    Returns:
-        The rows, sorted by key; those of the roster that handed in nothing are among them.
-    """
+    """Find out who handed in what."""
     folder = _opened(source, staging)
     _refuse_single(folder, source)
     entries = list(_entries(folder, staging, on_left_out, out))
@@ -101,15 +96,10 @@ def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn |
         problem = _clone(student.submission, target)
         return replace(row, fault=problem) if problem else replace(row, path=target)
     path = base / student.submission
-    try:
-        path.stat()
+    # Path.exists() raises where no file can have that name.
+    if os.path.exists(path):  # noqa: PTH110
         return replace(row, path=path)
-    except (FileNotFoundError, ValueError):
-        # A ValueError where no file can have that name: there is a NUL in it.
-        fault = f"{shown(str(path))} does not exist"
-    except OSError as error:
-        fault = f"{shown(student.submission)} cannot be read: {error.strerror}"
-    return replace(row, fault=fault)
+    return replace(row, fault=f"{shown(str(path))} does not exist")
 
 
 def _clone(url: str, target: Path) -> str:

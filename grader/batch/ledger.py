@@ -60,12 +60,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class BatchRows:
-    """What a batch consists of.
-
-    Attributes:
-        assignment: Its id.
-        location: Where the assignment lies; None for one of rosgrade's own.
-    """
+    """What a batch consists of."""
 
     assignment: str
     location: str | None

@@ -55,11 +55,7 @@ def keep_reference(
 
 
 def write_references(loaded: LoadedAssignment, recordings: Mapping[str, Recording]) -> Path | None:
-    """Write the file of an assignment.
-
-    Returns:
-        The file, or None where no scenario has a robot.
-    """
+    """Write the file of an assignment."""
     runs = {
         scenario.id: {"of": fingerprint(loaded, scenario), "replay": replay}
         for scenario in loaded.assignment.scenarios

@@ -20,18 +20,12 @@ _COLUMNS = {
     "name": ("name", "student", "student name", "full name"),
     "submission": ("submission", "path", "file", "folder", "repository", "repo", "url"),
 }
-_POINTS_POSSIBLE = "points possible"
 _NO_LETTER = re.compile(r"[\W_]+")
 
 
 @dataclass(frozen=True)
 class Student:
-    """One row of a roster.
-
-    Attributes:
-        row: Number of its line in the file, the header being 1.
-        id: Or empty, as all that follow.
-    """
+    """One row of a roster."""
 
     row: int
     id: str = ""
@@ -151,7 +145,7 @@ def _collect(columns: Mapping[str, int], rows: Sequence[tuple[int, list[str]]]) 
     students: dict[str, Student] = {}
     problems: list[str] = []
     for number, cells in rows:
-        if not any(cells) or cells[0].casefold().startswith(_POINTS_POSSIBLE):
+        if not any(cells) or cells[0].casefold().startswith("points possible"):
             continue
         values = {field: cells[column] for field, column in columns.items() if column < len(cells)}
         student = Student(number, **values)

@@ -18,11 +18,7 @@ _MOST_TWICE = 10
 
 
 class _Names:
-    """Who of a roster a name names.
-
-    Attributes:
-        prefix: What stands before the login in the names of repositories, or empty.
-    """
+    """Who of a roster a name names."""
 
     def __init__(self, students: Sequence[Student], entries: Sequence[Entry]) -> None:
         """Learn the names of a class."""
@@ -128,13 +124,14 @@ def matched(
             rows[at] = with_problem(rows[at], f"handed in twice: {listing(others)} too")
         for at, _ in found if key in doubtful else ():
             rows[at] = with_problem(rows[at], f"{listing(doubtful[key])} may be theirs too")
-    missing = [_missing(student) for student in roster.students if student.key not in handed]
-    return rows + [
-        replace(row, problem=f"{row.problem}; {listing(doubtful[row.key])} may be theirs")
-        if row.key in doubtful
-        else row
-        for row in missing
-    ]
+    for student in roster.students:
+        if student.key not in handed:
+            row = _missing(student)
+            if row.key in doubtful:
+                theirs = f"{row.problem}; {listing(doubtful[row.key])} may be theirs"
+                row = replace(row, problem=theirs)
+            rows.append(row)
+    return rows
 
 
 def _missing(student: Student) -> HandedIn:

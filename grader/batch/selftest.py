@@ -36,8 +36,6 @@ from grader.scratch import Scratch
 from grader.spec.unit import format_duration
 from grader.starter import write_starter
 
-REFERENCE = "reference"
-STARTER = "starter"
 MOST_FOR_STARTER = 0.15
 """Share of the points that the starter package may get before anything was written in it."""
 
@@ -74,12 +72,12 @@ class TrialResult:
     told: tuple[str, ...] = ()
 
 
-def trials(loaded: LoadedAssignment, reference: Path | None = None) -> tuple[Trial, ...]:
+def trials(loaded: LoadedAssignment) -> tuple[Trial, ...]:
     """The trials of an assignment: its reference, its variants, its mutants, its starter."""
-    mutants = load_mutants(loaded.assignment, loaded.folder, reference)
+    mutants = load_mutants(loaded.assignment, loaded.folder)
     changes = [*mutants.variants, *mutants.mutants]
     return (
-        Trial(Role.REFERENCE, REFERENCE, "the reference solution", None),
+        Trial(Role.REFERENCE, "reference", "the reference solution", None),
         *(
             Trial(
                 Role.MUTANT if isinstance(change, Mutant) else Role.VARIANT,
@@ -90,20 +88,8 @@ def trials(loaded: LoadedAssignment, reference: Path | None = None) -> tuple[Tri
             for change in changes
             if not change.skip_reason
         ),
-        Trial(Role.STARTER, STARTER, "the starter package, untouched", None),
+        Trial(Role.STARTER, "starter", "the starter package, untouched", None),
     )
-
-
-def write_submission(trial: Trial, loaded: LoadedAssignment, reference: Path, folder: Path) -> Path:
-    """Make the submission of a trial."""
-    if trial.role is Role.STARTER:
-        write_starter(loaded, folder / trial.id)
-        return folder / trial.id
-    if trial.change is None:
-        return reference
-    target = folder / trial.id
-    apply(trial.change, reference, target)
-    return target
 
 
 def run_trial(
@@ -115,7 +101,13 @@ def run_trial(
     on_graded: Callable[[Graded], None] = lambda _: None,
 ) -> TrialResult:
     """Grade one trial."""
-    submission = write_submission(trial, loaded, reference, folder / "submissions")
+    submission = folder / "submissions" / trial.id
+    if trial.role is Role.STARTER:
+        write_starter(loaded, submission)
+    elif trial.change is None:
+        submission = reference
+    else:
+        apply(trial.change, reference, submission)
     graded = grading.grade(submission, folder / "recordings" / trial.id)
     on_graded(graded)
     actual = {result.id: result.status for result in graded.grade.results}
@@ -171,28 +163,26 @@ def selftest(
     grading: Grading,
     *,
     jobs: int,
-    reference: Path | None = None,
     keep: Path | None = None,
     chosen: Callable[[Trial], bool] = lambda _: True,
-    on_start: Callable[[Trial], None] = lambda _: None,
     on_graded: Callable[[Graded], None] = lambda _: None,
 ) -> Iterator[TrialResult]:
     """Run every trial of an assignment."""
-    base = load_mutants(loaded.assignment, loaded.folder, reference).reference
+    base = load_mutants(loaded.assignment, loaded.folder).reference
     with Scratch("selftest") as folder:
 
         def work(trial: Trial) -> TrialResult:
-            on_start(trial)
             result = run_trial(trial, loaded, grading, base, folder, on_graded)
             if keep is not None and not result.verdict.right:
+                shutil.rmtree(keep / trial.id, ignore_errors=True)
                 for part in ("submissions", "recordings"):
-                    _keep(folder / part / trial.id, keep / trial.id / part)
+                    made = folder / part / trial.id
+                    if made.is_dir():
+                        shutil.copytree(made, keep / trial.id / part, symlinks=True)
             return result
 
         with ThreadPoolExecutor(max_workers=jobs) as pool:
-            futures = [
-                pool.submit(work, trial) for trial in trials(loaded, reference) if chosen(trial)
-            ]
+            futures = [pool.submit(work, trial) for trial in trials(loaded) if chosen(trial)]
             try:
                 for future in as_completed(futures):
                     yield future.result()
@@ -203,12 +193,6 @@ def selftest(
                 raise
 
 
-def _keep(folder: Path, target: Path) -> None:
-    if folder.is_dir():
-        shutil.rmtree(target, ignore_errors=True)
-        shutil.copytree(folder, target, symlinks=True)
-
-
 @dataclass(frozen=True)
 class MutationScore:
     """How well an assignment tells right from wrong."""
@@ -217,17 +201,7 @@ class MutationScore:
     mutants: int
     accepted: int
     right: int
-    starter_right: bool = True
-
-    @property
-    def perfect(self) -> bool:
-        """Whether nothing was judged wrongly."""
-        return self.killed == self.mutants and self.accepted == self.right and self.starter_right
-
-    @property
-    def percent(self) -> float:
-        """Share of mutants that were judged as they must."""
-        return 100.0 * self.killed / self.mutants if self.mutants else 0.0
+    perfect: bool
 
 
 def mutation_score(results: list[TrialResult]) -> MutationScore:
@@ -239,5 +213,5 @@ def mutation_score(results: list[TrialResult]) -> MutationScore:
         mutants=len(mutants),
         accepted=sum(r.verdict.right for r in right),
         right=len(right),
-        starter_right=all(r.verdict.right for r in results if r.trial.role is Role.STARTER),
+        perfect=all(r.verdict.right for r in results),
     )

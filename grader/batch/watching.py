@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any, Protocol, TypeVar
@@ -40,14 +41,11 @@ class Worker(Protocol):
         """End :meth:`grade`, which may then return or raise anything."""
 
 
-@dataclass(frozen=True)
-class Began:
-    """A grading begins."""
+class Step(Enum):
+    """What happens besides the end of a grading."""
 
-
-@dataclass(frozen=True)
-class Cancelled:
-    """A grading was ended by a change; the next one begins."""
+    BEGAN = "a grading begins"
+    CANCELLED = "a grading was ended by a change; the next one begins"
 
 
 @dataclass(frozen=True)
@@ -61,20 +59,18 @@ class Ended:
 class Watching:
     """Grades at first and then at every change, as long as its events are asked for."""
 
-    def __init__(
-        self, submission: Path, report: Path, worker: Worker, assignment: Path | None = None
-    ) -> None:
+    def __init__(self, submission: Path, report: Path, worker: Worker, assignment: Path) -> None:
         """Set up; nothing is watched yet."""
         self._submission = submission.resolve()
         self._report = report.resolve()
-        self._assignment = assignment.resolve() if assignment is not None else None
+        self._assignment = assignment.resolve()
         self._worker = worker
         # A future that is done, or None for a file that was saved.
         self._news: SimpleQueue[Future[Any] | None] = SimpleQueue()
         self._watches: list[Future[None]] = []
         self._stop = threading.Event()
 
-    def events(self) -> Iterator[Began | Cancelled | Ended]:
+    def events(self) -> Iterator[Step | Ended]:
         """Watch and grade."""
         with ThreadPoolExecutor(3, "watch") as pool:
             for look in (self._watch_submission, self._watch_assignment):
@@ -83,7 +79,7 @@ class Watching:
             try:
                 while True:
                     state = self._state()
-                    yield Began()
+                    yield Step.BEGAN
                     self._worker.begin()
                     grading = self._start(pool, self._worker.grade)
                     while not (finished := self._next() is grading) and self._state() == state:
@@ -98,7 +94,7 @@ class Watching:
                             self._next()
                     else:
                         self._cancel(grading)
-                        yield Cancelled()
+                        yield Step.CANCELLED
             finally:
                 self._stop.set()
                 if grading is not None:
@@ -127,27 +123,23 @@ class Watching:
         with contextlib.suppress(RosgradeError):
             submission = fingerprint(self._submission)
         with contextlib.suppress(RosgradeError):
-            if self._assignment is not None:
-                assignment = folder_sha256(self._assignment, self._report)
+            assignment = folder_sha256(self._assignment, self._report)
         return submission, assignment
 
     def _watch_assignment(self) -> None:
-        if self._assignment is not None:
-            self._watch(self._assignment, lambda _: True, recursive=True)
+        self._watch(self._assignment, lambda _: True)
 
     def _watch_submission(self) -> None:
-        watched = self._submission
-        if watched.is_dir():
-            self._watch(
-                watched,
-                lambda path: not is_left_out(path.relative_to(watched).as_posix()),
-                recursive=True,
-            )
+        root = self._submission
+        if root.is_dir():
+            self._watch(root, lambda path: not is_left_out(path.relative_to(root).as_posix()))
         else:
             # The file itself may be replaced.
-            self._watch(watched.parent, lambda path: path.name == watched.name, recursive=False)
+            self._watch(root.parent, lambda path: path.name == root.name, recursive=False)
 
-    def _watch(self, root: Path, matters: Callable[[Path], bool], *, recursive: bool) -> None:
+    def _watch(
+        self, root: Path, matters: Callable[[Path], bool], *, recursive: bool = True
+    ) -> None:
         def concerns(_: Change, path: str) -> bool:
             return not Path(path).is_relative_to(self._report) and matters(Path(path))
 

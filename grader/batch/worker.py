@@ -21,7 +21,6 @@ from grader.resources import cache_folder
 from grader.run.admission import Admission
 from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
-from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import choose
 from grader.scratch import Scratch
 from grader.submission.intake.locate import opened
@@ -79,11 +78,7 @@ def unpack(packed: bytes, folder: Path) -> None:
 
 @dataclass(frozen=True)
 class Parcel:
-    """A submission on its way to a worker.
-
-    Attributes:
-        refused: What there is instead where it cannot be read as a submission, or None.
-    """
+    """A submission on its way to a worker."""
 
     key: str
     name: str
@@ -152,18 +147,13 @@ def make_grading(
     order: Order, loaded: LoadedAssignment, admission: Admission | None = None
 ) -> Grading:
     """Set up grading on this machine."""
-    sandbox = _sandbox(order.sandbox)
-    runner = Runner(ros.find(), admission or Admission(), sandbox=sandbox)
-    return Grading(loaded, runner, cache_folder(), seed=order.seed)
-
-
-def _sandbox(choice: Choice) -> Sandbox | None:
-    """The sandbox for unknown programs; without one only by explicit wish."""
-    wanted = Choice.BWRAP if choice is Choice.AUTO else choice
+    # Unknown programs run without a sandbox only by explicit wish.
+    wanted = Choice.BWRAP if order.sandbox is Choice.AUTO else order.sandbox
     try:
         sandbox, _ = choose(wanted, cache_folder())
     except GraderFault as fault:
         raise GraderFault(
             f"{fault}\nOr run the submissions with your own rights: --sandbox none"
         ) from fault
-    return sandbox
+    runner = Runner(ros.find(), admission or Admission(), sandbox=sandbox)
+    return Grading(loaded, runner, cache_folder(), seed=order.seed)

@@ -22,7 +22,6 @@ from grader.cli import (
     check,
     doctor,
     export,
-    new,
     regrade,
     replay,
     report,
@@ -78,7 +77,7 @@ app.command("report")(report.report)
 app.command("replay")(replay.replay)
 app.add_typer(export.app, name="export")
 app.command("selftest")(selftest.selftest)
-app.command("new")(new.new)
+app.command("new")(start.new)
 app.command("validate")(catalogue.validate)
 app.command("schema")(catalogue.schema)
 app.command("checks")(catalogue.checks)

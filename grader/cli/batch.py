@@ -149,13 +149,15 @@ def _rows(
         return known, take_in_roster(known, submissions.parent, staging, progress.advance)
     read = read_roster(roster) if roster else None
 
-    def left_out(name: str) -> None:
-        progress.note(f"{name} is neither a folder nor an archive, and is left out")
-
-    def say_prefix(prefix: str) -> None:
-        progress.say(f"names are read as {prefix}LOGIN")
-
-    return read, take_in(submissions, staging, read, left_out, out, say_prefix)
+    not_taken = "is neither a folder nor an archive, and is left out"
+    return read, take_in(
+        submissions,
+        staging,
+        read,
+        on_left_out=lambda name: progress.note(f"{name} {not_taken}"),
+        out=out,
+        on_prefix=lambda prefix: progress.say(f"names are read as {prefix}LOGIN"),
+    )
 
 
 def _at_once(jobs: str) -> int | None:

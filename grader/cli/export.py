@@ -84,7 +84,7 @@ def csv(out: Results, output: File = Path("grades.csv"), zero: ZeroFor = None) -
 
     For the folder of a batch, it has the columns and the rows of its grades.csv.
     """
-    from grader.batch.rendering import read_class
+    from grader.batch.class_files import read_class
     from grader.report.files import refuse_inputs, write_whole
     from grader.report.formats.gradebook import grades_csv
 
@@ -112,7 +112,7 @@ def canvas(
 
     Ends with 1 if a student has no score in it, and says who and why.
     """
-    from grader.batch.rendering import read_class
+    from grader.batch.class_files import read_class
     from grader.errors import UsageError
     from grader.report.files import refuse_inputs, write_whole
     from grader.report.formats.gradebook import canvas_csv, read_canvas
@@ -137,9 +137,9 @@ def canvas(
 
 
 def _read_of(out: Path) -> list[Path]:
+    from grader.batch.class_files import find_reports
     from grader.batch.files import RESULT_FILE
     from grader.batch.ledger import BATCH_FILE
-    from grader.batch.rendering import find_reports
 
     return [out / BATCH_FILE, *(folder / RESULT_FILE for folder in find_reports(out))]
 

@@ -109,13 +109,7 @@ def with_file_formats(command: Callable[..., None]) -> Callable[..., None]:
 
 @dataclass(frozen=True)
 class Formats:
-    """What to write, and where to.
-
-    Attributes:
-        files: Format -> the file that it is written to.
-        gradescope_metadata: ``submission_metadata.json``.
-        classroom50: Whether Classroom 50 started this.
-    """
+    """What to write, and where to."""
 
     files: Mapping[str, Path] = field(default_factory=dict)
     junit_family: JunitFamily = JunitFamily.XUNIT2

@@ -36,9 +36,9 @@ def report(
 
     The options of the formats work for one report. For a class, every report is written.
     """
+    from grader.batch.class_files import find_reports, render_again
     from grader.batch.files import REPORT_FILE, RESULT_FILE
     from grader.batch.grading import RECORDINGS_FOLDER
-    from grader.batch.rendering import find_reports, render_again
     from grader.errors import UsageError
     from grader.report.files import refuse_inputs
 

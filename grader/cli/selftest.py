@@ -53,11 +53,17 @@ def selftest(
     from grader.assignment.load import list_assignments, load_assignment
     from grader.assignment.mutant import reference_of
     from grader.batch.grading import Grading
+    from grader.batch.reference_run import keep_reference
     from grader.batch.selftest import Role, Trial, mutation_score, trials
     from grader.batch.selftest import selftest as run_selftest
     from grader.report.files import refuse_part
     from grader.run.host.load import cpu_count
     from grader.run.runner import Runner
+
+    kept: list[str] = []
+
+    def keep_runs(loaded: LoadedAssignment, graded: Graded) -> None:
+        kept.append(keep_reference(loaded, graded.grade, graded.recordings))
 
     def chosen_trial(trial: Trial) -> bool:
         return not record or trial.role is Role.REFERENCE
@@ -72,7 +78,6 @@ def selftest(
             reference = reference_of(loaded.assignment.id, loaded.folder)
             refuse_part(keep, reference, f"the reference solution in {reference}")
         results: list[TrialResult] = []
-        kept: list[str] = []
         wanted = sum(chosen_trial(trial) for trial in trials(loaded))
         with Runner(ros.find(), sandbox=chosen) as runner, Progress(quiet).shown() as progress:
             grading = Grading(loaded, runner, cache_folder())
@@ -82,7 +87,7 @@ def selftest(
                 jobs=jobs or 2 * cpu_count(),
                 keep=keep and keep / loaded.assignment.id,
                 chosen=chosen_trial,
-                on_graded=partial(_keep, loaded, kept) if record else lambda _: None,
+                on_graded=partial(keep_runs, loaded) if record else lambda _: None,
             ):
                 results.append(result)
                 progress.say(
@@ -90,23 +95,18 @@ def selftest(
                     f"{result.trial.id}: {'ok' if result.verdict.right else 'WRONG'}"
                 )
         if record:
-            say(kept[0])
+            say(kept[-1])
             continue
         score = mutation_score(results)
         perfect = perfect and score.perfect
+        percent = 100.0 * score.killed / score.mutants if score.mutants else 0.0
         _print(console, loaded.assignment.id, results)
         say(
             f"{loaded.assignment.id}: {score.accepted} of {score.right} right solutions with "
             f"full points, {score.killed} of {score.mutants} mutants judged as they must: "
-            f"mutation score {score.percent:.0f} %"
+            f"mutation score {percent:.0f} %"
         )
     raise typer.Exit(0 if perfect else 1)
-
-
-def _keep(loaded: LoadedAssignment, kept: list[str], graded: Graded) -> None:
-    from grader.batch.reference_run import keep_reference
-
-    kept.append(keep_reference(loaded, graded.grade, graded.recordings))
 
 
 def _print(console: Console, assignment: str, results: list[TrialResult]) -> None:

@@ -1,4 +1,4 @@
-"""``rosgrade start``: a starter package for the student."""
+"""``rosgrade start`` and ``rosgrade new``: a package or an assignment to begin with."""
 
 from __future__ import annotations
 
@@ -32,3 +32,33 @@ def start(
     say("\nNext, read the task, then grade your work after every save:\n")
     say(f"  rosgrade show {assignment}")
     say(f"  rosgrade watch {assignment} {folder}")
+
+
+def new(
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="ID",
+            help="Name of the assignment (lower case letters, digits, underscores), or a folder of "
+            "this name.",
+        ),
+    ],
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Parent folder; by default the current folder.")
+    ] = Path(),
+) -> None:
+    """Write a small new assignment that works.
+
+    Creates a folder ID with assignment.yaml, a handout, a reference solution, and mutants:
+    mistakes that must lose points. Change it step by step. Existing files are never
+    overwritten.
+    """
+    from grader.scaffold import write_assignment
+
+    # A name alone is its own last part, and leaves the folder as it is.
+    place = folder / name
+    written = write_assignment(place.name or name, place.parent)
+    say(f"Written: {written}")
+    say("\nNext, edit assignment.yaml in this folder, and after each change run:\n")
+    say(f"  rosgrade validate {written}")
+    say(f"  rosgrade selftest {written}")

@@ -167,7 +167,7 @@ class _Work:
 
 def _follow(work: _Work, page: ReportPage, console: Console) -> None:
     from grader.batch.files import write_graded
-    from grader.batch.watching import Began, Cancelled, Watching
+    from grader.batch.watching import Ended, Step, Watching
     from grader.report.model.facts import Clock
     from grader.report.text.explanation import score
     from grader.report.text.terminal import print_changes, print_grade
@@ -178,13 +178,13 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
         watching = Watching(work.submission, work.report, work, work.loaded.folder)
         for event in watching.events():
             title = work.loaded.assignment.title
-            if isinstance(event, Began):
+            if event is Step.BEGAN:
                 clock = Clock()
                 page.tell("grading what was saved", f"… {title}")
                 shown.enter_context(work.progress.shown())
                 continue
             shown.close()
-            if isinstance(event, Cancelled):
+            if not isinstance(event, Ended):
                 work.progress.say("saved meanwhile: beginning anew")
                 continue
             if event.graded is None:

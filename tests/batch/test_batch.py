@@ -7,27 +7,21 @@ from __future__ import annotations
 
 import errno
 import shutil
-import sys
-from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
-from types import FrameType
-from typing import Any
 
 import pytest
 
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.batch import NOT_YET, Batch, Done
-from grader.batch.class_files import class_rows, copies, notes
+from grader.batch.class_files import copies, find_reports, notes
 from grader.batch.executor import BatchExecutor, ExecutorLost, LocalExecutor
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
 from grader.batch.handed_in import HandedIn
 from grader.batch.intake import take_in
 from grader.batch.ledger import Entry, Ledger
-from grader.batch.rendering import find_reports
-from grader.batch.roster import parse_roster
 from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
 from grader.report.model.result import make_result
@@ -220,36 +214,6 @@ def test_a_lost_cluster_ends_the_batch_and_is_the_fault_of_no_row(course: Class)
     assert {item.result is not None for item in course.grade(course.executor()).values()} == {True}
 
 
-def test_a_crew_that_grows_gets_more_to_do(course: Class) -> None:
-    for number in range(6):
-        course.hand_in(f"more{number}", f"{number}")
-
-    class Growing:
-        """Each time that it is asked there is one more of it; ends when all are at work."""
-
-        def __init__(self) -> None:
-            self.at_work: list[Future[None]] = []
-
-        @property
-        def capacity(self) -> int:
-            """One more than are at work."""
-            return len(self.at_work) + 1
-
-        def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
-            """Wait for the others."""
-            self.at_work.append(Future())
-            if len(self.at_work) == 8:
-                for future in self.at_work:
-                    future.set_exception(GraderFault("all at work"))
-            return self.at_work[-1]
-
-        def close(self) -> None:
-            """There is nothing to end."""
-
-    done = course.grade(Growing())
-    assert {item.entry.fault for item in done.values()} == {"all at work"}
-
-
 def test_a_batch_of_another_assignment_replaces_no_grades(course: Class) -> None:
     course.grade(course.executor())
     before = course.written()
@@ -314,52 +278,3 @@ def test_an_interrupted_batch_knows_what_it_has_not_come_to(course: Class) -> No
         left = {item.entry.key: item for item in batch.left(())}
     assert {key for key, item in left.items() if item.result is not None} == {"ana", "cai"}
     assert left["ben"].entry.problem == left["dee"].entry.problem == NOT_YET
-
-
-def steps(work: Callable[[], object]) -> int:
-    """How many instructions of Python some work takes: the same on a busy machine."""
-    count = 0
-
-    def trace(frame: FrameType, event: str, _: Any) -> Any:
-        nonlocal count
-        frame.f_trace_opcodes = True
-        frame.f_trace_lines = False
-        count += event == "opcode"
-        return trace
-
-    before = sys.gettrace()
-    sys.settrace(trace)
-    try:
-        work()
-    finally:
-        sys.settrace(before)
-    return count
-
-
-@pytest.mark.parametrize("line", ["s{0},Ana {0},s{0}@x.org", "s,Ana,s@x.org", "s{0},Ana,s@x.org"])
-def test_a_roster_twice_as_long_takes_no_more_than_twice_the_work(
-    course: Class, tmp_path: Path, line: str
-) -> None:
-    for name in ("s1", "Ana", "hw1-s2", "hw1-s3"):
-        course.hand_in(name, name)
-
-    def whole(size: int) -> int:
-        """From the roster to what is written of the class, without what is graded."""
-        out, staging = tmp_path / f"out{size}", tmp_path / f"staging{size}"
-        staging.mkdir()
-        text = "login,name,email\n" + "".join(f"{line.format(n)}\n" for n in range(size))
-
-        def work() -> None:
-            roster = parse_roster(text, "r.csv")
-            rows = take_in(course.folder / "class", staging, roster)
-            with Ledger(out).opened() as ledger:
-                batch = Batch(course.loaded, ledger)
-                batch.read(rows)
-                done = list(batch.grade({}, None))
-                batch.left(done)
-                class_rows(done, ledger)
-
-        return steps(work)
-
-    whole(10)
-    assert whole(800) < 2.2 * whole(400)

@@ -166,9 +166,3 @@ def test_what_is_no_scheduler_is_not_waited_for(
         with pytest.raises(UsageError, match=rf"no Dask scheduler answers at {address}; "):
             DaskExecutor(address, order)
         over.set()
-
-
-def test_no_scheduler_is_said() -> None:
-    order = Order(ASSIGNMENT, "0" * 64, None, Choice.NONE)
-    with pytest.raises(UsageError, match=r"no Dask scheduler answers at tcp://127.0.0.1:1"):
-        DaskExecutor("tcp://127.0.0.1:1", order)

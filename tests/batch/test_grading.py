@@ -17,12 +17,12 @@ import pytest
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch import grading as grading_module
+from grader.batch.class_files import find_reports
 from grader.batch.class_regrading import regrade_class
 from grader.batch.files import REPORT_FILE, RESULT_FILE, write_graded
 from grader.batch.grading import Graded, Grading
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import compare, find, regrade
-from grader.batch.rendering import find_reports
 from grader.batch.selftest import Role, Trial, mutation_score, run_trial
 from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
@@ -348,15 +348,6 @@ def test_a_limit_of_the_build_is_the_author_s(lesson: LoadedAssignment, tmp_path
     assert usual == BuildLimits()
     assert (own.python_s, own.other_s, own.output.total) == (30.0, 30.0, 2**20)
     assert own.room.memory_bytes == 2**30
-
-
-def test_a_library_that_is_not_installed_is_told_before_anything_is_graded(
-    lesson: LoadedAssignment, tmp_path: Path
-) -> None:
-    file = lesson.folder / "assignment.yaml"
-    file.write_text(YAML + "libraries: [no-such-library]\n", encoding="utf-8")
-    with pytest.raises(GraderFault, match="'no-such-library', which is not installed here"):
-        Grading(load_assignment(lesson.folder), ScriptedRunner(), tmp_path)
 
 
 def test_a_regrade_says_who_gains_what_and_why(

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from grader.batch.ledger import BATCH_FILE, BatchRows, Entry, Ledger, folder_name, keep_earlier
+from grader.batch.ledger import BATCH_FILE, BatchRows, Entry, Ledger, folder_name
 from grader.errors import UsageError
 
 
@@ -79,17 +79,6 @@ def test_a_grade_that_was_about_to_be_replaced_is_put_back(
         assert (found.folder("ana") / "result.json").read_text() == "second"
         earlier = {file.read_text() for file in (found.folder("ana") / "earlier").iterdir()}
         assert "first" in earlier
-
-
-def test_a_gradebook_that_is_replaced_is_kept_beside_the_new_one(tmp_path: Path) -> None:
-    grades = tmp_path / "grades.csv"
-    keep_earlier(grades)
-    grades.write_text("before")
-    keep_earlier(grades)
-    grades.write_text("after")
-    (kept,) = (tmp_path / "earlier").iterdir()
-    assert kept.name.startswith("grades-") and kept.suffix == ".csv"
-    assert kept.read_text() == "before"
 
 
 def test_two_batches_do_not_write_to_one_folder(tmp_path: Path) -> None:

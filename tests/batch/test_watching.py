@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from grader.batch.grading import Graded
-from grader.batch.watching import Began, Cancelled, Ended, Watching
+from grader.batch.watching import Ended, Step, Watching
 from grader.errors import GraderFault, UsageError
 from grader.submission.prepare import Prepared, fingerprint
 from tests.grade.sample import make_submission
@@ -55,17 +55,19 @@ def watched(tmp_path: Path) -> Iterator[SimpleNamespace]:
     (submission / "bot" / "package.xml").write_text("<package/>")
     file.write_text("one")
     played = Played(submission)
-    events = Watching(submission, submission / "rosgrade-report", played).events()
+    (tmp_path / "lesson").mkdir()
+    report = submission / "rosgrade-report"
+    events = Watching(submission, report, played, tmp_path / "lesson").events()
     yield SimpleNamespace(submission=submission, file=file, played=played, events=events)
     events.close()
     assert not [thread for thread in threading.enumerate() if thread.name in ("watch", "grade")]
 
 
 def test_a_saved_file_is_graded_again(watched: SimpleNamespace) -> None:
-    assert isinstance(next(watched.events), Began)
+    assert next(watched.events) is Step.BEGAN
     assert isinstance(next(watched.events), Ended)
     watched.file.write_text("two")
-    assert isinstance(next(watched.events), Began)
+    assert next(watched.events) is Step.BEGAN
     assert isinstance(next(watched.events), Ended)
     assert watched.played.grades == 2
 
@@ -87,7 +89,7 @@ def test_what_is_no_work_is_not_graded(watched: SimpleNamespace) -> None:
     watched.file.write_text("one")
     saved = threading.Timer(0.5, lambda: watched.file.write_text("two"))
     saved.start()
-    assert isinstance(next(watched.events), Began)
+    assert next(watched.events) is Step.BEGAN
     assert watched.file.read_text() == "two"
     saved.join()
 
@@ -98,7 +100,7 @@ def test_what_an_editor_keeps_beside_a_file_is_no_change(watched: SimpleNamespac
     watched.file.with_name("node.py~").write_text("x")
     saved = threading.Timer(0.5, lambda: watched.file.write_text("two"))
     saved.start()
-    assert isinstance(next(watched.events), Began)
+    assert next(watched.events) is Step.BEGAN
     assert watched.file.read_text() == "two"
     saved.join()
 
@@ -108,7 +110,7 @@ def test_a_save_as_editors_do_it_is_noticed(watched: SimpleNamespace) -> None:
     draft = watched.file.with_name("4913")
     draft.write_text("two")
     draft.replace(watched.file)
-    assert isinstance(next(watched.events), Began)
+    assert next(watched.events) is Step.BEGAN
     assert isinstance(next(watched.events), Ended)
 
 
@@ -122,24 +124,24 @@ def test_a_save_during_a_run_ends_it_and_begins_anew(watched: SimpleNamespace) -
 
     saving = threading.Thread(target=save)
     saving.start()
-    assert isinstance(next(watched.events), Began)
-    assert isinstance(next(watched.events), Cancelled)
+    assert next(watched.events) is Step.BEGAN
+    assert next(watched.events) is Step.CANCELLED
     saving.join()
     played.let_go.set()
-    assert isinstance(next(watched.events), Began)
+    assert next(watched.events) is Step.BEGAN
     assert isinstance(next(watched.events), Ended)
     assert played.grades == 2
 
 
 def test_the_end_ends_what_runs(watched: SimpleNamespace) -> None:
     watched.played.let_go.clear()
-    assert isinstance(next(watched.events), Began)
+    assert next(watched.events) is Step.BEGAN
     ended = threading.Thread(
         target=lambda: (watched.played.begun.wait(), watched.file.write_text("x"))
     )
     ended.start()
-    assert isinstance(next(watched.events), Cancelled)
-    assert isinstance(next(watched.events), Began)
+    assert next(watched.events) is Step.CANCELLED
+    assert next(watched.events) is Step.BEGAN
     ended.join()
     watched.events.close()
     assert watched.played.cancelled.is_set()
@@ -152,7 +154,7 @@ def test_an_error_is_told_and_watching_goes_on(watched: SimpleNamespace) -> None
     assert isinstance(event, Ended) and str(event.problem) == "no such thing"
     watched.played.error = None
     watched.file.write_text("two")
-    assert isinstance(next(watched.events), Began)
+    assert next(watched.events) is Step.BEGAN
     assert next(watched.events).problem is None
 
 
@@ -182,7 +184,7 @@ def test_a_saved_file_of_the_assignment_is_graded_with(tmp_path: Path) -> None:
     (assignment / "__pycache__" / "checks.pyc").write_text("x")
     saved = threading.Timer(0.5, lambda: file.write_text("two"))
     saved.start()
-    assert isinstance(next(events), Began)
+    assert next(events) is Step.BEGAN
     assert file.read_text() == "two"
     assert isinstance(next(events), Ended)
     assert played.grades == 2
@@ -201,9 +203,11 @@ def test_an_archive_that_is_replaced_is_graded_again(tmp_path: Path) -> None:
         archive.with_suffix(".new").replace(archive)
 
     write("one")
-    events = Watching(archive, tmp_path / "rosgrade-report", Played(archive)).events()
+    (tmp_path / "lesson").mkdir()
+    report = tmp_path / "rosgrade-report"
+    events = Watching(archive, report, Played(archive), tmp_path / "lesson").events()
     next(events), next(events)
     (tmp_path / "notes.txt").write_text("x")
     write("two")
-    assert isinstance(next(events), Began)
+    assert next(events) is Step.BEGAN
     events.close()

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.batch.worker import Parcel, pack, unpack
+from grader.batch.worker import Parcel, unpack
 from grader.errors import GraderFault
 from grader.submission.prepare import fingerprint
 
@@ -75,11 +75,3 @@ def test_a_tar_that_leads_out_is_refused(tmp_path: Path) -> None:
     with pytest.raises(GraderFault, match="leads out: out"):
         unpack(stream.getvalue(), target)
     assert not list(target.iterdir())
-
-
-def test_a_folder_survives(submission: Path, tmp_path: Path) -> None:
-    target = tmp_path / "copy"
-    target.mkdir()
-    unpack(pack(submission), target)
-    assert (target / "build").is_dir()
-    assert (target / "src" / "pkg" / "link.py").is_symlink()

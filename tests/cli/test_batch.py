@@ -180,14 +180,3 @@ def test_after_ctrl_c_there_is_an_overview_of_what_is_graded(
         assert row["note"] == ("" if graded else "not graded yet: the batch was interrupted")
     overview = (out / "index.html").read_text(encoding="utf-8")
     assert "not graded yet: the batch was interrupted" in overview
-
-
-def test_one_submission_in_place_of_a_class_is_a_mistake_of_use(
-    rosgrade: Rosgrade, tmp_path: Path
-) -> None:
-    one = REFERENCE / "bot_publisher"
-    ended = rosgrade(
-        "batch", "timed_publisher", one, "--out", tmp_path / "out", "--sandbox", "none"
-    )
-    assert ended.returncode == 2
-    assert "looks like one submission" in ended.stderr and "Traceback" not in ended.stderr

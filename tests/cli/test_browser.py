@@ -51,9 +51,9 @@ def test_the_browser_of_the_user_gets_the_address(tmp_path: Path) -> None:
     assert (tmp_path / "asked").read_text() == f"{URL}\n"
 
 
-@pytest.mark.parametrize("browser", ["exit 3", "kill -9 $$"])
-def test_a_browser_that_fails_is_told_with_the_address(tmp_path: Path, browser: str) -> None:
-    ended = opened(tmp_path, f"{script(tmp_path, browser)} %s")
+@pytest.mark.parametrize("browser", ["exit 3", None])
+def test_the_address_is_told_where_no_browser_starts(tmp_path: Path, browser: str | None) -> None:
+    ended = opened(tmp_path, browser and f"{script(tmp_path, browser)} %s")
     assert ended.returncode == 0
     assert ended.stderr == (
         f"rosgrade: warning: --open: no browser could be started; the page is {URL}\n"
@@ -67,15 +67,6 @@ def test_a_browser_that_stays_holds_up_nobody(tmp_path: Path) -> None:
         assert (ended.returncode, ended.stderr) == (0, "")
     finally:
         os.kill(int((tmp_path / "pid").read_text()), 9)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is always a browser")
-def test_a_machine_without_a_browser_names_the_page(tmp_path: Path) -> None:
-    ended = opened(tmp_path, None)
-    assert ended.returncode == 0
-    assert ended.stderr == (
-        f"rosgrade: warning: --open: no browser could be started; the page is {URL}\n"
-    )
 
 
 @pytest.mark.ros

@@ -109,13 +109,6 @@ def test_a_terminal_gets_lines_that_change_without_colours_where_unwanted(
     assert not re.search(r"\x1b\[[349]\dm", text)
 
 
-def test_a_line_that_is_too_long_for_the_terminal_is_cut(monkeypatch: pytest.MonkeyPatch) -> None:
-    terminal = made_terminal(monkeypatch)
-    with Progress().shown() as progress:
-        progress.narrate("behind", {"event": "waiting", "what": "a node called " + "n" * 80})
-    assert re.search(r"behind: waiting for a node called n+…", terminal.getvalue())
-
-
 def test_a_terminal_gets_the_rate_of_a_class(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = made_terminal(monkeypatch)
     grade_a_class(Progress())

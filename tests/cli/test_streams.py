@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -79,23 +78,3 @@ def test_output_that_is_lost_on_a_full_disk_is_told(tmp_path: Path) -> None:
 def test_what_nobody_reads_to_the_end_is_no_fault(tmp_path: Path) -> None:
     ended = shell(tmp_path, f"{ROSGRADE} schema | head -1")
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "{\n", "")
-
-
-def test_unbuffered_output_comes_at_once() -> None:
-    program = (
-        "from grader.cli.screen.streams import lasting_streams\n"
-        "with lasting_streams(): print('now'); input(); print('later')\n"
-    )
-    with subprocess.Popen(
-        [sys.executable, "-c", program],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        cwd=ROOT,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        text=True,
-    ) as process:
-        assert process.stdout is not None
-        # The program goes on only after this line was read.
-        assert process.stdout.readline() == "now\n"
-        told, _ = process.communicate("\n", timeout=60)
-    assert told == "later\n"

@@ -137,16 +137,3 @@ def test_a_port_that_is_taken_is_named(rosgrade: Rosgrade) -> None:
     assert ended.returncode == 2
     assert f"--port {port}: " in ended.stderr
     assert "Traceback" not in ended.stderr
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["timed_publsher", "."], "Did you mean 'timed_publisher'?"),
-        (["timed_publisher", "homework"], "homework: does not exist"),
-    ],
-)
-def test_what_does_not_exist_is_named(rosgrade: Rosgrade, arguments: list[str], said: str) -> None:
-    ended = rosgrade("watch", *arguments)
-    assert ended.returncode == 2
-    assert said in ended.stderr

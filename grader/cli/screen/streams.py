@@ -22,9 +22,6 @@ class _Lasting:
 
     It stands before Python's own stream, and not below it: what Ctrl-C interrupts there in the
     middle of a write would be written twice.
-
-    Attributes:
-        lost: Why, where what was written is missing somewhere; else None.
     """
 
     def __init__(self, stream: TextIO) -> None:
