@@ -44,11 +44,7 @@ class Done:
 
 @dataclass
 class Batch:
-    """Grades the rows of a class into a folder.
-
-    Attributes:
-        retry: Keys to grade again, or ``all``, or ``errors``.
-    """
+    """Grades the rows of a class into a folder; ``retry`` holds keys, ``all`` or ``errors``."""
 
     loaded: LoadedAssignment
     ledger: Ledger

@@ -80,10 +80,7 @@ def _connected(address: str, connect: Any) -> Any:
 
 
 class DaskExecutor:
-    """Workers of a cluster: one task for each submission.
-
-    A worker that dies loses no submission: the scheduler gives its tasks to others.
-    """
+    """Workers of a cluster; if one dies, the scheduler gives its submissions to others."""
 
     def __init__(self, address: str, order: Order) -> None:
         """Connect."""

@@ -91,9 +91,8 @@ def check(
     )
     with formats.grading():
         progress = Progress(quiet, verbose)
-        installation = ros.find()
         runner = Runner(
-            installation,
+            ros.find(),
             progress=_while_it_starts(progress.narrate),
             sandbox=chosen_sandbox(sandbox, progress),
             verbose=verbose,

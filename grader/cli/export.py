@@ -14,7 +14,6 @@ from grader.cli.screen.console import print_error, print_warning, say
 if TYPE_CHECKING:
     from grader.report.model.class_row import RowStatus
 
-Assignment = AssignmentName
 Folder = Annotated[Path, typer.Option("--out", help="Folder to write to.")]
 Results = Annotated[Path, typer.Argument(help="Folder with the reports of a class.")]
 File = Annotated[Path, typer.Option("--output", "-o", help="File to write.")]
@@ -44,7 +43,7 @@ app = typer.Typer(
 
 
 @app.command()
-def gradescope(assignment: Assignment, out: Folder = Path()) -> None:
+def gradescope(assignment: AssignmentName, out: Folder = Path()) -> None:
     """Write the autograder zip for Gradescope."""
     from grader import export
     from grader.assignment.load import load_assignment
@@ -54,7 +53,7 @@ def gradescope(assignment: Assignment, out: Folder = Path()) -> None:
 
 @app.command()
 def github(
-    assignment: Assignment,
+    assignment: AssignmentName,
     action: Annotated[
         str,
         typer.Option(help="Your course's copy of rosgrade: OWNER/REPOSITORY@REF."),
@@ -69,7 +68,7 @@ def github(
 
 
 @app.command()
-def classroom50(assignment: Assignment, out: Folder = Path()) -> None:
+def classroom50(assignment: AssignmentName, out: Folder = Path()) -> None:
     """Write the autograder folder for a Classroom 50 classroom."""
     from grader import export
     from grader.assignment.load import load_assignment

@@ -10,9 +10,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rich.console import Console
 
-_SETTLED_S = 2.0
-"""A browser that has not failed by then is one that stays."""
-
 
 def output_console() -> Console:
     """Console on standard output."""
@@ -52,9 +49,9 @@ def open_page(url: str) -> None:
     shown = any(os.environ.get(name) for name in ("BROWSER", "DISPLAY", "WAYLAND_DISPLAY"))
     failed = [sys.platform.startswith("linux") and not shown]
     if not failed[0]:
-        # Some browsers keep the program that starts them until they are closed.
+        # Some browsers keep the program that starts them until they are closed: wait 2 s at most.
         work = threading.Thread(target=lambda: failed.append(not webbrowser.open(url)), daemon=True)
         work.start()
-        work.join(_SETTLED_S)
+        work.join(2.0)
     if any(failed):
         print_warning(f"--open: no browser could be started; the page is {url}")
