@@ -60,7 +60,7 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     and depth of the publisher make it. Messages that were published just while it was matched
     may count on either side.
 
-    A scenario that records the topic subscribes to it from the start. In one that does not, there
+    A scenario that records the topic subscribes to it from the start. Without `record`, there
     is no subscription until the late joiner's; the sequence numbers of the publisher's middleware
     show how many messages came before. So the check detects a publisher that publishes only while
     there is a subscription.
