@@ -12,9 +12,10 @@ from pathlib import Path
 
 from grader.errors import UsageError, machine_fault
 
-# How JSON, JUnit XML, pages and Markdown of ours begin.
-_WRITTEN = re.compile(
-    rb'\{\s*"(schema|score)"|(<\?xml[^>]*>\s*)?<testsuites\b|<!doctype html>|## \S+: ',
+# What packages, assignments and results are made of; anything else in a folder may be replaced.
+_SOURCES = re.compile(
+    r".*\.(py|c|cc|cpp|h|hpp|msg|srv|action|cfg|toml|ya?ml|sh|launch|csv|mcap|zip|t?gz)"
+    r"|package\.xml|CMakeLists\.txt|README.*|LICENSE.*|result\.json|submission\.json",
     re.IGNORECASE,
 )
 
@@ -55,8 +56,8 @@ def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None])
 
     Args:
         outputs: Files and folders that the command writes; None for an option that is not used.
-        inputs: Files and folders that it reads. A new file may be written into a folder among
-            them, and one that an earlier run wrote there may be replaced.
+        inputs: Files and folders that it reads. In a folder among them a file may be written
+            that is new or no source, such as the output of an earlier run.
     """
     written: list[Path] = []
     read = [one for one in inputs if one is not None]
@@ -89,15 +90,14 @@ def _is_same(one: Path, other: Path) -> bool:
 
 
 def _is_of(file: Path, folder: Path) -> bool:
-    """Whether a file belongs to a folder, and was not written there by an earlier run."""
+    """Whether a file is a source in a folder."""
     if not (file.is_file() and folder.is_dir()):
         return False
     inside = os.path.relpath(os.path.realpath(file), os.path.realpath(folder)).split("/")
     # Reports are no part of what is graded, whatever stands in their place.
     if inside[0] == ".." or "rosgrade-report" in inside:
         return False
-    with file.open("rb") as stream:
-        return _WRITTEN.match(stream.read(200)) is None
+    return _SOURCES.fullmatch(inside[-1]) is not None
 
 
 def check_folder(folder: Path) -> None:

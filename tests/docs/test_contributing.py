@@ -22,7 +22,7 @@ FILES = dict(re.findall(r'```python title="([^"]+)"\n(.*?)```', PAGE, re.DOTALL)
 def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The import packages with every file of the walks written into them."""
     folder = tmp_path_factory.mktemp("copy")
-    for name in ("grader", "sim", "assignments", "reference", "templates"):
+    for name in ("grader", "sim", "assignments", "reference", "templates", "tests"):
         ignored = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / name, folder / name, ignore=ignored)
     for path, text in FILES.items():
@@ -66,6 +66,15 @@ def test_a_new_check_is_listed_validated_and_judges(copy: Path) -> None:
     before = yaml.read_text(encoding="utf-8")
     yaml.write_text(before + entry.replace("TOPIC", "/cmd_vel"), encoding="utf-8")
     assert "valid" in rosgrade(copy, "validate", str(folder))
+    python(
+        copy,
+        "from grader.checks.finding import Status\n"
+        "from tests.checks.builder import every, judge, messages, recording\n"
+        "sent = recording(messages=messages(every(0.3, 5)))\n"
+        "asked = {'topic': '/cmd_vel', 'field': 'linear.x'}\n"
+        "assert judge('messages.newest', sent, **asked, value=1.0).status is Status.PASSED\n"
+        "assert judge('messages.newest', sent, **asked, value=2.0).status is Status.FAILED\n",
+    )
 
 
 def test_a_new_explanation_is_listed_and_found_without_a_list(copy: Path) -> None:
@@ -90,14 +99,14 @@ def test_a_new_stimulus_is_valid_described_and_played(copy: Path) -> None:
     shutil.copytree(copy / "assignments/simple_publisher", folder, dirs_exist_ok=True)
     yaml = folder / "assignment.yaml"
     text = yaml.read_text(encoding="utf-8")
-    stimuli = "    stimuli:\n      - {mark: half of it, after: 1 s}\n    record:\n"
+    stimuli = "    stimuli:\n      - {wait: 1 s}\n    record:\n"
     yaml.write_text(text.replace("    record:\n", stimuli, 1), encoding="utf-8")
     assert "valid" in rosgrade(copy, "validate", str(folder))
-    assert '"Mark a moment in the recording.' in rosgrade(copy, "schema")
+    assert '"Let time pass, so that' in rosgrade(copy, "schema")
     python(
         copy,
         "from grader.docs import assignment_markdown\n"
         "from grader.run.stimuli.player import PLAYS\n"
-        "assert '## stimuli: mark' in assignment_markdown()\n"
-        "assert 'MarkOrder' in [order.__name__ for order in PLAYS]\n",
+        "assert '## stimuli: wait' in assignment_markdown()\n"
+        "assert 'WaitOrder' in [order.__name__ for order in PLAYS]\n",
     )

@@ -159,8 +159,10 @@ def _vanished(recording: Recording, node: Node) -> bool:
     if gone_ns is None or gone_ns >= recording.stop_ns:
         return False
     # What a stimulus ends is meant to vanish, within the lease of its participant.
-    if any(item.time_ns <= gone_ns for item in recording.interventions):
-        return False
+    process = declarations.process_of(recording, node.name)
+    for done in recording.interventions:
+        if done.time_ns <= gone_ns and (process is None or process.name == done.process):
+            return False
     # The graph can lose a node for a moment on a busy machine; what it does tells better. What it
     # subscribed to tells nothing: others publish that.
     again = any(

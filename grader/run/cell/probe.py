@@ -121,7 +121,7 @@ class Probe:
         self._logs = KeptLines(limits.output_bytes)
         # Also what was published before the probe was matched.
         profile = qos_profile("reliable", "transient_local", _ROSOUT_DEPTH)
-        events = told_of_matches(self._note_match)
+        events = told_of_matches(self.note_match)
         self.node.create_subscription(Log, _ROSOUT, self._take_log, profile, event_callbacks=events)
         for topic in topics:
             self._topics[topic.name] = topic
@@ -134,7 +134,7 @@ class Probe:
         self._executor.spin_once(timeout_sec=limit_s)
 
     def has_met(self) -> bool:
-        """Whether a publisher came or went since this was last asked, as the middleware tells."""
+        """Whether an endpoint came or went at one of the probe's since this was last asked."""
         met, self._has_met = self._has_met, False
         return met
 
@@ -232,7 +232,7 @@ class Probe:
         self._create_subscription(topic.name, topic.type, profile, receive)
 
     def _create_subscription(self, topic: str, type: str, profile: QoSProfile, receive: Any) -> Any:
-        events = told_of_matches(self._note_match)
+        events = told_of_matches(self.note_match)
         return self.node.create_subscription(
             import_interface(type), topic, receive, profile, event_callbacks=events, raw=True
         )
@@ -253,7 +253,8 @@ class Probe:
         time_ns = stamp_ns if stamp_ns >= 0 else time.time_ns()
         self._logs.add(LogLine(time_ns, name, "rosout", text, level))
 
-    def _note_match(self, _: Any) -> None:
+    def note_match(self, _: Any) -> None:
+        """Have the graph looked at soon: an endpoint came or went, as the middleware tells."""
         self._has_met = True
 
     def _receive(self, topic: Topic, data: bytes, info: Any) -> None:

@@ -6,6 +6,7 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.serialization import serialize_message
 
 from grader.measure.compatibility import refusals
@@ -60,6 +61,10 @@ class Publishing(Playing):
             self._class,
             order.topic,
             qos_profile(order.reliability, order.durability, order.depth),
+            # A subscription may be destroyed again before the graph is looked at the next time.
+            event_callbacks=PublisherEventCallbacks(
+                matched=context.probe.note_match, use_default_callbacks=False
+            ),
         )
         self._sent = 0
         self._patience = Patience(f"a subscription on {order.topic}", context)
