@@ -133,7 +133,11 @@ class Progress:
                 self._bars.remove_task(self._tasks.pop(""))
             if name not in self._tasks:
                 self._tasks[name] = self._bars.add_task(text, total=None)
-            self._bars.update(self._tasks[name], description=text, completed=completed, total=total)
+            task = self._tasks[name]
+            if completed == 0 and any(one.finished for one in self._bars.tasks if one.id == task):
+                # A scenario that is run again, or the next piece of work, begins anew.
+                self._bars.reset(task)
+            self._bars.update(task, description=text, completed=completed, total=total)
 
     def _rate(self) -> str:
         if self._fresh < _LEAST_FOR_RATE:
