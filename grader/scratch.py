@@ -34,7 +34,7 @@ class Scratch:
         self._folder = tempfile.TemporaryDirectory(prefix=f"{PREFIX}{kind}-", dir=place)
         self.path = Path(self._folder.name)
         self._lock: int | None = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
-        # Some file systems of clusters have no locks; nobody can take one away there either.
+        # Some file systems of clusters have no locks, so no other process takes one there either.
         with contextlib.suppress(OSError):
             fcntl.flock(self._lock, fcntl.LOCK_SH)
 

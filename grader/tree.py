@@ -77,7 +77,7 @@ def _grant(path: bytes, mode: int) -> None:
     """Give the owner of a file or folder what it takes to read it, and to remove what is in it."""
     wanted = stat.S_IRWXU if stat.S_ISDIR(mode) else stat.S_IRUSR if stat.S_ISREG(mode) else 0
     if mode & wanted != wanted:
-        # What is somebody else's stays as it is.
+        # What belongs to another user stays as it is.
         with contextlib.suppress(OSError):
             os.chmod(path, stat.S_IMODE(mode) | wanted)  # noqa: PTH101  bytes
 

@@ -198,7 +198,7 @@ class Batch:
             yield Done(told, self.ledger.result(twin.key) if known else None, fresh)
 
     def _copy(self, key: str, twin: Entry) -> None:
-        """Give the same submission of somebody else the same result, under its own name."""
+        """Give an identical submission of another student the same result, under its own name."""
         known, original = self.ledger.result(twin.key), self.ledger.result(key)
         if known and original and grade_json(known) == grade_json(original):
             return

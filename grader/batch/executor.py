@@ -20,7 +20,7 @@ _EACH_WORKER = 2
 
 
 class ExecutorLost(GraderFault):
-    """Nobody is left to grade what was handed over, nor anything else."""
+    """No worker is left to grade submissions."""
 
 
 class BatchExecutor(Protocol):

@@ -175,7 +175,7 @@ class Grading:
                     except GraderFault as fault:
                         faults[name] = str(fault)
             except BaseException as error:
-                # An interrupt ends all that runs; a bug of ours costs nobody else's run.
+                # An interrupt ends all that runs; a bug of rosgrade costs no other run.
                 if not isinstance(error, Exception):
                     self._runner.close()
                 raise
@@ -210,7 +210,7 @@ class Grading:
         except UsageError as error:
             raise GraderFault(f"the recording that was just made: {error}") from error
         except OSError as error:
-            # A full disk, a folder that somebody removed: it is tried again, and the others go on.
+            # A full disk, a folder that was removed: it is tried again, and the others go on.
             told = GraderFault(f"this machine: {str(error)[:_LONGEST_WORDS]}")
             raise machine_fault(error) or told from error
 

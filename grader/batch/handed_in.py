@@ -77,9 +77,9 @@ def _archive_in(folder: Path) -> Path | None:
 
 
 def only_archive(files: Mapping[str, Path]) -> Path | None:
-    """The archive that somebody handed in, perhaps with a report beside it; else None."""
+    """The only archive among some files, perhaps with a report beside it; else None."""
     archives = [file for name, file in files.items() if name.lower().endswith(SUFFIXES)]
-    # A link may lead to somebody else's.
+    # A link may lead to the work of another student.
     plain = all(stat.S_ISREG(file.lstat().st_mode) for file in files.values())
     return archives[0] if len(archives) == 1 and plain and MANIFEST not in files else None
 

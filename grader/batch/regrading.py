@@ -103,7 +103,7 @@ def regrade_command(path: Path, loaded: LoadedAssignment) -> str:
 
 
 def refuse_other(folder: Path, name: str, loaded: LoadedAssignment) -> None:
-    """Let nobody lose all points because a recording is judged as of another assignment."""
+    """Refuse to judge a recording with another assignment: all points would be lost."""
     if name != loaded.assignment.id:
         raise UsageError(f"{folder}: holds the grades of {name}, not of {loaded.assignment.id}")
 

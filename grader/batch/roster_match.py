@@ -87,7 +87,7 @@ def matched(
 ) -> list[HandedIn]:
     """Give each entry to the student of the roster that it names.
 
-    What only resembles a name is given to nobody, and is told on its own row and on theirs.
+    A name that is only similar is not matched. Both rows, of the submission and of the student, say so.
     """
     names = _Names(roster.students, entries)
     if names.prefix:

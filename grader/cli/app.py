@@ -106,7 +106,7 @@ def main() -> None:
         print_error(str(error))
         sys.exit(NOT_GRADED if isinstance(error, GraderFault) else USAGE)
     except OSError as error:
-        # A full disk, too few descriptors, a folder that somebody removed.
+        # A full disk, too few descriptors, a folder that was removed.
         print_error(str(machine_fault(error) or f"this machine: {error}"))
         sys.exit(NOT_GRADED)
     except Exception:

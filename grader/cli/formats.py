@@ -119,7 +119,7 @@ class Formats:
 
     @contextmanager
     def grading(self) -> Iterator[None]:
-        """While this lasts, what a student's code prints cannot command whoever reads along."""
+        """While this lasts, GitHub Actions obeys no command in what a student's code prints."""
         # Each is imported only where it is asked for: together they take 0.2 s.
         if self.classroom50:
             from grader.report.formats import classroom50

@@ -30,7 +30,7 @@ from grader.recording.model import NS, Endpoint, Kind, LogLine, Recording
 from grader.spec.unit import format_duration
 
 _LOG_LINES = 5
-# Share of the time that the host may take before silence says nothing any more.
+# Share of the time that the host may take before a missing line proves nothing.
 _STARVED = 0.5
 # What a subscription must request for the messages from before it was there.
 _KEEPS = ("transient_local", "unknown")

@@ -26,7 +26,7 @@ from grader.spec.unit import format_duration
 from grader.submission.record import SourceError
 
 _LOG_LINES = 5
-# Share of the observation that the host may take before silence says nothing any more.
+# Share of the observation that the host may take before a missing message proves nothing.
 _STARVED = 0.5
 # Without what the host took: in so long a node answers what it was asked.
 _OWN_S = 2.0

@@ -22,7 +22,7 @@ _SHARED = {
     "OPENBLAS_NUM_THREADS": "1",
 }
 _HOST_NETWORK = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-# Shared memory does not reach from one sandbox into another, and nobody says so: publishers are
+# Shared memory does not reach from one sandbox into another, and no error says so: publishers are
 # seen, and their messages lost. LOCALHOST would switch it on again; there is only `lo` anyway.
 _OWN_NETWORK = {
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",

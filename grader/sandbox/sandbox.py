@@ -114,7 +114,7 @@ class Sandbox:
                     self._tree = None
             raise GraderFault(
                 f"files of the students' Python were deleted in {tree.path.parent}, perhaps by "
-                "somebody who tidied up; grade again, and they are made anew"
+                "a clean-up; grade again, and they are made again"
             )
 
         return check

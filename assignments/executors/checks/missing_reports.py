@@ -1,4 +1,4 @@
-"""Why callbacks that should report on a topic cannot be judged: nobody reports, or otherwise."""
+"""Why callbacks that should report on a topic cannot be judged: no node reports, or reports otherwise."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from typing import Any, TextIO, TypeVar, cast
 
 from grader.errors import GraderFault
 
-# Nobody wants to know the rest: `| head`, and a terminal that was closed.
+# The rest is not wanted: `| head`, and a terminal that was closed.
 _UNREAD = frozenset({errno.EPIPE, errno.EIO})
 
 _Answer = TypeVar("_Answer")
@@ -55,7 +55,7 @@ class _Lasting:
 
 @contextmanager
 def lasting_streams() -> Iterator[None]:
-    """Let the block go on, and end with its own status, whoever reads what it writes."""
+    """Let the block go on and end with its own status, also when its output is no longer read."""
     output = _Lasting(sys.stdout)
     sys.stdout = cast("TextIO", output)
     sys.stderr = cast("TextIO", _Lasting(sys.stderr))

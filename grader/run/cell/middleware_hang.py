@@ -19,7 +19,7 @@ from grader.run.order import CellOrder
 from grader.submission.record import SubmissionRecord
 
 ENDED_BY = signal.SIGALRM
-"""What a cell is ended with that stalls. Nobody else sends it, unlike SIGKILL."""
+"""The signal that ends a cell whose middleware hangs. Unlike SIGKILL, only rosgrade sends it."""
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 # As the names of Fast DDS' threads begin.
 _MIDDLEWARE = b"(dds."
