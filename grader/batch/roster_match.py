@@ -87,7 +87,7 @@ def matched(
 ) -> list[HandedIn]:
     """Give each entry to the student of the roster that it names.
 
-    A name that is only similar is not matched. Both rows, of the submission and of the student, say so.
+    A name that is only similar is not matched; the rows of submission and student say so.
     """
     names = _Names(roster.students, entries)
     if names.prefix:
