@@ -7,10 +7,12 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
 from grader.run.admission import Admission
+from grader.run.host import load
 from grader.run.host.load import Load, cpu_count
 
 LIMIT_S = 10.0
@@ -114,6 +116,43 @@ def test_a_machine_without_cpu_or_memory_to_spare_takes_one_cell_for_each_cpu(
 
 def test_the_free_memory_is_a_share() -> None:
     assert 0.0 < Load().free_memory() < 1.0
+
+
+@pytest.mark.parametrize(
+    ("group", "limit", "taken", "spare"),
+    [
+        ("0::/", "memory.max", "memory.current", "inactive_file"),
+        ("0::/machine/box", "memory.max", "memory.current", "inactive_file"),
+        (
+            "0::/\n4:cpu,memory:/box",
+            "memory/memory.limit_in_bytes",
+            "memory/memory.usage_in_bytes",
+            "total_inactive_file",
+        ),
+    ],
+)
+def test_a_container_may_have_less_memory_than_the_machine(
+    group: str,
+    limit: str,
+    taken: str,
+    spare: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(load, "_MEMINFO", tmp_path / "meminfo")
+    monkeypatch.setattr(load, "_GROUPS", tmp_path / "groups")
+    monkeypatch.setattr(load, "_GROUP_FOLDERS", tmp_path)
+    (tmp_path / "meminfo").write_text("MemTotal: 1000000 kB\nMemAvailable: 900000 kB\n")
+    (tmp_path / "groups").write_text(group)
+    (tmp_path / limit).parent.mkdir(exist_ok=True)
+    (tmp_path / limit).with_name("memory.stat").write_text(f"anon 1\n{spare} 20000\n")
+    (tmp_path / taken).write_text("110000\n")
+    (tmp_path / limit).write_text("100000\n")
+    assert Load().free_memory() == pytest.approx(0.1)
+    # As much as there is, or any amount.
+    for unlimited in ("max", str(2**63 - 4096)):
+        (tmp_path / limit).write_text(f"{unlimited}\n")
+        assert Load().free_memory() == pytest.approx(0.9)
 
 
 def test_the_load_counts_threads_of_the_whole_machine() -> None:

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import re
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 _STAT = Path("/proc/stat")
 _MEMINFO = Path("/proc/meminfo")
+_GROUPS = Path("/proc/self/cgroup")
+_GROUP_FOLDERS = Path("/sys/fs/cgroup")
+_GROUP_FILES = (
+    ("memory.max", "memory.current", "inactive_file"),
+    ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
+)
+"""Of cgroup v2 and v1: limit, use, and the line of memory.stat that says what is only cached."""
 _SAMPLE_S = 0.04
 _MEMORY_S = 0.4
 
@@ -38,6 +47,30 @@ class Load:
         return self._average
 
     def free_memory(self) -> float:
-        """Share of the memory that a program can still get without swapping: proc_meminfo(5)."""
+        """Share of the memory that a program can still get without swapping: proc_meminfo(5).
+
+        Or what is left of the limit of a container, as Gradescope sets one: cgroups(7).
+        """
         sizes = dict(re.findall(r"^(\w+): +(\d+) kB$", _MEMINFO.read_text(), re.MULTILINE))
-        return int(sizes["MemAvailable"]) / int(sizes["MemTotal"])
+        shares = [int(sizes["MemAvailable"]) / int(sizes["MemTotal"])]
+        for group in _groups():
+            for limit, used, spare in _GROUP_FILES:
+                # Most groups have no limit, and a group of v1 has no file of v2.
+                with contextlib.suppress(OSError, ValueError, IndexError):
+                    most = int((group / limit).read_text())
+                    cached = re.findall(
+                        rf"^{spare} (\d+)$", (group / "memory.stat").read_text(), re.M
+                    )
+                    taken = int((group / used).read_text()) - int(cached[0])
+                    if most < 1024 * int(sizes["MemTotal"]):
+                        shares.append(1.0 - taken / most)
+        return min(shares)
+
+
+def _groups() -> Iterator[Path]:
+    """Folders of the groups of this process, outwards; a container may see its own as the root."""
+    for controllers, path in re.findall(r"^\d+:(.*?):(.*)$", _GROUPS.read_text(), re.MULTILINE):
+        if not controllers or "memory" in controllers.split(","):
+            root = _GROUP_FOLDERS / ("memory" if controllers else "")
+            folder = root / path.lstrip("/")
+            yield from (folder, *folder.parents)[: -len(root.parents)]
