@@ -5,17 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 from grader.assignment.stimuli.message import Find, StimulusError
 from grader.spec.document import Place
 from grader.spec.nearest_name import nearest_or_all
 from grader.spec.source import Model
 
-if TYPE_CHECKING:
-    from grader.assignment.model import Scenario
-
 S = TypeVar("S", bound="StimulusModel")
+
+
+class ScenarioOfStimuli(Protocol):
+    """What a stimulus looks at in its scenario, to say what does not fit."""
+
+    @property
+    def stimuli(self) -> Sequence[StimulusModel]:
+        """All stimuli, itself among them."""
+
+    @property
+    def recorded_types(self) -> Mapping[str, str]:
+        """Types of the recorded topics, by topic."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +87,7 @@ class StimulusModel(Model):
         """
         raise NotImplementedError
 
-    def mistakes(self, making: Making, scenario: Scenario) -> Iterator[tuple[Place, str]]:
+    def mistakes(self, making: Making, scenario: ScenarioOfStimuli) -> Iterator[tuple[Place, str]]:
         """What does not fit, as far as it shows without a run: its order cannot be made."""
         try:
             self.order(making)

@@ -134,9 +134,8 @@ def _patch_multiprocessing(module: Any) -> None:
 
 
 def _patch_rclpy(module: Any) -> None:
-    import rosgrade_rclpy  # type: ignore[import-not-found]
-
-    rosgrade_rclpy.PATCHES[module.__name__](module)
+    # By name: it stands on this module.
+    __import__("rosgrade_rclpy").PATCHES[module.__name__](module)
 
 
 _PATCHES = {

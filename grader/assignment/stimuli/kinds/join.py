@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import Field
 
-from grader.assignment.stimuli.stimulus_model import Making, StimulusModel, kind
+from grader.assignment.stimuli.stimulus_model import (
+    Making,
+    ScenarioOfStimuli,
+    StimulusModel,
+    kind,
+)
 from grader.spec.document import Place
 from grader.spec.name import Durability, Id, InterfaceName, Reliability, TopicName
 from grader.spec.quantity import DurationOrZero
-
-if TYPE_CHECKING:
-    from grader.assignment.model import Scenario
 
 
 @kind
@@ -44,7 +46,7 @@ class Join(StimulusModel):
         same = self.model_dump(include={"name", "type", "reliability", "durability", "depth"})
         return {"kind": "JoinOrder", "topic": self.join, "after_s": self.after, **same}
 
-    def mistakes(self, making: Making, scenario: Scenario) -> Iterator[tuple[Place, str]]:
+    def mistakes(self, making: Making, scenario: ScenarioOfStimuli) -> Iterator[tuple[Place, str]]:
         """Its name is another's, or it would hear the probe itself."""
         alike = [one for one in scenario.stimuli if isinstance(one, Join) and one.name == self.name]
         if alike[0] is not self:

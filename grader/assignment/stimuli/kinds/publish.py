@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import Field, model_validator
 
@@ -14,14 +14,16 @@ from grader.assignment.stimuli.stimulus_messages import (
     from_file,
     from_function,
 )
-from grader.assignment.stimuli.stimulus_model import Making, StimulusModel, kind
+from grader.assignment.stimuli.stimulus_model import (
+    Making,
+    ScenarioOfStimuli,
+    StimulusModel,
+    kind,
+)
 from grader.spec.document import Place
 from grader.spec.name import Durability, InterfaceName, Reliability, TopicName
 from grader.spec.nearest_name import did_you_mean
 from grader.spec.quantity import Duration, DurationOrZero
-
-if TYPE_CHECKING:
-    from grader.assignment.model import Scenario
 
 MOST_MESSAGES = 10_000
 
@@ -169,7 +171,7 @@ class Publish(StimulusModel):
             return from_function(self.python, making.folder, making.seed)
         return [Given(value, ("messages", index)) for index, value in enumerate(self.messages)]
 
-    def mistakes(self, making: Making, scenario: Scenario) -> Iterator[tuple[Place, str]]:
+    def mistakes(self, making: Making, scenario: ScenarioOfStimuli) -> Iterator[tuple[Place, str]]:
         """Its topic or its messages do not fit."""
         recorded = scenario.recorded_types
         if self.publish in recorded:
