@@ -23,11 +23,11 @@ from grader import resources
 from grader.assignment import model, mutant
 from grader.assignment.own_check import FOLDER, lesson_checks
 from grader.assignment.stimuli.stimulus import stimulus_models
-from grader.checks import finding
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.checks.tolerance import TimeTolerance
 from grader.diagnosis.explanation import explanations
+from grader.findings import finding
 from grader.recording import event, interaction, simulated
 from grader.recording import model as recording
 from grader.spec.unit import UNITS, Dimension, format_duration

@@ -17,8 +17,8 @@ from grader.assignment.binding import BoundCheck
 from grader.assignment.model import Assignment
 from grader.assignment.stimuli.message import Find, part_of
 from grader.checks.check import NamedFields
-from grader.checks.value import NoSuchField, expected_leaves, tolerance_of, unreachable, value_at
 from grader.errors import GraderFault, Problem
+from grader.findings.value import NoSuchField, expected_leaves, tolerance_of, unreachable, value_at
 from grader.recording.interface import FLOATS, TEXTS, fields_of
 from grader.spec.document import Place
 from grader.spec.name import INTERFACE

@@ -16,8 +16,8 @@ from pydantic import AfterValidator, Field
 
 from grader import resources
 from grader.assignment.model import Assignment
-from grader.checks.finding import Status
 from grader.errors import AssignmentError, Problem, UsageError
+from grader.findings.finding import Status
 from grader.spec.document import Place
 from grader.spec.name import Id
 from grader.spec.nearest_name import nearest_or_all

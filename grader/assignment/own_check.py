@@ -32,7 +32,7 @@ from pydantic.errors import PydanticUserError
 from grader import resources
 from grader.checks.catalogue import CATALOGUE, gather
 from grader.checks.check import Check, Parameters, Subject
-from grader.checks.finding import Finding
+from grader.findings.finding import Finding
 from grader.spec.nearest_name import did_you_mean, nearest_or_all
 
 FOLDER = "checks"

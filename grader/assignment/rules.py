@@ -25,8 +25,8 @@ from grader.assignment.stimuli.kinds.request import (
 )
 from grader.checks import need as needs
 from grader.checks.check import Subject
-from grader.checks.value import same_value
 from grader.errors import GraderFault, Problem
+from grader.findings.value import same_value
 from grader.spec.document import Place
 from grader.spec.nearest_name import did_you_mean, nearest_or_all
 from grader.spec.source import Source

@@ -14,9 +14,9 @@ from grader.batch.batch import Done
 from grader.batch.files import REPORT_FILE, RESULT_FILE, write_report
 from grader.batch.ledger import BATCH_FILE, Entry, Ledger
 from grader.batch.regrading import find, regrade, regrade_command, stored_assignment
-from grader.checks.finding import Status
-from grader.checks.wording import listing
 from grader.errors import UsageError
+from grader.findings.finding import Status
+from grader.findings.wording import listing
 from grader.grade import Grade
 from grader.report.files import write_whole
 from grader.report.formats.gradebook import grades_csv

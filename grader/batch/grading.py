@@ -13,8 +13,8 @@ from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import BuildLimitOptions
 from grader.batch.reference_run import read_references
 from grader.batch.type_support import TypeSupport
-from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError, machine_fault
+from grader.findings.finding import Status
 from grader.grade import Grade, grade
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording, to_json

@@ -16,8 +16,8 @@ from typing import Any
 
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Scenario
-from grader.checks.wording import counted
 from grader.errors import AssignmentError, Problem, UsageError
+from grader.findings.wording import counted
 from grader.grade import Grade
 from grader.recording.model import Recording
 from grader.report.files import write_whole

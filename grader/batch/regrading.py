@@ -13,8 +13,8 @@ from grader.assignment.selection import visible_part
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.batch.reference_run import read_references
-from grader.checks.finding import Status
 from grader.errors import UsageError
+from grader.findings.finding import Status
 from grader.grade import Grade, grade
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording

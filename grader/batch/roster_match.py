@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 
 from grader.batch.handed_in import Entry, HandedIn, row_of, stem_of, with_problem
 from grader.batch.roster import Roster, Student, name_forms, resemblance, written
-from grader.checks.wording import listing
+from grader.findings.wording import listing
 from grader.submission.intake.paths import shown
 
 # No name of a repository has so many in earnest.

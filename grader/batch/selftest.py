@@ -26,7 +26,7 @@ from grader.assignment.mutant import (
     verdict,
 )
 from grader.batch.grading import Graded, Grading
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.grade.model import Grade
 from grader.report.model.facts import RunFacts
 from grader.report.model.grade_part import grade_json

@@ -9,9 +9,9 @@ from enum import Enum
 from functools import wraps
 from typing import Any, ClassVar, Protocol
 
-from grader.checks.finding import Finding
 from grader.checks.need import Doubt, Need
-from grader.checks.value import EXACT, NoSuchField, Tolerance
+from grader.findings.finding import Finding
+from grader.findings.value import EXACT, NoSuchField, Tolerance
 from grader.spec.source import Model
 
 
@@ -132,3 +132,17 @@ def check(
         return Check(name, subject, parameters, judged)
 
     return decorate
+
+
+def toleranced(
+    key: str,
+    endpoint: str,
+    fields: Mapping[str, Any],
+    tolerance: Tolerance = EXACT,
+    *,
+    part: int = 0,
+) -> Iterator[NamedFields]:
+    """The fields below one key of ``with``, and those that have a tolerance of their own."""
+    yield NamedFields((key,), endpoint, fields, part, tolerance)
+    for path in tolerance if isinstance(tolerance, Mapping) else ():
+        yield NamedFields(("tolerance", path), endpoint, path, part)

@@ -12,8 +12,6 @@ from grader.recording.model import NS, Recording
 _STALL_S = 0.1
 _STALL_WINDOW_NS = NS // 2
 _HELD_UP_S = 0.1
-# What is announced is announced again and again.
-_LOST_S = 0.5
 
 
 def is_doubtful(recording: Recording, doubt: Doubt | None) -> bool:
@@ -52,8 +50,3 @@ def _did_not_meet(recording: Recording) -> bool:
         goal.answered_ns is None for goal in recording.goals
     )
     return silent and recording.stolen_s(recording.launched_ns, recording.stop_ns) > _HELD_UP_S
-
-
-def was_held_up(recording: Recording) -> bool:
-    """Whether the machine was so busy that discovery may have lost what a node announces."""
-    return recording.stolen_s(recording.launched_ns, recording.stop_ns) > _LOST_S

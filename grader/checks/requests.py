@@ -7,26 +7,22 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from grader.checks.check import stop_if
-from grader.checks.fields import (
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.no_endpoint import SERVICE, Word, why_not_met, why_not_offered
+from grader.diagnosis.process.process_exit import why_ended
+from grader.findings.fields import (
     difference_table,
     difference_words,
     fields_hint,
     unlike,
     words,
 )
-from grader.checks.finding import Evidence, Moment, Table
-from grader.checks.value import EXACT, Tolerance
-from grader.checks.wording import code
-from grader.diagnosis.cause import Cause
-from grader.diagnosis.no_answer import why_taken, why_unanswered
-from grader.diagnosis.no_endpoint import SERVICE, Word, why_not_met, why_not_offered
-from grader.diagnosis.process.process_exit import why_ended
-from grader.recording.interaction import Goal
-from grader.recording.model import NS, Call, Recording
-from grader.spec.unit import format_duration
+from grader.findings.finding import Evidence, Moment, Table
+from grader.findings.value import EXACT, Tolerance
+from grader.findings.wording import code
+from grader.recording.interaction import NO_SERVER, Goal
+from grader.recording.model import Call, Recording
 
-NO_SERVER = "no server"
-"""Error of a request to a server that was not there."""
 _MOST_ROWS, _MOST_MOMENTS = 50, 8
 
 Request = TypeVar("Request", Call, Goal)
@@ -71,32 +67,6 @@ def _sent_ns(one: Call | Goal) -> int:
     return one.sent_ns if isinstance(one, Goal) else one.requested_ns
 
 
-def why_late(
-    recording: Recording,
-    kind: Word,
-    name: str,
-    asked_ns: int,
-    answered_ns: int | None,
-    within_s: float,
-    seen: str,
-    hint: str,
-    evidence: Evidence,
-) -> Cause | None:
-    """Why an answer did not come in time, or None if it did.
-
-    Args:
-        seen: What did not happen, such as ``the call was not answered``.
-    """
-    if answered_ns is None:
-        return why_unanswered(recording, seen, kind, name, asked_ns, within_s)
-    took_s = (answered_ns - asked_ns) / NS
-    if took_s <= within_s:
-        return None
-    seen = f"{seen} for {format_duration(took_s)}"
-    taken = why_taken(recording, seen, asked_ns, answered_ns, within_s)
-    return taken or Cause(seen, hint, evidence)
-
-
 def why_other_fields(
     seen: str,
     part: str,
@@ -119,11 +89,6 @@ def why_other_fields(
         hint or fields_hint(part, value or {}, [item.field for item in found]),
         replace(evidence, tables=(difference_table(part.capitalize(), found), *evidence.tables)),
     )
-
-
-def the_goal(goal: Goal) -> str:
-    """A goal in words."""
-    return f"the goal ({words(goal.goal)})"
 
 
 def timeline(recording: Recording, title: str, steps: Iterable[tuple[int, str]]) -> Evidence:

@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from grader.checks.wording import counted
 from grader.cli.screen.console import output_console, print_error, print_warning
 from grader.errors import RosgradeError
+from grader.findings.wording import counted
 
 
 class Document(str, Enum):

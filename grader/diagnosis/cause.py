@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from grader.checks.finding import Evidence, Finding
+from grader.findings.finding import Evidence, Finding
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from grader.checks.finding import Evidence, Moment
-from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.process.process_exit import ended_early, exited
+from grader.findings.finding import Evidence, Moment
+from grader.findings.wording import code
 from grader.measure import declarations
 from grader.recording.interaction import Service
 from grader.recording.model import Endpoint, Kind, Recording

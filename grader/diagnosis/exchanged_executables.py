@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 
-from grader.checks.finding import Evidence
-from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
+from grader.findings.finding import Evidence
+from grader.findings.wording import code
 from grader.recording.model import Recording
 from grader.submission.record import PackageRecord, SourceError
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from grader.checks.finding import Evidence, Moment
-from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_destroyed
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
@@ -19,6 +17,8 @@ from grader.diagnosis.process.raised import (
     parse_failures,
     student_place,
 )
+from grader.findings.finding import Evidence, Moment
+from grader.findings.wording import code
 from grader.measure import declarations
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
@@ -83,6 +83,32 @@ class NoAnswer(Symptom[Cause]):
         when_s = self.recording.since_launch_s(self.asked_ns)
         moment = Moment("asked, not answered in time", when_s)
         return Evidence(moments=(moment,), places=(self.place,) if self.place else ())
+
+
+def why_late(
+    recording: Recording,
+    kind: Word,
+    name: str,
+    asked_ns: int,
+    answered_ns: int | None,
+    within_s: float,
+    seen: str,
+    hint: str,
+    evidence: Evidence,
+) -> Cause | None:
+    """Why an answer did not come in time, or None if it did.
+
+    Args:
+        seen: What did not happen, such as ``the call was not answered``.
+    """
+    if answered_ns is None:
+        return why_unanswered(recording, seen, kind, name, asked_ns, within_s)
+    took_s = (answered_ns - asked_ns) / NS
+    if took_s <= within_s:
+        return None
+    seen = f"{seen} for {format_duration(took_s)}"
+    taken = why_taken(recording, seen, asked_ns, answered_ns, within_s)
+    return taken or Cause(seen, hint, evidence)
 
 
 def why_unanswered(

@@ -5,9 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from grader.checks.finding import Evidence, Finding, Moment, Table
-from grader.checks.first_seen import nodes_seen
-from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_destroyed
 from grader.diagnosis.exchanged_executables import why_exchanged
@@ -15,6 +12,9 @@ from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import crashed, why_crashed
 from grader.diagnosis.undeclared import why_never_appeared
+from grader.findings.finding import Evidence, Finding, Moment, Table
+from grader.findings.first_seen import nodes_seen
+from grader.findings.wording import code, codes
 from grader.measure import declarations
 from grader.recording.interaction import Service
 from grader.recording.model import Kind, Owner, Recording

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.checks.finding import Evidence
-from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.not_built import existing_package, why_not_built
+from grader.findings.finding import Evidence
+from grader.findings.wording import code, codes
 from grader.spec.nearest_name import nearest
 from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from grader.checks.finding import Evidence, Moment
-from grader.checks.first_seen import endpoints_seen, first_seen
-from grader.checks.wording import code, counted, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_messages import why_not_delivered
 from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spun, why_slow
 from grader.diagnosis.process.process_exit import why_ended
+from grader.findings.finding import Evidence, Moment
+from grader.findings.first_seen import endpoints_seen, first_seen
+from grader.findings.wording import code, counted, listing
 from grader.measure.printed import (
     Echo,
     Wanted,

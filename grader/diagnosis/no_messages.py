@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from grader.checks.doubt import was_held_up
-from grader.checks.finding import Evidence, Moment
-from grader.checks.first_seen import endpoints_seen, first_seen
-from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unpublished, why_unsubscribed
 from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.process.process_exit import why_ended
+from grader.findings.finding import Evidence, Moment
+from grader.findings.first_seen import endpoints_seen, first_seen
+from grader.findings.wording import code, codes, counted
 from grader.measure import compatibility
+from grader.measure.declarations import was_held_up
 from grader.recording.model import NS, Endpoint, Kind, Owner, Recording
 from grader.spec.unit import format_duration
 

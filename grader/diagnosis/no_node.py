@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.checks.finding import Evidence
-from grader.checks.first_seen import nodes_seen, until_the_end
-from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.exchanged_executables import why_exchanged
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
@@ -14,6 +11,9 @@ from grader.diagnosis.not_built import why_not_built
 from grader.diagnosis.process.process_exit import why_crashed, why_ended
 from grader.diagnosis.process.raised import in_brackets, interrupted_place
 from grader.diagnosis.undeclared import why_never_appeared
+from grader.findings.finding import Evidence
+from grader.findings.first_seen import nodes_seen, until_the_end
+from grader.findings.wording import code, codes
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.spec.nearest_name import nearest

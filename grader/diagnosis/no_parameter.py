@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from grader.checks.finding import Evidence, Moment
-from grader.checks.requests import NO_SERVER, why_late
-from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.no_answer import why_unanswered
+from grader.diagnosis.no_answer import why_late, why_unanswered
 from grader.diagnosis.no_endpoint import SERVICE
 from grader.diagnosis.no_node import why_not_node
 from grader.diagnosis.process.process_exit import why_ended
+from grader.findings.finding import Evidence, Moment
+from grader.findings.wording import code, codes
 from grader.measure.parameter_calls import calls_to, descriptor, names
+from grader.recording.interaction import NO_SERVER
 from grader.recording.model import Call, Recording
 from grader.spec.nearest_name import nearest
 

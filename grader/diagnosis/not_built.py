@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
-from grader.checks.finding import Evidence
-from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.findings.finding import Evidence
+from grader.findings.wording import code, codes
 from grader.spec.nearest_name import nearest
 from grader.submission.build.build_log import modules_not_found, not_found
 from grader.submission.build.toolchain import TOOLS

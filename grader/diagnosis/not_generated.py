@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import PurePosixPath
 
-from grader.checks.finding import Evidence
-from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
 from grader.diagnosis.not_built import existing_package, why_no_package, why_not_built
+from grader.findings.finding import Evidence
+from grader.findings.wording import code, codes
 from grader.recording.interface import DefinitionError, sections_of
 from grader.spec.nearest_name import nearest
 from grader.submission.read.cmake import CMakeCommand, read_commands

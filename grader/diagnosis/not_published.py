@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from grader.checks.finding import Evidence, Moment
-from grader.checks.first_seen import until_the_end
-from grader.checks.wording import code, counted, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import explanation
 from grader.diagnosis.no_answer import why_raised
@@ -20,6 +17,9 @@ from grader.diagnosis.no_messages import (
 )
 from grader.diagnosis.process.blocked_executor import left_s, why_blocked, why_never_spun
 from grader.diagnosis.process.raised import interrupted_place
+from grader.findings.finding import Evidence, Moment
+from grader.findings.first_seen import until_the_end
+from grader.findings.wording import code, counted, listing
 from grader.measure import declarations
 from grader.recording.model import NS, Kind, Recording
 from grader.spec.unit import format_duration

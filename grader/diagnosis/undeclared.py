@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from grader.checks.doubt import was_held_up
-from grader.checks.finding import Evidence, Moment
 from grader.diagnosis.cause import Cause
+from grader.findings.finding import Evidence, Moment
 from grader.measure import declarations
+from grader.measure.declarations import was_held_up
 from grader.recording.model import Recording
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.checks.finding import Evidence
-from grader.checks.requests import the_goal, why_late
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.no_answer import why_one_cpu, why_raised, why_taken, why_unanswered
+from grader.diagnosis.no_answer import why_late, why_one_cpu, why_raised, why_taken, why_unanswered
 from grader.diagnosis.no_endpoint import ACTION
 from grader.diagnosis.process.process_exit import why_ended
+from grader.findings.fields import the_goal
+from grader.findings.finding import Evidence
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
 from grader.spec.unit import format_duration

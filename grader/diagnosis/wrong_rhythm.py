@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from statistics import mean
 
-from grader.checks.finding import Evidence, Moment
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, explanation
 from grader.diagnosis.process.blocked_executor import left_s, long_wait
 from grader.diagnosis.process.process_exit import why_ended
+from grader.findings.finding import Evidence, Moment
 from grader.measure import declarations
 from grader.measure.period import Interval, PeriodLimits, PeriodVerdict
 from grader.recording.model import NS, Kind, Recording

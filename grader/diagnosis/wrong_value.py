@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from itertools import combinations, pairwise, product
 from typing import Any
 
-from grader.checks.value import Difference, same
-from grader.checks.wording import value_text
 from grader.diagnosis.explanation import Symptom, explanation
+from grader.findings.value import Difference, same
+from grader.findings.wording import value_text
 
 # How many times too large -> what that is. People type 57.3 and 3.14: three digits must do.
 _FACTORS = {

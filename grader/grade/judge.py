@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 from grader.assignment.model import CheckSpec
 from grader.checks.check import Subject
 from grader.checks.doubt import is_doubtful
-from grader.checks.finding import Finding, Status
 from grader.diagnosis.not_built import why_lacking, why_not_built
+from grader.findings.finding import Finding, Status
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
 from grader.grade.runtime_imports import with_runtime_imports
 from grader.recording.model import Ending, Recording

@@ -8,7 +8,7 @@ from decimal import ROUND_HALF_UP, Decimal
 from typing import Any
 
 from grader.assignment.model import NOTHING_WITHHELD, Assignment, Visibility, Withheld
-from grader.checks.finding import Finding, Status
+from grader.findings.finding import Finding, Status
 from grader.submission.record import SubmissionRecord
 
 STEP = Decimal("0.01")

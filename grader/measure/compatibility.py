@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.checks.finding import Table
+from grader.findings.finding import Table
 from grader.recording.model import Kind, Qos
 from grader.spec.unit import format_duration
 

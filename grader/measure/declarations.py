@@ -15,6 +15,9 @@ from typing import Any
 from grader.measure.compatibility import STRENGTH
 from grader.recording.model import Declaration, Kind, Process, Qos, Recording
 
+# What is announced is announced again and again.
+_LOST_S = 0.5
+
 
 @dataclass(frozen=True)
 class DeclaredTimer:
@@ -203,3 +206,8 @@ def _number(data: Mapping[str, Any], key: str) -> float | None:
 def _text(data: Mapping[str, Any], key: str) -> str | None:
     value = data.get(key)
     return value if isinstance(value, str) else None
+
+
+def was_held_up(recording: Recording) -> bool:
+    """Whether the machine was so busy that discovery may have lost what a node announces."""
+    return recording.stolen_s(recording.launched_ns, recording.stop_ns) > _LOST_S

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from grader.checks.value import number_at
-from grader.checks.wording import code
+from grader.findings.value import number_at
+from grader.findings.wording import code
 from grader.recording.model import NS, LogLine, Message, Recording
 
 _NUMBER = re.compile(

@@ -9,6 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+NO_SERVER = "no server"
+"""Error of a request to a server that was not there."""
+
 EXECUTOR_SERVICES = {
     "list_parameters": "rcl_interfaces/srv/ListParameters",
     "get_type_description": "type_description_interfaces/srv/GetTypeDescription",

@@ -11,9 +11,9 @@ import pytest
 from grader.assignment.load import load_assignment
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, NoParameters, Parameters, Subject
-from grader.checks.finding import Finding
 from grader.checks.need import Recorded, Submitted
 from grader.errors import AssignmentError, GraderFault
+from grader.findings.finding import Finding
 from grader.ros import RosInstallation
 from grader.spec.name import InterfaceName, TopicName
 from grader.spec.quantity import Duration

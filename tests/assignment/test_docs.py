@@ -11,7 +11,7 @@ import pytest
 from grader import docs, resources
 from grader.assignment.own_check import all_checks, load_own_check
 from grader.checks.check import Check
-from grader.checks.finding import Evidence, Finding
+from grader.findings.finding import Evidence, Finding
 from grader.recording.interaction import Goal
 from grader.recording.model import Endpoint, Message, Recording
 from grader.recording.simulated import Scene, Truth

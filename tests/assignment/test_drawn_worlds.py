@@ -13,7 +13,7 @@ from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.model import Scenario
 from grader.assignment.random_values import draw_values, fill_in, world_values
 from grader.assignment.simulation import read_scenario_world
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.recording.model import Recording
 from sim.description import SimulatorOptions
 from sim.motion import Pose, relative, wrap_angle

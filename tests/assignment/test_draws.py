@@ -24,7 +24,7 @@ from grader.assignment.load import load_assignment
 from grader.assignment.own_check import load_function
 from grader.assignment.random_values import draw_values, world_values
 from grader.assignment.simulation import read_scenario_world
-from grader.checks.value import value_at
+from grader.findings.value import value_at
 from grader.measure.printed import shows
 from sim.lidar import Lidar
 

@@ -17,7 +17,7 @@ Write = Callable[..., Path]
 TEXTS = 'PASSED = "it is there"\n'
 MINE = '''\
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.finding import Finding
+from grader.findings.finding import Finding
 from grader.checks.need import Recorded
 from grader.spec.name import TopicName
 

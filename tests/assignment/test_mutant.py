@@ -14,7 +14,7 @@ from grader.assignment.mutant import (
     mutate,
     verdict,
 )
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 
 FILES = {
     "bot/setup.py": b"name = 'bot'\n",

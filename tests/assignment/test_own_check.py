@@ -10,8 +10,8 @@ import pytest
 
 from grader.assignment.load import load_assignment
 from grader.checks.check import Subject
-from grader.checks.finding import Status
 from grader.errors import AssignmentError
+from grader.findings.finding import Status
 from tests.assignment.lessons import HEAD
 
 Write = Callable[..., Path]
@@ -22,7 +22,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from grader.spec.quantity import Duration
-from grader.checks.finding import Finding
+from grader.findings.finding import Finding
 
 
 @dataclass

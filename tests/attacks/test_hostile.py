@@ -23,7 +23,7 @@ from grader.batch.files import REPORT_FILE
 from grader.batch.grading import Grading
 from grader.batch.intake import take_in
 from grader.batch.ledger import Ledger
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.report.model.grade_part import grade_json
 from grader.report.model.result import result_json
 from grader.report.model.result_model import Result

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from grader.batch.grading import Grading
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from tests.attacks.conftest import Targets
 from tests.attacks.submissions import write_submission
 from tests.submission.samples import MANIFEST

@@ -22,8 +22,8 @@ from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
 from grader.batch.handed_in import HandedIn
 from grader.batch.intake import take_in
 from grader.batch.ledger import Entry, Ledger
-from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
+from grader.findings.finding import Status
 from grader.report.model.result import make_result
 from grader.run.runner import Runner
 from tests.report.sample import not_graded

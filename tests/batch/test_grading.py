@@ -24,8 +24,8 @@ from grader.batch.grading import Graded, Grading
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import compare, find, regrade
 from grader.batch.selftest import Role, Trial, mutation_score, run_trial
-from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
+from grader.findings.finding import Status
 from grader.recording.event import Disturbance
 from grader.recording.mcap_writer import write_recording
 from grader.recording.model import Ending, Endpoint, Kind, Node, Owner, Qos, Recording

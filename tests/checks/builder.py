@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from grader.assignment.own_check import all_checks
-from grader.checks.finding import Finding, Status
+from grader.findings.finding import Finding, Status
 from grader.recording.event import Disturbance
 from grader.recording.model import (
     NS,

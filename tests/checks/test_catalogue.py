@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from grader import checks
 from grader.checks.catalogue import CATALOGUE, gather
 from grader.checks.check import Check, Subject
-from grader.checks.finding import Finding, Status
+from grader.findings.finding import Finding, Status
 from grader.recording.model import (
     Call,
     Declaration,

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.grade.runtime_imports import with_runtime_imports
 from grader.submission.record import Dependency, Import, SourceError
 from tests.checks.builder import (

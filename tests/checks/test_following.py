@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from grader.checks.finding import Status
 from grader.checks.messages.derived_messages import yaw
+from grader.findings.finding import Status
 from grader.recording.model import Recording
 from tests.checks.builder import (
     endpoint,

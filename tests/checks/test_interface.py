@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from grader.checks.finding import Finding, Status
+from grader.findings.finding import Finding, Status
 from grader.submission.record import BuildRecord, Definition, Dependency, PackageRecord
 from tests.checks.builder import failing, judge, package, submission
 

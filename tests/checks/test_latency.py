@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.checks.finding import Status
 from grader.checks.timing.latency import answers_to
+from grader.findings.finding import Status
 from grader.recording.model import Kind
 from tests.checks.builder import (
     endpoint,

@@ -3,8 +3,8 @@
 import itertools
 from dataclasses import replace
 
-from grader.checks.finding import Status
 from grader.checks.log.log_content import logged
+from grader.findings.finding import Status
 from grader.recording.model import Ending
 from tests.checks.builder import (
     at,

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from assignments.p_controller.checks.control_law import examine
 from grader.assignment.load import load_assignment
-from grader.checks.finding import Status
 from grader.diagnosis.motion.misread_yaw import misread_yaw
+from grader.findings.finding import Status
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.steering import Sample
 from sim.motion import Pose

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.recording.model import Kind, Owner, Qos
 from grader.recording.simulated import Incident
 from tests.checks.builder import (

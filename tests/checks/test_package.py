@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.submission.record import BuildRecord, Dependency, SourceError
 from tests.checks.builder import failing, judge, package, submission
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.recording.model import Kind, Qos
 from tests.checks.builder import (
     RELIABLE,

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from tests.checks.builder import (
     died,
     every,

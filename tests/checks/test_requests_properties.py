@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from grader.checks.catalogue import CATALOGUE
-from grader.checks.finding import Finding, Status
+from grader.findings.finding import Finding, Status
 from grader.recording.event import Disturbance
 from grader.recording.interaction import Feedback, Goal, Service
 from grader.recording.model import Call, LogLine

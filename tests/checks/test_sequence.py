@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from tests.checks.builder import failing, judge, message, recording
 
 INT = "std_msgs/msg/Int64"

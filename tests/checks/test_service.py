@@ -2,7 +2,7 @@
 
 import pytest
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.recording.model import Ending
 from tests.checks.builder import (
     NODE,

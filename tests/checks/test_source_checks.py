@@ -4,7 +4,7 @@ import ast
 
 import pytest
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.submission.read.outline import outline
 from grader.submission.record import Lint, LintFinding, SourceError
 from tests.checks.builder import failing, judge, package, submission

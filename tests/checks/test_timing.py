@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.recording.event import Disturbance
 from grader.recording.model import NS
 from tests.checks.builder import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.checks.finding import Finding, Status
+from grader.findings.finding import Finding, Status
 from grader.recording.model import Ending
 from tests.checks.builder import SOURCE, died, judge, nodeless, output, text, traceback
 

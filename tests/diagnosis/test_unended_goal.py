@@ -2,7 +2,7 @@
 
 import pytest
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from tests.checks.builder import at, declared, failing, judge, taken
 from tests.checks.requests import acting, canceled
 

@@ -68,7 +68,7 @@ def test_a_new_check_is_listed_validated_and_judges(copy: Path) -> None:
     assert "valid" in rosgrade(copy, "validate", str(folder))
     python(
         copy,
-        "from grader.checks.finding import Status\n"
+        "from grader.findings.finding import Status\n"
         "from tests.checks.builder import every, judge, messages, recording\n"
         "sent = recording(messages=messages(every(0.3, 5)))\n"
         "asked = {'topic': '/cmd_vel', 'field': 'linear.x'}\n"

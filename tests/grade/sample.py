@@ -11,7 +11,7 @@ from grader.assignment.binding import BoundCheck
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Assignment, CheckSpec, Launch, Package, Scenario
 from grader.checks.check import Check, NoParameters, Parameters, Subject
-from grader.checks.finding import Finding
+from grader.findings.finding import Finding
 from grader.recording.model import NS, Ending, Process, Recording
 from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
 

@@ -6,8 +6,8 @@ import pytest
 
 from grader.assignment.model import Launch
 from grader.checks.check import Subject
-from grader.checks.finding import Evidence, Finding, Moment, Status
 from grader.checks.motion.robot_check import RobotParameters
+from grader.findings.finding import Evidence, Finding, Moment, Status
 from grader.grade import grade
 from grader.recording.event import Disturbance
 from grader.recording.model import NS, Ending

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.checks.finding import Finding, Status
+from grader.findings.finding import Finding, Status
 from grader.grade import grade
 from tests.grade.sample import FAIL, PASS, Told, make_loaded, make_recording, make_submission
 

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
-from grader.checks.finding import Status
-from grader.checks.reference import (
+from grader.findings.finding import Status
+from grader.findings.reference import (
     Goal,
     GoalPose,
     UnknownValue,

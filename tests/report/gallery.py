@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from grader.checks.finding import Case, Cases, Comparison, Evidence, Finding, Moment, Plot, Span
+from grader.findings.finding import Case, Cases, Comparison, Evidence, Finding, Moment, Plot, Span
 from grader.measure.motion.track import speed_plot
 from grader.recording.event import Breach
 from grader.recording.model import Recording

@@ -10,7 +10,7 @@ from typing import Any
 from rich.console import Console
 
 from grader.checks.check import Subject
-from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
+from grader.findings.finding import Evidence, Finding, Moment, Plot, Table
 from grader.grade import Grade, grade
 from grader.recording.event import Breach, Disturbance
 from grader.recording.model import NS, Call, LogLine, Message, Node, Owner, Process, Recording

@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from grader.checks.finding import Finding
 from grader.errors import GraderFault, UsageError
+from grader.findings.finding import Finding
 from grader.report.formats.classroom50 import identity, render_release, render_result, whole_factor
 from tests.assignment.validator import valid
 from tests.grade.sample import Told

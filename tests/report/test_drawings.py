@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.checks.finding import Plot
+from grader.findings.finding import Plot
 from grader.recording.model import Call, Declaration, Ending, Message, Process
 from grader.report.drawing.axes import Scale, ticks
 from grader.report.drawing.flags import Flag, place

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from grader.checks.finding import Evidence, Finding
+from grader.findings.finding import Evidence, Finding
 from grader.report.formats import github
 from grader.submission.record import SourceError
 from tests.grade.sample import FAIL, Told

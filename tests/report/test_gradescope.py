@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from grader.checks.finding import Finding
 from grader.errors import UsageError
+from grader.findings.finding import Finding
 from grader.recording.event import Breach
 from grader.report.formats.gradescope import read_metadata, render, unfinished
 from grader.report.formats.options import FormatOptions

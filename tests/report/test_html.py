@@ -11,7 +11,7 @@ import pytest
 from jinja2 import DictLoader, Environment
 
 from grader import resources
-from grader.checks.finding import Finding
+from grader.findings.finding import Finding
 from grader.recording.event import Breach
 from grader.recording.model import LogLine
 from grader.report.formats import github, gradescope, junit

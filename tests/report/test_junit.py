@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 import pytest
 import xmlschema
 
-from grader.checks.finding import Finding
+from grader.findings.finding import Finding
 from grader.report.formats.junit import render
 from grader.report.formats.options import FormatOptions
 from tests.grade.sample import FAIL, Told

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from grader.checks.finding import Evidence, Finding
+from grader.findings.finding import Evidence, Finding
 from grader.recording.event import Breach
 from grader.report.formats.markdown import COMMENT_BYTES, fence, literal, prose, render_markdown
 from tests.grade.sample import Told

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.checks.finding import Case, Cases, Comparison, Plot, Span
+from grader.findings.finding import Case, Cases, Comparison, Plot, Span
 from grader.recording.event import Breach, Intervention
 from grader.recording.model import Qos
 from grader.report.drawing.callbacks import draw_callbacks

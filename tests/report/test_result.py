@@ -6,8 +6,8 @@ import re
 import pytest
 
 from grader.assignment.load import load_assignment
-from grader.checks.finding import Evidence, Finding, Plot
 from grader.errors import UsageError
+from grader.findings.finding import Evidence, Finding, Plot
 from grader.grade import grade
 from grader.report.model.result import (
     make_result,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from grader.assignment.model import SHOWN_FROM
 from grader.assignment.selection import visible_part
 from grader.checks.check import Subject
-from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
+from grader.findings.finding import Evidence, Finding, Moment, Plot, Table
 from grader.grade import grade
 from grader.report.formats import classroom50, github, gradescope, junit
 from grader.report.formats.foxglove import render_layout

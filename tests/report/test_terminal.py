@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from grader.checks.finding import Evidence, Finding
+from grader.findings.finding import Evidence, Finding
 from grader.report.text.terminal import print_changes, print_grade
 from tests.grade.sample import FAIL, PASS, Told
 from tests.report.sample import (

@@ -17,8 +17,8 @@ import pytest
 
 from grader import ros
 from grader.checks.doubt import is_doubtful
-from grader.checks.finding import Status
 from grader.errors import GraderFault
+from grader.findings.finding import Status
 from grader.measure import declarations
 from grader.recording.model import NS, Ending, Kind, Owner, Recording
 from grader.run.environment import cell_environment

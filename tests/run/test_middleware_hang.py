@@ -10,7 +10,7 @@ import pytest
 from grader.assignment.load import list_assignments, load_assignment
 from grader.assignment.model import Scenario
 from grader.checks.check import Subject
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.grade.judge import grade
 from grader.run.cell.middleware_hang import ENDED_BY, HangMonitor, hung_recording
 from grader.run.order import CellOrder, ProcessCommand, RunLimits, Until

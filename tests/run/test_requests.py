@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from grader import ros
-from grader.checks.finding import Status
 from grader.errors import GraderFault
+from grader.findings.finding import Status
 from grader.recording.model import Ending
 from grader.ros import RosInstallation
 from grader.run.runner import launch_file_program

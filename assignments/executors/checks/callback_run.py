@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from grader.checks.finding import Span
+from grader.findings.finding import Span
 from grader.recording.model import NS, Message, Recording
 
 _REPORT = re.compile(r"\s*(\S(?:.*\S)?)\s+(start|end)\s*")

@@ -11,11 +11,11 @@ from pydantic import Field, model_validator
 
 from grader.measure import declarations
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding
+from grader.findings.finding import Evidence, Finding
 from grader.checks.need import Published, Recorded
 from grader.measure.period import Interval, PeriodLimits, forgiven, judge
 from grader.checks.tolerance import TimeTolerance, Tolerance
-from grader.checks.wording import code, codes, counted, listing
+from grader.findings.wording import code, codes, counted, listing
 from grader.diagnosis.no_messages import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.process.process_exit import why_ended

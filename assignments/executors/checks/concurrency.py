@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from grader.checks.finding import Finding
-from grader.checks.wording import code, codes, listing
+from grader.findings.finding import Finding
+from grader.findings.wording import code, codes, listing
 from grader.recording.model import Recording
 
 _EXCLUSIVE = "MutuallyExclusiveCallbackGroup"

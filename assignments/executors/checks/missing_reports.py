@@ -8,9 +8,9 @@ from typing import ClassVar
 from pydantic import Field
 
 from grader.checks.check import Parameters
-from grader.checks.finding import Evidence, Moment
+from grader.findings.finding import Evidence, Moment
 from grader.checks.need import Need, Recorded
-from grader.checks.wording import code, codes, counted, value_text
+from grader.findings.wording import code, codes, counted, value_text
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pydantic import Field
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.wording import code, codes, counted, listing
+from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.wording import code, codes, counted, listing
 from grader.diagnosis.exchanged_executables import why_exchanged
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Duration

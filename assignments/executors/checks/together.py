@@ -8,8 +8,8 @@ from functools import reduce
 from pydantic import Field
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.wording import code, codes, counted
+from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.wording import code, codes, counted
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration

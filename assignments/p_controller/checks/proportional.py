@@ -9,14 +9,14 @@ from typing import Literal
 from pydantic import Field
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding, Moment, Plot
+from grader.findings.finding import Evidence, Finding, Moment, Plot
 from grader.measure.motion.steering import MOST_BEHIND, Sample, answers
 from grader.measure.motion.approach import Approach
 from grader.diagnosis.motion.no_motion import approach
 from grader.measure.motion.command import command_topic
 from grader.measure.motion.quantities import metres
 from grader.checks.motion.robot_check import GoalParameters
-from grader.checks.wording import counted, percent
+from grader.findings.wording import counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.missed_goal import why_not_there

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grader.checks.value import number_at
-from grader.checks.value import NoSuchField
+from grader.findings.value import number_at
+from grader.findings.value import NoSuchField
 from grader.recording.model import NS, Message
 
 from .conversion import (

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from grader.checks.finding import Case as CaseError
-from grader.checks.finding import Cases, Evidence, Moment, Table
+from grader.findings.finding import Case as CaseError
+from grader.findings.finding import Cases, Evidence, Moment, Table
 from grader.recording.model import Recording
 
 from .case import Answer, Case

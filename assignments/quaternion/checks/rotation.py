@@ -11,11 +11,11 @@ import numpy as np
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.first_seen import first_seen
+from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.first_seen import first_seen
 from grader.measure.numbering import published
 from grader.checks.need import Published, Recorded
-from grader.checks.wording import code, counted, listing
+from grader.findings.wording import code, counted, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.wrong_value import MISREAD, was_integer
 from grader.diagnosis.no_messages import why_not_sent

@@ -7,26 +7,16 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
-from grader.checks.fields import (
-    FieldTolerance,
-    toleranced,
-    words,
-)
-from grader.checks.finding import Evidence, Finding
+from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if, toleranced
 from grader.checks.need import Doubt, GoalSent
-from grader.checks.requests import (
-    judged_requests,
-    the_goal,
-    timeline,
-    why_late,
-    why_other_fields,
-)
-from grader.checks.value import EXACT
-from grader.checks.wording import code, counted, percent
+from grader.checks.requests import judged_requests, timeline, why_other_fields
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.no_answer import why_raised, why_unanswered
+from grader.diagnosis.no_answer import why_late, why_raised, why_unanswered
 from grader.diagnosis.no_endpoint import ACTION, is_offered
+from grader.findings.fields import FieldTolerance, the_goal, words
+from grader.findings.finding import Evidence, Finding
+from grader.findings.value import EXACT
+from grader.findings.wording import code, counted, percent
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
 from grader.spec.name import InterfaceName, TopicName

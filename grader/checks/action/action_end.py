@@ -6,13 +6,14 @@ from pydantic import Field
 
 from grader.checks.action.action import OfGoals, answered_goals, evidence, why_rejected
 from grader.checks.check import Subject, check, stop_if
-from grader.checks.finding import Finding
 from grader.checks.need import GoalSent
-from grader.checks.requests import the_goal, why_late
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.no_answer import why_late
 from grader.diagnosis.no_endpoint import ACTION
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.unended_goal import ended_alone, why_no_end, why_not_canceled
+from grader.findings.fields import the_goal
+from grader.findings.finding import Finding
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Duration

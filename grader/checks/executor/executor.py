@@ -8,12 +8,8 @@ from statistics import median
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.doubt import was_held_up
-from grader.checks.finding import Evidence, Finding, Moment, Plot
-from grader.checks.first_seen import first_seen, nodes_seen
 from grader.checks.need import Doubt
 from grader.checks.node.node import target_nodes
-from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node, why_not_node
@@ -21,7 +17,11 @@ from grader.diagnosis.process.blocked_executor import left_s, why_never_spun
 from grader.diagnosis.process.process_exit import ended_early, why_ended, why_it_exited
 from grader.diagnosis.process.raised import interrupted_place
 from grader.diagnosis.undeclared import why_undeclared
+from grader.findings.finding import Evidence, Finding, Moment, Plot
+from grader.findings.first_seen import first_seen, nodes_seen
+from grader.findings.wording import code, codes, counted
 from grader.measure import declarations
+from grader.measure.declarations import was_held_up
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.model import NS, Call, Kind, Recording
 from grader.spec.name import QualifiedNodeName, TopicName

@@ -8,13 +8,11 @@ from pydantic import Field as Parameter
 from pydantic import model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.finding import Comparison, Evidence, Finding, Table
 from grader.checks.interface.definition_differences import (
     Difference,
     constant_differences,
     field_differences,
 )
-from grader.checks.wording import code, codes, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_manifest
 from grader.diagnosis.not_generated import (
@@ -25,6 +23,8 @@ from grader.diagnosis.not_generated import (
     used_packages,
     why_not_generated,
 )
+from grader.findings.finding import Comparison, Evidence, Finding, Table
+from grader.findings.wording import code, codes, listing
 from grader.recording.interface import DefinitionError, Section, sections_of
 from grader.spec.name import InterfaceName as Interface
 from grader.submission.record import Definition, PackageRecord, SourceError, SubmissionRecord

@@ -8,15 +8,15 @@ from typing import Any
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.finding import Evidence, Finding
-from grader.checks.first_seen import nodes_seen
 from grader.checks.need import Called, Doubt
 from grader.checks.requests import timeline
 from grader.checks.service.service import judged_calls, why_slow
-from grader.checks.wording import code, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_endpoint import SERVICE, offered
 from grader.diagnosis.no_node import why_not_node
+from grader.findings.finding import Evidence, Finding
+from grader.findings.first_seen import nodes_seen
+from grader.findings.wording import code, listing
 from grader.recording.model import Call, Recording
 from grader.spec.name import QualifiedNodeName
 

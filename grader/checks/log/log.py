@@ -9,13 +9,13 @@ from typing import Literal
 from pydantic import Field
 
 from grader.checks.check import NamedFields, Parameters, Subject, check
-from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.first_seen import endpoints_seen
-from grader.checks.value import FieldPath, NoSuchField, value_at
-from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_log import why_not_logged
 from grader.diagnosis.process.blocked_executor import why_slow
+from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.first_seen import endpoints_seen
+from grader.findings.value import FieldPath, NoSuchField, value_at
+from grader.findings.wording import code, codes, counted
 from grader.measure.printed import Echo, Wanted, echoes, quote, wanted_values
 from grader.recording.model import NS, Kind, Message, Recording
 from grader.spec.name import TopicName

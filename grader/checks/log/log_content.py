@@ -10,14 +10,14 @@ from typing import Annotated, Literal, get_args
 from pydantic import AfterValidator, Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.first_seen import until_the_end
-from grader.checks.wording import code, counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.blocked_executor import left_s, why_not_called
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.wrong_rhythm import why_paused
+from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.first_seen import until_the_end
+from grader.findings.wording import code, counted, percent
 from grader.measure.printed import logged_text, quote
 from grader.recording.model import NS, Recording
 from grader.spec.name import QualifiedNodeName

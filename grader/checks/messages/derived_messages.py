@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, TypeAdapter
 
-from grader.checks.value import FieldPath, NoSuchField, leaves, number_at, value_at
+from grader.findings.value import FieldPath, NoSuchField, leaves, number_at, value_at
 from grader.measure.numbering import lost
 from grader.recording.model import NS, Message, Recording
 

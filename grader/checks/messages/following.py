@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pydantic import Field
 
 from grader.checks.check import NamedFields, Parameters, Subject, check
-from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.messages.derived_messages import (
     DerivedMessages,
     Sample,
@@ -16,9 +15,10 @@ from grader.checks.messages.derived_messages import (
     SourceValue,
 )
 from grader.checks.need import Recorded
-from grader.checks.value import FieldPath, NoSuchField
-from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.no_messages import why_few, why_silent
+from grader.findings.finding import Evidence, Finding, Moment, Plot
+from grader.findings.value import FieldPath, NoSuchField
+from grader.findings.wording import code, codes, counted, listing
 from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration

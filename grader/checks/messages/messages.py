@@ -8,11 +8,14 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
-from grader.checks.check import NamedFields, Parameters, Subject, check
-from grader.checks.fields import FieldTolerance, difference_table, toleranced, words
-from grader.checks.finding import Evidence, Finding, Moment, Table
+from grader.checks.check import NamedFields, Parameters, Subject, check, toleranced
 from grader.checks.need import Published, Recorded
-from grader.checks.value import (
+from grader.diagnosis.explanation import explain
+from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
+from grader.diagnosis.wrong_value import WrongValue, accumulates, was_integer
+from grader.findings.fields import FieldTolerance, difference_table, words
+from grader.findings.finding import Evidence, Finding, Moment, Table
+from grader.findings.value import (
     EXACT,
     Difference,
     FieldPath,
@@ -26,10 +29,7 @@ from grader.checks.value import (
     tolerance_of,
     value_at,
 )
-from grader.checks.wording import code, codes, counted, value_text
-from grader.diagnosis.explanation import explain
-from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
-from grader.diagnosis.wrong_value import WrongValue, accumulates, was_integer
+from grader.findings.wording import code, codes, counted, value_text
 from grader.measure.numbering import is_numbered, published
 from grader.recording.model import Kind, Recording
 from grader.spec.name import TopicName

@@ -8,10 +8,7 @@ from collections.abc import Collection, Sequence
 from pydantic import Field
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding, Plot
-from grader.checks.first_seen import first_seen
 from grader.checks.motion.robot_check import RobotParameters
-from grader.checks.wording import code, counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import (
     why_cut_short,
@@ -20,6 +17,9 @@ from grader.diagnosis.motion.no_motion import (
     why_rejected,
 )
 from grader.diagnosis.no_messages import why_silent
+from grader.findings.finding import Evidence, Finding, Plot
+from grader.findings.first_seen import first_seen
+from grader.findings.wording import code, counted, percent
 from grader.measure.motion.approach import NO_SPEED_M_S
 from grader.measure.motion.command import VelocityCommand, command_topic, commands
 from grader.measure.motion.quantities import speed, turn

@@ -9,13 +9,13 @@ from statistics import median
 from pydantic import Field
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding
-from grader.checks.first_seen import until_the_end
 from grader.checks.motion.robot_check import RobotParameters
-from grader.checks.wording import counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
+from grader.findings.finding import Evidence, Finding
+from grader.findings.first_seen import until_the_end
+from grader.findings.wording import counted, percent
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.ground import ahead
 from grader.measure.motion.quantities import degrees, metres, speed, turn

@@ -8,15 +8,15 @@ from itertools import pairwise
 from pydantic import Field, model_validator
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding
-from grader.checks.first_seen import until_the_end
 from grader.checks.motion.robot_check import GoalParameters, RobotParameters
-from grader.checks.wording import percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.missed_heading import why_not_aligned
 from grader.diagnosis.motion.no_motion import approach, why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted, why_off_course, why_unsteered
+from grader.findings.finding import Evidence, Finding
+from grader.findings.first_seen import until_the_end
+from grader.findings.wording import percent
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.quantities import degrees, metres, point, speed, turn

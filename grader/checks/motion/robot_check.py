@@ -6,7 +6,7 @@ from pydantic import Field
 
 from grader.checks.check import Parameters
 from grader.checks.need import Doubt, SimulatedRobot
-from grader.checks.reference import GoalPose
+from grader.findings.reference import GoalPose
 from grader.spec.quantity import PositiveLength
 
 

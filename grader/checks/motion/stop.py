@@ -7,16 +7,16 @@ from typing import Literal
 from pydantic import Field
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding
-from grader.checks.first_seen import until_the_end
 from grader.checks.motion.robot_check import RobotParameters
-from grader.checks.wording import counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_it_exited
+from grader.findings.finding import Evidence, Finding
+from grader.findings.first_seen import until_the_end
+from grader.findings.wording import counted
 from grader.measure.motion.command import scans, stolen_s
 from grader.measure.motion.ground import Sight, ahead
 from grader.measure.motion.quantities import metres, speed

@@ -8,13 +8,13 @@ from itertools import pairwise
 from pydantic import Field
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding
 from grader.checks.motion.robot_check import GoalParameters
-from grader.checks.wording import counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.no_motion import approach
 from grader.diagnosis.motion.off_course import why_off_course
+from grader.findings.finding import Evidence, Finding
+from grader.findings.wording import counted
 from grader.measure.motion.approach import WRAP_HINT, Approach, long_turns
 from grader.measure.motion.quantities import degrees, metres, speed
 from grader.measure.motion.track import evidence_at, speed_plot, way_m

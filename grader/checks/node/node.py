@@ -7,9 +7,6 @@ from functools import partial
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.first_seen import endpoints_seen
-from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.process_exit import (
@@ -19,6 +16,9 @@ from grader.diagnosis.process.process_exit import (
     why_ended,
     why_it_exited,
 )
+from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.first_seen import endpoints_seen
+from grader.findings.wording import code, codes, counted
 from grader.measure import declarations
 from grader.recording.model import NS, Kind, Node, Owner, Process, Recording
 from grader.spec.name import QualifiedNodeName, TopicName

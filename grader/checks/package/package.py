@@ -10,9 +10,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.finding import Evidence, Finding, Table
 from grader.checks.need import Need, Submitted
-from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_executable import why_no_executable, why_nothing_to_run
 from grader.diagnosis.not_built import (
@@ -21,6 +19,8 @@ from grader.diagnosis.not_built import (
     why_not_built,
     why_too_new,
 )
+from grader.findings.finding import Evidence, Finding, Table
+from grader.findings.wording import code, codes
 from grader.spec.name import PackageName
 from grader.spec.nearest_name import nearest
 from grader.submission.read.dependencies import meant

@@ -7,10 +7,7 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.need import Doubt, ParameterSet, ParametersRead
-from grader.checks.value import same, same_value
-from grader.checks.wording import code, value_text
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_parameter import (
     answered_at,
@@ -18,6 +15,9 @@ from grader.diagnosis.no_parameter import (
     why_not_declared,
     why_services_silent,
 )
+from grader.findings.finding import Evidence, Finding, Moment, Table
+from grader.findings.value import same, same_value
+from grader.findings.wording import code, value_text
 from grader.measure.parameter_calls import (
     Descriptor,
     Reading,

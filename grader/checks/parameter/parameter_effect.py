@@ -10,24 +10,17 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from grader.checks.check import NamedFields, Subject, check, stop_if
-from grader.checks.fields import (
-    FieldTolerance,
-    difference_table,
-    difference_words,
-    toleranced,
-    unlike,
-    words,
-)
-from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.check import NamedFields, Subject, check, stop_if, toleranced
 from grader.checks.need import ParameterSet, Recorded
 from grader.checks.parameter.parameter import OfSetting, refusal, settings_to
-from grader.checks.value import EXACT
-from grader.checks.wording import code, counted, percent, value_text
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_raised, why_taken
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended
+from grader.findings.fields import FieldTolerance, difference_table, difference_words, unlike, words
+from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.value import EXACT
+from grader.findings.wording import code, counted, percent, value_text
 from grader.measure.parameter_calls import settings
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName

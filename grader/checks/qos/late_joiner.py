@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.need import Joined
-from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.no_messages import why_few
 from grader.diagnosis.process.process_exit import why_ended
+from grader.findings.finding import Evidence, Finding, Moment, Table
+from grader.findings.wording import code, counted
 from grader.measure import declarations
 from grader.measure.compatibility import compatibility_table, refusals
 from grader.measure.numbering import published

@@ -9,13 +9,13 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.finding import Evidence, Finding
-from grader.checks.first_seen import endpoints_seen, first_seen
 from grader.checks.need import Joined
-from grader.checks.wording import code, counted
 from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.undeclared import why_undeclared
+from grader.findings.finding import Evidence, Finding
+from grader.findings.first_seen import endpoints_seen, first_seen
+from grader.findings.wording import code, counted
 from grader.measure import declarations
 from grader.measure.compatibility import (
     comparisons,

@@ -9,16 +9,16 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
-from grader.checks.fields import FieldTolerance, brief, toleranced, words
-from grader.checks.finding import Evidence, Finding, Moment, Table
+from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if, toleranced
 from grader.checks.need import Called, Doubt
-from grader.checks.requests import judged_requests, why_late, why_other_fields
-from grader.checks.value import EXACT, value_at
-from grader.checks.wording import code, codes, counted
+from grader.checks.requests import judged_requests, why_other_fields
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.no_answer import why_one_cpu
+from grader.diagnosis.no_answer import why_late, why_one_cpu
 from grader.diagnosis.no_endpoint import SERVICE, is_offered
+from grader.findings.fields import FieldTolerance, brief, words
+from grader.findings.finding import Evidence, Finding, Moment, Table
+from grader.findings.value import EXACT, value_at
+from grader.findings.wording import code, codes, counted
 from grader.recording.model import NS, Call, Recording
 from grader.spec.name import InterfaceName, TopicName
 from grader.spec.quantity import Duration

@@ -13,12 +13,12 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, field_validator
 
 from grader.checks.check import Subject, check, stop_if
-from grader.checks.finding import Evidence, Finding
 from grader.checks.need import RuffRules, Submitted
 from grader.checks.package.package import OfPackage
-from grader.checks.wording import code, codes, counted, listing, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_package, why_too_new
+from grader.findings.finding import Evidence, Finding
+from grader.findings.wording import code, codes, counted, listing, percent
 from grader.spec.nearest_name import nearest
 from grader.spec.quantity import Ratio
 from grader.submission.read.inheritance import NODE, Family, FoundClass

@@ -9,12 +9,12 @@ from statistics import median
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.need import Published, Recorded
-from grader.checks.wording import code, counted
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_messages import why_not_sent, why_silent
 from grader.diagnosis.process.blocked_executor import left_s
+from grader.findings.finding import Evidence, Finding, Moment, Plot
+from grader.findings.wording import code, counted
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration

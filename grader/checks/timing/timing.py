@@ -10,16 +10,16 @@ from statistics import median
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.finding import Evidence, Finding, Moment, Plot
-from grader.checks.first_seen import first_seen
 from grader.checks.need import Recorded
 from grader.checks.tolerance import TimeTolerance, Tolerance
-from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import cause_of
 from grader.diagnosis.no_messages import ENDED_HINT, why_few
 from grader.diagnosis.process.blocked_executor import left_s
 from grader.diagnosis.wrong_rhythm import WrongRhythm, why_paused
+from grader.findings.finding import Evidence, Finding, Moment, Plot
+from grader.findings.first_seen import first_seen
+from grader.findings.wording import code, counted
 from grader.measure import declarations
 from grader.measure.numbering import is_numbered, lost
 from grader.measure.period import (

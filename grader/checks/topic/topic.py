@@ -8,12 +8,12 @@ from typing import Literal
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.finding import Evidence, Finding, Status
-from grader.checks.first_seen import endpoints_seen, nodes_seen
 from grader.checks.need import Recorded
-from grader.checks.wording import code, codes
 from grader.diagnosis.no_endpoint import misnamed, why_no_endpoint
 from grader.diagnosis.no_node import why_no_node
+from grader.findings.finding import Evidence, Finding, Status
+from grader.findings.first_seen import endpoints_seen, nodes_seen
+from grader.findings.wording import code, codes
 from grader.recording.model import Kind, Recording
 from grader.spec.name import InterfaceName, TopicName
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from grader.checks.wording import counted
+from grader.findings.wording import counted
 from grader.safe_text import one_line
 
 if TYPE_CHECKING:

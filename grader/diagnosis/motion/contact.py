@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from grader.checks.wording import counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.process.blocked_executor import stuck_callback
+from grader.findings.wording import counted
 from grader.measure.motion.command import VelocityCommand, commands, is_zero
 from grader.measure.motion.quantities import speed, turn
 from grader.measure.motion.scan import newest

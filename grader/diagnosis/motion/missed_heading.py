@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from grader.checks.finding import Evidence
-from grader.checks.first_seen import until_the_end
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.off_course import why_off_course
+from grader.findings.finding import Evidence
+from grader.findings.first_seen import until_the_end
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.quantities import degrees, turn
 from grader.measure.motion.track import is_at_rest, turned_rad

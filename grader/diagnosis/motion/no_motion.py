@@ -6,16 +6,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
-from grader.checks.finding import Evidence
-from grader.checks.first_seen import endpoints_seen, first_seen
-from grader.checks.reference import Goal, UnknownValue
-from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
 from grader.diagnosis.wrong_value import MISREAD, was_integer
+from grader.findings.finding import Evidence
+from grader.findings.first_seen import endpoints_seen, first_seen
+from grader.findings.reference import Goal, UnknownValue
+from grader.findings.wording import code, codes, counted
 from grader.measure.compatibility import compatibility_table, refusals
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.command import (

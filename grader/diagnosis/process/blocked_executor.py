@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
-from grader.checks.finding import Evidence, Moment
-from grader.checks.first_seen import until_the_end
-from grader.checks.wording import codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.process.raised import in_brackets, interrupted_place
+from grader.findings.finding import Evidence, Moment
+from grader.findings.first_seen import until_the_end
+from grader.findings.wording import codes
 from grader.measure import declarations
 from grader.recording.model import NS, Call, Process, Recording
 from grader.spec.unit import format_duration

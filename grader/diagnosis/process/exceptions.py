@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from string import Template
 
-from grader.checks.wording import code
 from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
 from grader.diagnosis.process.missing_library import library_hint
 from grader.diagnosis.process.raised import Failure, Frame, student_place
+from grader.findings.wording import code
 from grader.recording.model import Recording
 from grader.spec.source import Model, read_source
 

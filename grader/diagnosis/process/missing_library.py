@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from grader.checks.wording import code, codes
 from grader.diagnosis.process.raised import Failure
+from grader.findings.wording import code, codes
 from grader.recording.model import Recording
 from grader.spec.nearest_name import nearest
 from grader.submission.read.rosdistro import PACKAGES, PYTHON_MODULES

@@ -6,14 +6,14 @@ import signal
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from grader.checks.finding import Evidence, Moment
-from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
 from grader.diagnosis.process.exceptions import Raised
 from grader.diagnosis.process.missing_library import lacking_package
 from grader.diagnosis.process.newer_names import newer_name
 from grader.diagnosis.process.raised import Failure, fatal_failure, in_brackets, student_place
+from grader.findings.finding import Evidence, Moment
+from grader.findings.wording import code
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.spec.source import Model, read_source

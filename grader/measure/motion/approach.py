@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from grader.checks.finding import Plot
+from grader.findings.finding import Plot
 from grader.measure.motion.track import over_time
 from grader.recording.model import Recording
 from grader.recording.simulated import Truth

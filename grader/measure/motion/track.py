@@ -7,7 +7,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from grader.checks.finding import Evidence, Moment, Plot
+from grader.findings.finding import Evidence, Moment, Plot
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 from sim.motion import Pose, wrap_angle

@@ -7,8 +7,8 @@ from statistics import median_high
 
 from markupsafe import Markup
 
-from grader.checks.finding import Span
-from grader.checks.wording import counted
+from grader.findings.finding import Span
+from grader.findings.wording import counted
 from grader.report.drawing.axes import TIME_AXIS, Scale, time_axis
 from grader.report.drawing.lanes import LANE, SIDE, Bar, Lane, draw_lanes
 from grader.report.drawing.svg import Figure, figure

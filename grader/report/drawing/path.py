@@ -10,7 +10,7 @@ from itertools import accumulate, pairwise
 
 from markupsafe import Markup
 
-from grader.checks.wording import counted, listing
+from grader.findings.wording import counted, listing
 from grader.measure.motion.ground import ahead
 from grader.measure.motion.quantities import metres
 from grader.measure.motion.track import first_rest, has_moved

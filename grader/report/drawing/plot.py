@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from grader.checks.finding import Plot
-from grader.checks.wording import counted
+from grader.findings.finding import Plot
+from grader.findings.wording import counted
 from grader.report.drawing import svg
 from grader.report.drawing.axes import LEFT, RIGHT, Scale, ticks, unit_of, value_axis
 from grader.safe_text import one_line

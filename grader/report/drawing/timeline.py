@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from markupsafe import Markup
 
-from grader.checks.wording import counted, listing
 from grader.diagnosis.no_endpoint import OWN_TOPICS
+from grader.findings.wording import counted, listing
 from grader.recording.model import NS, Call, LogLine, Owner, Process, Recording
 from grader.report.drawing.axes import TIME_AXIS, Scale, time_axis
 from grader.report.drawing.flags import Flag, draw_flags

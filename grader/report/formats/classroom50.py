@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from decimal import ROUND_FLOOR, Decimal
 from typing import Any
 
-from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
+from grader.findings.finding import Status
 from grader.report.formats.markdown import COMMENT_BYTES, render_markdown
 from grader.report.model.result_model import Result
 from grader.report.model.student import for_student

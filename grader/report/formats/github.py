@@ -9,7 +9,7 @@ limits of annotations: actions/runner, ``ExecutionContext.cs``.
 
 from __future__ import annotations
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.report.formats.markdown import render_markdown
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student

@@ -15,8 +15,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
-from grader.checks.finding import Status
 from grader.errors import UsageError
+from grader.findings.finding import Status
 from grader.report.model.class_row import ClassRow, RowStatus
 from grader.report.model.result_model import Result
 from grader.report.text.words import number

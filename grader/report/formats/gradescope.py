@@ -14,8 +14,8 @@ from typing import Any
 
 from pydantic import AwareDatetime, BaseModel, ValidationError
 
-from grader.checks.finding import Status
 from grader.errors import UsageError
+from grader.findings.finding import Status
 from grader.report.formats import markdown
 from grader.report.formats.options import DEFAULTS, FormatOptions
 from grader.report.model.result import read_json

@@ -14,7 +14,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.report.formats.options import DEFAULTS, FormatOptions
 from grader.report.html.page import environment
 from grader.report.model.result_model import Result

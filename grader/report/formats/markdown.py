@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.report.formats.options import FormatOptions
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 
-from grader.checks.finding import Comparison
+from grader.findings.finding import Comparison
 from grader.safe_text import one_line
 
 MOST_LINES = 200

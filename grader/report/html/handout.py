@@ -12,8 +12,8 @@ from markupsafe import Markup
 from grader.assignment.binding import BoundCheck
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Visibility
-from grader.checks.wording import counted
 from grader.errors import UsageError
+from grader.findings.wording import counted
 from grader.grade.model import total
 from grader.report.html.page import render_page
 from grader.report.text.words import counted_points

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from statistics import fmean, median
 from urllib.parse import quote
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.report.drawing.distribution import draw_distribution
 from grader.report.html.page import render_page
 from grader.report.model.class_row import ClassRow, RowStatus

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup, escape
 
 from grader import resources
-from grader.checks.finding import Status
-from grader.checks.wording import counted
+from grader.findings.finding import Status
+from grader.findings.wording import counted
 from grader.report.text import explanation, words
 from grader.safe_text import clean, one_line
 

@@ -7,7 +7,7 @@ from functools import partial
 
 from markupsafe import Markup
 
-from grader.checks.finding import Plot, Status
+from grader.findings.finding import Plot, Status
 from grader.grade.model import Grade
 from grader.recording.event import Breach
 from grader.recording.model import Recording

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from grader.assignment.model import Scenario
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.grade.model import Grade, total
 from grader.recording.model import Recording
 from grader.report.model.result_model import CheckPart, FindingPart, Result

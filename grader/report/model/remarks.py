@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import accumulate
 
 from grader.checks.topic.topic import PROBE, Untouched
-from grader.checks.wording import code, codes, counted
+from grader.findings.wording import code, codes, counted
 from grader.recording.model import NS, Kind, Owner, Recording
 
 _FLOOD = 1000

@@ -9,8 +9,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from grader.checks.finding import Status
 from grader.errors import UsageError
+from grader.findings.finding import Status
 from grader.grade.model import CheckResult, Grade, ScenarioFinding
 from grader.recording.model import NS, Recording
 from grader.report.model import result_model as model

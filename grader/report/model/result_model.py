@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from grader.checks.finding import Evidence, Status
+from grader.findings.finding import Evidence, Status
 from grader.grade.model import reason
 from grader.safe_text import encodable
 from grader.submission.record import BuildRecord

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from grader.assignment.model import Assignment, Visibility
-from grader.checks.reference import Goal, GoalPose, UnknownValue
+from grader.findings.reference import Goal, GoalPose, UnknownValue
 from grader.report.drawing.path import Target
 from grader.spec.quantity import PositiveLength
 from sim.motion import Pose

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from grader.checks.finding import Status
-from grader.checks.wording import counted, listing
+from grader.findings.finding import Status
+from grader.findings.wording import counted, listing
 from grader.grade import model as grades
 from grader.grade.model import total
 from grader.report.model.result_model import CheckPart, FindingPart, Result

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.text import explanation
 from grader.report.text.words import STATUS, number

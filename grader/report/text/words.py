@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.recording.model import Ending
 
 

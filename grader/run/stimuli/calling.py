@@ -6,10 +6,10 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+from grader.recording.interaction import NO_SERVER
 from grader.recording.model import NS
 from grader.run.host.disturbance import Stopwatch
 from grader.run.stimuli.context import Patience, Playing, StimulusContext, plays
-from grader.run.stimuli.service_calls import NO_SERVER
 
 _POLL_S = 0.02
 # The server may match the client, for its answers, a moment later than the client the server.

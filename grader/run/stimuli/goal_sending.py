@@ -6,12 +6,11 @@ import time
 from dataclasses import dataclass, replace
 from typing import Any
 
-from grader.recording.interaction import Feedback, Goal
+from grader.recording.interaction import NO_SERVER, Feedback, Goal
 from grader.run.cell.probe import import_interface
 from grader.run.stimuli.calling import Requesting
 from grader.run.stimuli.context import StimulusContext, plays
 from grader.run.stimuli.filling import filled, plain
-from grader.run.stimuli.service_calls import NO_SERVER
 
 _MOST_FEEDBACK = 5000
 _ACCEPT_S = 1.0

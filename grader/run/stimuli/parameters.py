@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from grader.recording.interaction import NO_SERVER
 from grader.recording.model import Owner
 from grader.run.stimuli.calling import Requesting
 from grader.run.stimuli.context import Playing, StimulusContext, plays
-from grader.run.stimuli.service_calls import NO_SERVER
 
 _EVERY: Mapping[str, Any] = {"prefixes": [], "depth": 0}
 _TYPES = {

@@ -12,8 +12,6 @@ from grader.recording.model import Call
 from grader.run.cell.probe import Probe, import_interface
 from grader.run.stimuli.filling import filled, plain
 
-NO_SERVER = "no server"
-
 
 class ServiceCalls:
     """Clients of the probe, one for each service, and every call so far, oldest first."""

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from assignments.executors.checks.callback_run import read_reports
 from grader.assignment.load import load_assignment
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from grader.recording.model import Kind
 from tests.checks.builder import (
     NODE,

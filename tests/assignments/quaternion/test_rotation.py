@@ -15,7 +15,7 @@ from assignments.quaternion.checks.common_mistakes import MISTAKES
 from assignments.quaternion.checks.conversion import CONVERSIONS, Group, angles_between, oracle
 from grader.assignment.load import find_assignment
 from grader.assignment.own_check import load_function
-from grader.checks.finding import Status
+from grader.findings.finding import Status
 from tests.checks.builder import (
     died,
     endpoint,

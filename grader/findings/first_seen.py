@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import islice
 
-from grader.checks.finding import Moment
+from grader.findings.finding import Moment
 from grader.recording.model import Endpoint, Message, Recording
 
 _MOST = 5

@@ -7,17 +7,16 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from grader.checks.check import NamedFields
-from grader.checks.finding import Table
-from grader.checks.value import (
-    EXACT,
+from grader.findings.finding import Table
+from grader.findings.value import (
     Difference,
     FieldPath,
     Tolerance,
     differences,
     expected_leaves,
 )
-from grader.checks.wording import codes, value_text
+from grader.findings.wording import codes, value_text
+from grader.recording.interaction import Goal
 
 _MOST_FIELDS = 6
 
@@ -29,20 +28,6 @@ FieldTolerance = Annotated[
         "the numbers of other fields must be exact."
     ),
 ]
-
-
-def toleranced(
-    key: str,
-    endpoint: str,
-    fields: Mapping[str, Any],
-    tolerance: Tolerance = EXACT,
-    *,
-    part: int = 0,
-) -> Iterator[NamedFields]:
-    """The fields below one key of ``with``, and those that have a tolerance of their own."""
-    yield NamedFields((key,), endpoint, fields, part, tolerance)
-    for path in tolerance if isinstance(tolerance, Mapping) else ():
-        yield NamedFields(("tolerance", path), endpoint, path, part)
 
 
 def unlike(
@@ -60,6 +45,11 @@ def unlike(
 def words(value: Mapping[str, Any]) -> str:
     """Write fields as ``a = 2, b = 3``; ``nothing`` for none."""
     return ", ".join(f"{path} = {value_text(item)}" for path, item in _plain(value)) or "nothing"
+
+
+def the_goal(goal: Goal) -> str:
+    """A goal in words."""
+    return f"the goal ({words(goal.goal)})"
 
 
 def brief(value: Mapping[str, Any]) -> str:
