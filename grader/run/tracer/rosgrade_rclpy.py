@@ -7,7 +7,7 @@ import itertools
 import os
 import sys
 
-from sitecustomize import (  # type: ignore[import-not-found]
+from rosgrade_report import (  # type: ignore[import-not-found]
     HELD_TOPICS,
     LEAST_THREADS,
     MIDDLEWARE,

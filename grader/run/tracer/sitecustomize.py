@@ -21,50 +21,21 @@ import gc
 import os
 import sys
 
+from rosgrade_report import (  # type: ignore[import-not-found]
+    FD,
+    LEAST_THREADS,
+    PIPE,
+    SEEN_FD,
+    pipe_at,
+    quietly,
+    report,
+)
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-_FD = int(os.environ.get("ROSGRADE_TRACER_FD", "-1"))
-SEEN_FD = int(os.environ.get("ROSGRADE_SEEN_FD", "-1"))
-HELD_TOPICS = frozenset(filter(None, os.environ.get("ROSGRADE_HOLD", "").split(":")))
-LEAST_THREADS = 4
-THRESHOLDS = gc.get_threshold()
 _IMPORTED = 100_000
-_PREFIXES = ("ROS_", "RMW_", "FASTDDS_", "FASTRTPS_", "CYCLONEDDS_")
-_HARMLESS = ("ROS_LOG_DIR", "ROS_HOME", "ROS_DISTRO", "ROS_VERSION", "ROS_PYTHON_VERSION")
-# Writes up to PIPE_BUF (4096 bytes) are atomic, so lines of several processes do not mix.
-_LONGEST_LINE = 4000
-
-
-def pipe_at(fd: int) -> tuple[int, int] | None:
-    """Identity of a pipe, None for anything else."""
-    try:
-        status = os.fstat(fd)
-    except OSError:
-        return None
-    return (status.st_dev, status.st_ino) if status.st_mode & 0o170000 == 0o010000 else None
-
-
-def report(kind: str, **data: Any) -> None:
-    """Send one line to the cell; without a listener nothing happens."""
-    try:
-        import json
-
-        line = json.dumps({"kind": kind, "pid": os.getpid(), **data}) + "\n"
-        # The program may have closed the pipe, and something else may have its number now.
-        if len(line) <= _LONGEST_LINE and _PIPE and pipe_at(_FD) == _PIPE:
-            os.write(_FD, line.encode())
-    except Exception:
-        pass
-
-
-def quietly(function: Any, *args: Any) -> Any:
-    """Call something, whose errors never reach the student's program."""
-    try:
-        return function(*args)
-    except Exception:
-        return None
 
 
 def _exit() -> None:
@@ -95,7 +66,7 @@ def _like(original: Any, function: Any, module: str) -> Any:
 def _keep_pipes() -> None:
     """Let os.close() and os.closerange() not see the pipes of the cell: daemons close all."""
     close, close_range = os.close, os.closerange
-    kept = sorted((_FD, SEEN_FD))
+    kept = sorted((FD, SEEN_FD))
 
     def close_other(fd: int) -> None:
         if fd in kept:
@@ -117,8 +88,8 @@ def _patch_subprocess(module: Any) -> None:
     make = module.Popen.__init__
 
     def made(self: Any, *args: Any, **kwargs: Any) -> None:
-        if kwargs.get("close_fds", True) and pipe_at(_FD) == _PIPE:
-            kwargs["pass_fds"] = (*kwargs.get("pass_fds", ()), _FD)
+        if kwargs.get("close_fds", True) and pipe_at(FD) == PIPE:
+            kwargs["pass_fds"] = (*kwargs.get("pass_fds", ()), FD)
         make(self, *args, **kwargs)
 
     module.Popen.__init__ = made
@@ -128,7 +99,7 @@ def _patch_multiprocessing(module: Any) -> None:
     start = module.spawnv_passfds
 
     def started(path: Any, args: Any, passfds: Any) -> Any:
-        return start(path, args, {*passfds, _FD} if pipe_at(_FD) == _PIPE else passfds)
+        return start(path, args, {*passfds, FD} if pipe_at(FD) == PIPE else passfds)
 
     module.spawnv_passfds = started
 
@@ -196,7 +167,8 @@ def _note_import(name: str) -> None:
 
 
 def _passes_on(file: str) -> bool:
-    return file == __file__ or file.startswith("<") or "/importlib/" in file
+    own = (__file__, quietly.__code__.co_filename)
+    return file in own or file.startswith("<") or "/importlib/" in file
 
 
 def _is_guarded(frame: Any) -> bool:
@@ -224,16 +196,8 @@ _imported = {"rosgrade_rclpy"}
 _INSTALL = os.path.dirname(os.path.dirname(os.path.dirname("".join(sys.orig_argv[1:2]))))
 
 
-def of_middleware() -> dict[str, str]:
-    """Variables of the environment that decide which nodes discover each other."""
-    found = {name: os.environ[name] for name in os.environ if name.startswith(_PREFIXES)}
-    return {name: value for name, value in found.items() if name not in _HARMLESS}
-
-
-MIDDLEWARE = of_middleware()
-_PIPE = pipe_at(_FD)
 # A child that did not inherit the pipe has the variable, but not what it names.
-if _PIPE is not None and str(_PIPE[1]) == os.environ.get("ROSGRADE_TRACER_PIPE"):
+if PIPE is not None and str(PIPE[1]) == os.environ.get("ROSGRADE_TRACER_PIPE"):
     sys.meta_path.insert(0, _Finder)
     # Imports make objects and no garbage: until rclpy.init() there is little to look for.
     gc.set_threshold(_IMPORTED)
