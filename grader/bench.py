@@ -40,9 +40,9 @@ from grader.sandbox.trial import choose
 from grader.submission.build.build_cache import BUILDS
 from grader.submission.prepare import Prepared, prepare
 
-ASSIGNMENTS = ("timed_publisher", "bot_controller")
-"""Without and with a robot; the first one is graded by `rosgrade check`, too."""
-CLASS = 100
+CLASSES = {"timed_publisher": 100, "bot_controller": 20}
+"""Assignment, without and with a robot -> size of its class."""
+ASSIGNMENT = "timed_publisher"
 REGRADED = 50
 OUTPUT = Path("rosgrade-bench.json")
 _FEW = 3
@@ -102,7 +102,7 @@ def _check(samples: Samples, folder: Path, runs: int) -> None:
         if build == "cold":
             # The student's Python environment beside the builds is made once on a machine.
             shutil.rmtree(cache / "rosgrade" / BUILDS, ignore_errors=True)
-        arguments = ["check", ASSIGNMENTS[0], str(reference_of(ASSIGNMENTS[0])), "--quiet"]
+        arguments = ["check", ASSIGNMENT, str(reference_of(ASSIGNMENT)), "--quiet"]
         wall_s, cpu_s = _timed(
             [sys.executable, "-m", "grader", *arguments, "--report", str(report)],
             {**os.environ, "XDG_CACHE_HOME": str(cache)},
@@ -134,7 +134,7 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
     sandbox, notice = choose(Choice.AUTO, folder / "batch-cache")
     if notice:
         print(notice, file=sys.stderr)
-    for name in ASSIGNMENTS:
+    for name, count in CLASSES.items():
         loaded = load_assignment(name)
         prepared = prepare(
             reference_of(name), ros.find(), cache=folder / "batch-cache", sandbox=sandbox
@@ -146,15 +146,15 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
             before_s, own_s = runner.cpu_s, time.process_time()
             began_s = time.monotonic()
             with ThreadPoolExecutor(max_workers=runner.admission.most) as pool:
-                futures = [pool.submit(work, number) for number in range(CLASS)]
+                futures = [pool.submit(work, number) for number in range(count)]
                 for number, future in enumerate(as_completed(futures), start=1):
                     future.result()
                     if number % 20 == 0:
-                        print(f"{name}: {number} of {CLASS}", file=sys.stderr, flush=True)
+                        print(f"{name}: {number} of {count}", file=sys.stderr, flush=True)
             wall_s = time.monotonic() - began_s
             cpu_s = runner.cpu_s - before_s + time.process_time() - own_s
-        samples[f"batch of {name}: submissions per minute"].append(60 * CLASS / wall_s)
-        samples[f"batch of {name}: CPU of each"].append(cpu_s / CLASS)
+        samples[f"batch of {name}: submissions per minute"].append(60 * count / wall_s)
+        samples[f"batch of {name}: CPU of each"].append(cpu_s / count)
         share = cpu_s / cpu_count() / wall_s
         samples[f"batch of {name}: share of what the CPUs bound"].append(share)
         began_s = time.monotonic()
@@ -162,9 +162,9 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
             regrade(loaded, find(folder / name / "0"))
         rate = 60 * REGRADED / (time.monotonic() - began_s)
         samples[f"regrade of {name}: submissions per minute"].append(rate)
-        if name == ASSIGNMENTS[0]:
+        if name == ASSIGNMENT:
             plain_s = median(_plain(samples, prepared) for _ in range(10))
-            times = CLASS / wall_s * plain_s
+            times = count / wall_s * plain_s
             samples[f"batch of {name}: times the plain test program's rate"].append(times)
 
 
@@ -181,7 +181,7 @@ def _plain(samples: Samples, prepared: Prepared) -> float:
         Wall time in seconds.
     """
     found = ros.find()
-    (until,) = (one.until for one in load_assignment(ASSIGNMENTS[0]).assignment.scenarios)
+    (until,) = (one.until for one in load_assignment(ASSIGNMENT).assignment.scenarios)
     assert prepared.install is not None
     (program,) = prepared.install.glob("lib/bot_publisher/bot_pub")
     with lock_domain() as domain:
