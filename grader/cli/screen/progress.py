@@ -47,10 +47,10 @@ class Progress:
     @contextmanager
     def shown(self) -> Iterator[Progress]:
         """Show what happens while the block runs; it begins with nothing."""
+        self._said, self._tasks = "", {}
         if self._quiet or not sys.stderr.isatty():
             yield self
             return
-        self._tasks = {}
         with _make_bars() as bars:
             self._bars = bars
             try:
