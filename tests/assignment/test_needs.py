@@ -64,7 +64,7 @@ def found(mistakes: Callable[[str], list[str]], ros_with: Callable[..., None]) -
         ("source.ruff", "package: bot, rules: [F, E501, PL]"),
     ],
 )
-def test_what_fits(found: Found, uses: str, parameters: str) -> None:
+def test_what_fits_is_accepted(found: Found, uses: str, parameters: str) -> None:
     assert found(uses, parameters) == []
 
 

@@ -187,7 +187,7 @@ def test_everything_can_be_reached_by_the_keyboard(look, pages):
     assert {"SUMMARYundefined", "INPUTrange", "BUTTONbutton"} <= reached
 
 
-def test_it_prints(look, pages, tmp_path):
+def test_the_whole_report_is_printed(look, pages, tmp_path):
     found = look(pages["gallery"], color_scheme="dark")
     data = found.page.pdf(path=tmp_path / "report.pdf", format="A4")
     assert data.startswith(b"%PDF-") and len(data) > 20_000

@@ -28,7 +28,7 @@ def judged(*dependencies, packages=(), **changes):
     return judge("package.dependencies", subject, package=NAME)
 
 
-def test_passes():
+def test_complete_dependencies_pass():
     finding = judged(RCLPY, GEOMETRY)
     assert finding.status is Status.PASSED
     assert finding.observed == "`geometry_msgs` and `rclpy` declared"

@@ -37,7 +37,7 @@ def responsive(run, **parameters):
 
 
 class TestGood:
-    def test_answers_at_once(self):
+    def test_a_node_that_answers_at_once_passes(self):
         finding = responsive(recording())
         assert finding.status is Status.PASSED
         assert finding.observed == "`/bot_publisher` answered 8 of 8 calls within 1 s"
@@ -217,14 +217,14 @@ class TestBlocked:
         )
         assert "`/twin` answered 0 of 4" in failing("executor.responsive", run)
 
-    def test_no_node(self):
+    def test_without_a_node_that_is_the_cause(self):
         run = nodeless(processes=(died(-11),), ending=Ending.EXITED)
         assert "SIGSEGV" in failing("executor.responsive", run)
         assert "found the node" in failing("executor.responsive", recording(), node="/other")
 
 
 class TestNotJudged:
-    def test_a_busy_machine(self):
+    def test_a_busy_machine_is_never_blamed_on_the_node(self):
         slow = recording(calls=calls(1.4), disturbance=taken(0.5, 4.4, waited_s=0.5))
         finding = responsive(slow)
         assert (finding.status, finding.disturbed) == (Status.ERROR, True)

@@ -173,7 +173,7 @@ class TestExplains:
             (lambda _: math.nan, "not a finite number"),
         ],
     )
-    def test_a_wrong_heading(self, theta, words):
+    def test_a_wrong_heading_is_explained(self, theta, words):
         found = failure(run(lambda t: status(place(t)[0], theta(place(t)[1]), place(t)[2])))
         assert "`pose.theta` = " in found
         assert words in found
@@ -244,7 +244,7 @@ class TestExplains:
         assert "`pose.x` = 0 instead of" in found
         assert found.count("the same number in every message") == 1
 
-    def test_values_that_lag(self):
+    def test_values_that_lag_are_explained(self):
         found = failure(run(lambda t: right(t - 1.0), times=TIMES[20:]))
         assert "those of `/odom` 1.0" in found and "s earlier" in found
 

@@ -266,7 +266,7 @@ class TestManifest:
         kept = tuple(d for d in interfaces().dependencies if d.name not in names)
         return handed_in(dependencies=kept, **changes)
 
-    def test_passes(self):
+    def test_a_complete_manifest_passes(self):
         assert judge("interface.manifest", handed_in(), interface=INTERFACE).status is Status.PASSED
 
     @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def latency(**limits):
     return {"stimulus": "/chatter", "topic": "/cmd_vel", **limits}
 
 
-def test_soon_enough():
+def test_answers_that_come_soon_enough_pass():
     finding = judge(
         "timing.latency", answered([0.01] * 10), **latency(median="20 ms", most="0.1 s")
     )

@@ -140,7 +140,7 @@ class TestAnyFormatIsRight:
             "in the map x = -0.62, y = 1.37; in odom x = 1.37, y = -0.62",
         ],
     )
-    def test_of_two_numbers(self, text):
+    def test_two_numbers_in_any_words_pass(self, text):
         finding = judge("log.follows", run(lines(text, ODOM_TIMES_S)), **POSITION)
         assert finding.status is Status.PASSED, finding
         assert "follow 6 of 6 messages" in finding.observed
@@ -157,7 +157,7 @@ class TestAnyFormatIsRight:
             "1,83",
         ],
     )
-    def test_of_one_number(self, text):
+    def test_one_number_in_any_words_passes(self, text):
         finding = judge("log.follows", run(lines(text, SCAN_TIMES_S)), **FRONT)
         assert finding.status is Status.PASSED, finding
 
@@ -179,7 +179,7 @@ class TestAnyFormatIsRight:
     def test_other_digits_are_no_groups(self, text):
         assert "none shows" in front(lines(text, SCAN_TIMES_S), **ranging(765072.0, *RANGES[1:]))
 
-    def test_on_stdout_too(self):
+    def test_what_is_printed_counts_as_well(self):
         log = tuple(replace(line, stream="stdout") for line in lines("1.37 -0.62", ODOM_TIMES_S))
         assert judge("log.follows", run(log), **POSITION).status is Status.PASSED
 
@@ -404,7 +404,7 @@ class TestNotTheStudentsFault:
         assert finding.status is Status.ERROR, finding
         return finding
 
-    def test_nothing_was_sent(self):
+    def test_a_message_that_was_never_sent_costs_nothing(self):
         finding = self.errs(run(messages={"/odom": run().on("/odom")}))
         assert "nothing was sent on `/scan`" in finding.observed and finding.disturbed
 

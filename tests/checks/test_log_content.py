@@ -47,20 +47,20 @@ class TestContains:
         assert finding.status is Status.PASSED
         assert finding.observed == "1, such as `Ready to go`"
 
-    def test_a_pattern(self):
+    def test_a_pattern_is_found(self):
         run = logging(logs("x = 1.25"), logs("x = ?", 2.0))
         finding = judge("log.contains", run, pattern=r"x = \d+\.\d+$", at_most=1)
         assert finding.status is Status.PASSED
 
-    def test_another_level(self):
+    def test_another_level_is_told(self):
         found = failing("log.contains", logging(logs("ready", level="WARN")), **READY)
         assert "`ready` is logged as WARN, not as INFO" in found
 
-    def test_printed(self):
+    def test_what_is_only_printed_is_told(self):
         found = failing("log.contains", logging(output("ready", stream="stdout")), **READY)
         assert "`ready` is printed, not logged" in found
 
-    def test_similar(self):
+    def test_a_similar_line_is_shown(self):
         found = failing("log.contains", logging(logs("reday")), **READY)
         assert "similar is `reday`" in found
 
@@ -74,10 +74,10 @@ class TestContains:
         assert "the callbacks keep each other waiting" in found
         assert "get_logger" not in found
 
-    def test_nothing_logged(self):
+    def test_an_empty_log_is_told(self):
         assert "the node logs nothing" in failing("log.contains", recording(), **READY)
 
-    def test_too_often(self):
+    def test_too_many_lines_are_counted(self):
         run = logging(*(logs("ready", 1.0 + n) for n in range(3)))
         found = failing("log.contains", run, **READY, at_most=1)
         assert "3 of them" in found and "once=True" in found
@@ -99,7 +99,7 @@ class TestContains:
 
 
 class TestLevel:
-    def test_nothing_above(self):
+    def test_a_log_without_higher_levels_passes(self):
         run = logging(logs("a"), logs("b", 2.0, level="WARN"))
         assert judge("log.level", run, at_most="WARN").status is Status.PASSED
 
@@ -110,12 +110,12 @@ class TestLevel:
 
 
 class TestRate:
-    def test_once_a_second(self):
+    def test_one_line_a_second_passes(self):
         run = logging(*(logs("tick", 0.5 + n) for n in range(4)))
         finding = judge("log.rate", run, text="tick", rate="1 Hz")
         assert (finding.status, finding.observed) == (Status.PASSED, "1 Hz")
 
-    def test_flooded(self):
+    def test_a_flooded_log_loses(self):
         run = logging(*(logs("tick", 0.5 + 0.1 * n) for n in range(30)))
         found = failing("log.rate", run, text="tick", at_most="2 Hz")
         assert "30 log messages, 10 Hz" in found and "throttle_duration_sec" in found
@@ -139,6 +139,6 @@ class TestRate:
         )
         assert judge("log.rate", run, text="tick", at_least="1 Hz").disturbed
 
-    def test_none_of_them(self):
+    def test_a_log_without_such_lines_loses(self):
         found = failing("log.rate", recording(), text="tick", rate="1 Hz")
         assert "the node logs nothing" in found

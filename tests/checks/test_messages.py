@@ -79,7 +79,7 @@ class TestCount:
             (0, {"exactly": 0}, Status.PASSED),
         ],
     )
-    def test_limits(self, number, limits, status):
+    def test_both_limits_of_a_count_hold(self, number, limits, status):
         run = recording(messages=messages(every(0.3, number)) if number else {})
         assert count(run, **limits).status is status
 

@@ -269,13 +269,13 @@ def test_who_publishes_changes_only_does_so_often_enough_for_the_assignment(line
 class TestMistakes:
     """Each mistake loses the checks that it should, with its own words, and no others."""
 
-    def test_nothing_wrapped(self):
+    def test_angles_that_are_not_wrapped_are_named(self):
         run = run_to(BEHIND, (0, 0, -3.0), wrap=lambda error: error)
         found = lost(run, BEHIND)
         assert "through half a turn" in found["motion.short_way"]
         assert "full turn off" in found["proportional on the way"]
 
-    def test_theta_not_wrapped(self):
+    def test_a_goal_heading_that_is_not_wrapped_is_named(self):
         goal = (-0.2, -0.16, math.radians(170))
         start = (0.4, 0.0, math.radians(-165))
         run = run_to(goal, start, wrap_theta=lambda error: error)
@@ -284,7 +284,7 @@ class TestMistakes:
         assert "335° counter-clockwise where 25° clockwise would do" in found["motion.short_way"]
         assert "full turn off" in found["proportional at the goal"]
 
-    def test_three_steps(self):
+    def test_turn_drive_turn_is_named(self):
         def law(error):
             size = 1.2 if abs(error) > 1.0 else 0.6 if abs(error) > 0.3 else 0.2
             return math.copysign(size, error)
@@ -305,7 +305,7 @@ class TestMistakes:
         goal = (0.0, -0.5, 0.0)
         assert lost(run_to(goal, linear=1.0, angular=1.0, spin=1.0), goal) == {}
 
-    def test_wrong_sign(self):
+    def test_a_wrong_sign_is_named(self):
         run = run_to(GOAL, law=lambda error: -1.5 * error, seconds=20)
         found = lost(run, GOAL)
         assert "motion.reaches" in found
@@ -370,7 +370,7 @@ class TestMistakes:
             "motion.slows_down", run
         )
 
-    def test_drives_backwards(self):
+    def test_driving_backwards_is_named(self):
         student = Student(BEHIND)
 
         def by_dx(pose):
@@ -417,7 +417,7 @@ class TestMistakes:
             ((0.4, 0.2, 0.0), "came to rest at (0.3"),
         ],
     )
-    def test_somewhere_else(self, goal, words):
+    def test_another_goal_is_told(self, goal, words):
         run = run_to((*goal[:2], wrap(goal[2])))
         assert words in failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
 
@@ -427,14 +427,14 @@ class TestMistakes:
         said = failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
         assert "counted from where the robot started" in said
 
-    def test_far_too_slow(self):
+    def test_a_robot_that_is_too_slow_is_told(self):
         run = run_to(GOAL, linear=0.02, seconds=20)
         assert (
             "if it is on its way, it is too slow"
             in failing("motion.reaches", run, goal=yaml(GOAL), **REACHES).lower()
         )
 
-    def test_never_stops_turning(self):
+    def test_a_robot_that_never_stops_turning_is_told(self):
         run = run_to(GOAL, align_law=lambda _: 0.5, straight=0.0, seconds=30)
         said = failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
         assert "still turns at 0.5 rad/s" in said or "not at rest" in said
@@ -454,7 +454,7 @@ class TestMistakes:
         found = lost(drive(on_odometry(law), seconds=20), goal)
         assert list(found) == ["motion.overshoot"]
 
-    def test_a_detour(self):
+    def test_a_detour_is_measured(self):
         run = run_to((-0.8, 0.1, 0.0), angular=0.5, linear=0.3, seconds=60)
         said = failing("motion.path_length", run, goal=yaml((-0.8, 0.1, 0.0)), most="20 %")
         assert "longer" in said and "Look at its heading on the way" in said

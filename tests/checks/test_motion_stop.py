@@ -122,7 +122,7 @@ class TestKeepsDriving:
 
 
 class TestDrives:
-    def test_twice_as_fast(self):
+    def test_twice_the_speed_is_told(self):
         run = drive(by_front(0.2), world=WALL, seconds=20)
         assert "2 times the expected speed" in failing("motion.drives", run, **DRIVES)
 
@@ -140,11 +140,11 @@ class TestDrives:
         said = failing("motion.drives", run, **DRIVES)
         assert "1 m/s was commanded, and the robot can do no more than 0.22 m/s" in said
 
-    def test_backwards(self):
+    def test_driving_backwards_is_told(self):
         run = drive(by_front(-0.1), seconds=5)
         assert "-1 times the expected" in failing("motion.drives", run, speed="0.1 m/s")
 
-    def test_on_and_off(self):
+    def test_driving_on_and_off_is_told(self):
         ticks = iter(range(10_000))
         run = drive(on_scan(lambda _: (0.1 * (next(ticks) % 4 < 2), 0.0)), seconds=8)
         assert "paused in between, 9 times" in failing("motion.drives", run, speed="0.1 m/s")
@@ -156,7 +156,7 @@ class TestDrives:
         said = failing("motion.stays_at_rest", drive(law, seconds=6, rest_s=None))
         assert "turned on the spot" in said and "set off" not in said
 
-    def test_turning_instead(self):
+    def test_turning_in_place_of_driving_is_told(self):
         run = drive(on_scan(lambda _: (0.0, 0.1)), seconds=5)
         assert "turns on the spot" in failing("motion.drives", run, speed="0.1 m/s")
 
@@ -170,7 +170,7 @@ class TestDrives:
             "motion.drives", run, speed="0.1 m/s"
         )
 
-    def test_not_a_number(self):
+    def test_a_speed_that_is_not_a_number_is_told(self):
         run = drive(on_scan(lambda _: (math.nan, 0.0)), seconds=2)
         assert "9 commands on `/cmd_vel` were not finite (first: linear nan" in failing(
             "motion.drives", run, speed="0.1 m/s"
@@ -256,13 +256,13 @@ class TestStops:
             said = failing(check, run, **parameters)
             assert "nearest of all" not in said and "made it stop? Log" in said
 
-    def test_never_stops(self):
+    def test_a_robot_that_never_stops_is_told(self):
         run = drive(lambda s: (0.1, 0.0) if s.new_scan else None, world=WALL, seconds=3)
         said = failing("motion.stops", run, **STOPS)
         assert "never stopped: it still drives at 0.1 m/s" in said
         assert "a wall is still" in said
 
-    def test_drives_into_it(self):
+    def test_a_robot_that_hits_the_wall_is_told(self):
         run = drive(lambda s: (0.1, 0.0) if s.new_scan else None, world=WALL, seconds=12)
         for check, parameters in (("motion.stops", STOPS), ("motion.no_contact", {})):
             said = failing(check, run, **parameters)
@@ -318,7 +318,7 @@ class TestStops:
         assert "drove into a wall" in said and "; the last scan had come 6." in said
         assert "Without scans the robot drives blindly" in said and "brake" not in said
 
-    def test_too_late(self):
+    def test_stopping_too_late_is_told(self):
         late = iter(range(1000))
 
         def law(senses: Senses):
@@ -382,7 +382,7 @@ class TestRest:
             "motion.stays_at_rest", run, after="start"
         )
 
-    def test_sets_off_again(self):
+    def test_setting_off_again_is_told(self):
         def forgetful(senses: Senses):
             if not senses.new_scan or senses.scan is None:
                 return None
@@ -392,7 +392,7 @@ class TestRest:
         said = failing("motion.stays_at_rest", run, after="stop")
         assert "set off again 10.1" in said and "a wall" in said
 
-    def test_backs_off(self):
+    def test_backing_off_is_told(self):
         run = drive(on_scan(lambda _: (-0.05, 0.0)), world=WALL, seconds=2, rest_s=None)
         said = failing("motion.stays_at_rest", run, after="start")
         assert "set off backwards" in said
@@ -437,12 +437,12 @@ class TestRest:
 
 
 class TestStraight:
-    def test_a_curve(self):
+    def test_a_curve_is_not_straight(self):
         run = drive(on_scan(lambda _: (0.1, 0.2)), seconds=4)
         said = failing("motion.straight", run)
         assert "angular.z = 0.2 rad/s was commanded" in said
 
-    def test_a_creeping_curve(self):
+    def test_a_slow_curve_is_not_straight(self):
         run = drive(on_scan(lambda _: (0.1, 0.009)), seconds=10)
         assert "the heading changed by" in failing("motion.straight", run)
 

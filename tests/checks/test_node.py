@@ -396,7 +396,7 @@ class TestEnds:
         run = recording(processes=(process(exit_code=1),), log=log)
         assert judge("node.ends", run, within="2 s").status is Status.PASSED
 
-    def test_too_late(self):
+    def test_ending_too_late_is_told(self):
         run = recording(processes=(process(exited_s=7.7, stop_s=3.2),), end_s=7.7)
         found = failing("node.ends", run, within="2 s")
         assert "needed 3.2 s to end after SIGINT" in found
@@ -421,7 +421,7 @@ class TestEnds:
         run = recording(processes=(slow,), end_s=7.7, disturbance=taken(4.5, 7.0, waited_s=0.5))
         assert "needed 3.2 s" in failing("node.ends", run, within="2 s")
 
-    def test_survivors_are_named(self):
+    def test_processes_that_survive_are_named(self):
         run = recording(processes=(process(survivors=("sleep 100", "python3 x.py")),))
         found = failing("node.ends", run, within="2 s")
         assert "left 2 processes running behind it: `sleep 100` and `python3 x.py`" in found
@@ -440,7 +440,7 @@ class TestEnds:
         assert finding.status is Status.ERROR
         assert f"`{BOT}` could not be ended" in finding.observed
 
-    def test_nothing_was_launched(self):
+    def test_without_a_launch_that_is_the_cause(self):
         run = nodeless(ending=Ending.NOT_STARTED, processes=())
         assert "nothing was launched" in failing("node.ends", run, within="2 s")
 

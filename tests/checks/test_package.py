@@ -43,7 +43,7 @@ class TestFound:
     def found(self, subject, **parameters):
         return failing("package.found", subject, package=NAME, **parameters)
 
-    def test_passes(self):
+    def test_a_package_of_that_name_passes(self):
         finding = judge("package.found", submission(), package=NAME, build_type="ament_python")
         assert finding.status is Status.PASSED
         assert "src/bot_publisher" in finding.observed
@@ -54,7 +54,7 @@ class TestFound:
         assert problem in found
         assert "each of them once" in found
 
-    def test_a_misspelt_name(self):
+    def test_a_misspelt_package_is_named(self):
         found = self.found(submission(package("bot_publishr")))
         assert "found package `bot_publishr`" in found
         assert "<name>bot_publisher</name>" in found
@@ -91,7 +91,7 @@ class TestBuilds:
     def found(self, **build):
         return judge("package.builds", submission(**build), package=NAME)
 
-    def test_passes(self):
+    def test_a_package_that_builds_passes(self):
         assert self.found().status is Status.PASSED
 
     def test_the_students_line_comes_first(self):
@@ -145,7 +145,7 @@ class TestBuilds:
         finding = self.found(build=failed_build(NAME, log=log))
         assert "failed: the build was ended because it wrote too much output" in finding.observed
 
-    def test_both_packages_failed(self):
+    def test_of_two_failed_packages_the_first_is_blamed(self):
         log = "Failed   <<< other [1s]\nFailed   <<< bot_publisher [1s]\n"
         subject = submission(
             package(), package("other"), build=failed_build("bot_publisher", "other", log=log)
@@ -280,10 +280,10 @@ class TestBuilds:
         )
         assert judge("package.builds", subject, package=NAME).status is Status.PASSED
 
-    def test_nothing_was_built(self):
+    def test_a_build_that_did_not_run_is_told(self):
         assert self.found(build=None).status is Status.ERROR
 
-    def test_no_package(self):
+    def test_without_a_package_that_is_the_cause(self):
         found = failing("package.builds", submission(package("bot_publishr")), package=NAME)
         assert "found package `bot_publishr`" in found
 
@@ -327,6 +327,6 @@ class TestExecutable:
         subject = submission(package(executables=()), build=failed_build(NAME, culprit=CULPRIT))
         assert str(CULPRIT) in failing("package.executable", subject, **self.WANTED)
 
-    def test_nothing_was_built(self):
+    def test_without_a_build_that_is_the_cause(self):
         finding = judge("package.executable", submission(build=None), **self.WANTED)
         assert finding.status is Status.ERROR

@@ -219,7 +219,7 @@ def states(*labels, success=True, **changes):
 class TestLifecycle:
     WANTED = {"node": "bot_publisher", "states": ["unconfigured", "inactive"]}  # noqa: RUF012
 
-    def test_good(self):
+    def test_a_node_in_the_expected_state_passes(self):
         finding = judge("lifecycle.state", states("unconfigured", "inactive"), **self.WANTED)
         assert finding.observed == "unconfigured then inactive"
 
@@ -235,7 +235,7 @@ class TestLifecycle:
         found = failing("lifecycle.state", run, **self.WANTED)
         assert "it is inactive" in found and "TransitionCallbackReturn" not in found
 
-    def test_a_plain_node(self):
+    def test_a_node_without_states_is_told(self):
         run = states("unconfigured", services=())
         assert "is no lifecycle node" in failing("lifecycle.state", run, **self.WANTED)
 

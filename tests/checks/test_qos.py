@@ -30,7 +30,7 @@ def offering(*profiles: Qos, kind: Kind = Kind.PUBLISHER):
 
 
 class TestOffered:
-    def test_passes(self):
+    def test_an_offer_as_asked_for_passes(self):
         finding = judge(
             "qos.offered", recording(), topic="/cmd_vel", reliability="reliable",
             durability="volatile", liveliness="automatic",
@@ -58,7 +58,7 @@ class TestOffered:
         assert "transient_local" in hint
         assert "best_effort" not in hint
 
-    def test_every_publisher_counts(self):
+    def test_every_publisher_must_offer_it(self):
         run = offering(RELIABLE, BEST_EFFORT)
         assert "best_effort" in failing(
             "qos.offered", run, topic="/cmd_vel", reliability="reliable"
@@ -68,7 +68,7 @@ class TestOffered:
         finding = judge("qos.offered", offering(LATCHED), topic="/cmd_vel", reliability="reliable")
         assert finding.status is Status.PASSED
 
-    def test_durations(self):
+    def test_durations_are_compared_with_their_units(self):
         # A fraction of 2**32 of a second is how DDS writes 300 ms.
         seen = replace(RELIABLE, deadline_s=round(0.3 * 2**32) / 2**32, lifespan_s=1.0)
         run = offering(seen)
@@ -102,7 +102,7 @@ class TestOffered:
 
 
 class TestRequested:
-    def test_passes(self):
+    def test_a_request_as_asked_for_passes(self):
         run = offering(BEST_EFFORT, kind=Kind.SUBSCRIPTION)
         finding = judge("qos.requested", run, topic="/cmd_vel", reliability="best_effort")
         assert finding.status is Status.PASSED
@@ -125,7 +125,7 @@ class TestDepth:
         assert finding.status is Status.PASSED
         assert "declared by the process" in finding.observed
 
-    def test_another_depth(self):
+    def test_another_depth_is_told(self):
         run = recording(declarations=declarations(depth=1))
         found = failing("qos.depth", run, topic="/cmd_vel", depth=10)
         assert "depth 1, declared by the process" in found
@@ -146,7 +146,7 @@ class TestDepth:
         found = failing("qos.depth", run, topic="/scan", depth=10, kind="subscription")
         assert "QoSProfile(depth=10, ...)" in found and "callback, 10)" not in found
 
-    def test_keep_all(self):
+    def test_keep_all_is_no_depth(self):
         item = declared("publisher", topic="/cmd_vel", history="keep_all", depth=10)
         found = failing("qos.depth", recording(declarations=(item,)), topic="/cmd_vel", depth=10)
         assert "history keep_all" in found
@@ -185,7 +185,7 @@ class TestDepth:
         assert (finding.status is Status.PASSED) is passes
         assert passes or f"show that it keeps {kept} message" in finding.observed
 
-    def test_a_subscription(self):
+    def test_the_depth_of_a_subscription_counts_too(self):
         item = declared("subscription", topic="/scan", history="keep_last", depth=5)
         run = recording(
             endpoints=(endpoint("/scan", kind=Kind.SUBSCRIPTION),), declarations=(item,)

@@ -104,7 +104,7 @@ class TestTheBestAvailable:
         wish = peer("subscription", durability="volatile", expect="refuse")
         return judge("qos.compatible", run, **wish)
 
-    def test_it_refuses_nobody(self):
+    def test_it_matches_every_peer(self):
         found = self.volatile_refused(self.run({"durability": "best_available"}))
         assert found.status is Status.FAILED
         assert "asks for the best available durability" in found.observed
@@ -136,7 +136,7 @@ class TestLateJoiner:
         found = failing("qos.compatible", run, **peer(joiner="late"))
         assert "durability volatile offered, transient_local requested" in found
 
-    def test_it_matched(self):
+    def test_a_joiner_that_matched_passes(self):
         run = having(LATCHED, joins=(join(2.0),))
         assert judge("qos.compatible", run, **peer(joiner="late")).status is Status.PASSED
 
@@ -146,7 +146,7 @@ class TestLateJoiner:
         assert finding.status is Status.ERROR
         assert "`late` was never matched" in finding.observed
 
-    def test_it_never_joined(self):
+    def test_a_joiner_that_never_joined_costs_nothing(self):
         finding = judge("qos.compatible", having(LATCHED), **peer(joiner="late"))
         assert finding.status is Status.ERROR
 

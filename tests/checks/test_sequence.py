@@ -28,7 +28,7 @@ def sequence(**parameters):
 
 
 @given(st.integers(-(10**6), 10**6), st.integers(-50, 50), st.integers(3, 30))
-def test_counting_from_anywhere(start, step, length):
+def test_counting_may_begin_anywhere(start, step, length):
     run = counting(*(start + step * n for n in range(length)))
     assert judge("messages.sequence", run, **sequence(step=step)).status is Status.PASSED
     exact = sequence(step=step, start=start)
@@ -53,7 +53,7 @@ def test_a_message_that_was_lost_on_its_way_leaves_its_place_out():
         (("a", "c"), {"values": ["a", "b"]}, "'c' instead of 'b' in message 2 of 2"),
     ],
 )
-def test_mistakes_are_named(values, parameters, words):
+def test_mistakes_in_counting_are_named(values, parameters, words):
     assert words in failing("messages.sequence", counting(*values), **sequence(**parameters))
 
 

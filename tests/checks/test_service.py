@@ -42,10 +42,10 @@ class TestExists:
             ("/robot/enable", "`/robot` stands in front of the name"),
         ],
     )
-    def test_near_misses(self, there, words):
+    def test_near_misses_of_a_service_are_named(self, there, words):
         assert words in failing("service.exists", serving(services=(service(there),)), **ENABLE)
 
-    def test_another_type(self):
+    def test_another_type_of_service_is_named(self):
         run = serving(services=(service(type="std_srvs/srv/Trigger"),))
         found = failing("service.exists", run, service="/enable", type=SET_BOOL)
         assert "has the type `std_srvs/srv/Trigger`" in found
@@ -152,14 +152,14 @@ class TestResponds:
 
 
 class TestConcurrent:
-    def test_side_by_side(self):
+    def test_calls_worked_on_side_by_side_pass(self):
         run = serving(asked(1.0, 0.4), asked(1.001, 0.41))
         assert judge("service.concurrent", run, **SLOW).status is Status.PASSED
         one_after_another = {**SLOW, "calls": "one_after_another"}
         found = failing("service.concurrent", run, **one_after_another)
         assert "both were worked on at the same time" in found
 
-    def test_one_after_another(self):
+    def test_calls_worked_on_one_after_another_pass(self):
         run = serving(asked(1.0, 0.4), asked(1.001, 0.8))
         finding = judge("service.concurrent", run, **SLOW, calls="one_after_another")
         assert finding.status is Status.PASSED

@@ -118,7 +118,7 @@ class TestClass:
 
 
 class TestDocstrings:
-    def test_what_needs_none(self):
+    def test_what_needs_no_docstring_costs_nothing(self):
         text = (
             'import x\nclass A:\n    """A."""\n    def __init__(self): pass\n'
             "    def _private(self): pass\n    @x.setter\n    def x(self, v): pass\n"
@@ -148,7 +148,7 @@ class TestDocstrings:
 
 
 class TestTypeHints:
-    def test_complete(self):
+    def test_complete_type_hints_pass(self):
         text = (
             "class A:\n    def __init__(self, x: int): pass\n"
             "    @staticmethod\n    def s(x: int) -> None: pass\n"
@@ -169,10 +169,10 @@ class TestTypeHints:
             ("async def f(a) -> None: pass", "no hint for `a`"),
         ],
     )
-    def test_incomplete(self, text, words):
+    def test_missing_type_hints_are_named(self, text, words):
         assert words in failing("source.type_hints", files(node=text), **PACKAGE)
 
-    def test_parameters_only(self):
+    def test_parameters_alone_may_be_asked_for(self):
         run = files(node="def f(a: int): pass")
         finding = judge("source.type_hints", run, **PACKAGE, returns=False)
         assert finding.status is Status.PASSED
@@ -189,7 +189,7 @@ class TestNoPrint:
             "# print(1)\n'print(1)'",
         ],
     )
-    def test_what_is_none(self, text):
+    def test_what_is_no_print_costs_nothing(self, text):
         assert judge("source.no_print", files(node=text), **PACKAGE).status is Status.PASSED
 
     @pytest.mark.parametrize(
@@ -202,7 +202,7 @@ class TestNoPrint:
             "from rich import print\nprint(1)",
         ],
     )
-    def test_what_is_one(self, text):
+    def test_a_print_is_found_at_its_line(self, text):
         found = failing("source.no_print", files(node=text), **PACKAGE)
         assert f"1 place with print(), the first at {FOLDER}/node.py:2" in found
 

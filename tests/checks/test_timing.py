@@ -40,7 +40,7 @@ def wrong(run):
 
 
 class TestGood:
-    def test_a_timer(self):
+    def test_the_messages_of_a_timer_pass(self):
         finding = period(recording())
         assert finding.status is Status.PASSED
         assert finding.observed == (
@@ -363,7 +363,7 @@ class TestParameters:
         run = spaced(intervals)
         assert period(run, outliers=outliers).status is status
 
-    def test_intervals_needed(self):
+    def test_a_period_needs_some_intervals(self):
         run = recording(messages=messages(every(PERIOD_S, 6)), stop_s=2.4)
         assert period(run, at_least=5).status is Status.PASSED
         assert "6 messages on `/cmd_vel`" in period(run, at_least=6).observed

@@ -9,7 +9,7 @@ from grader.checks.tolerance import TimeTolerance, parse_time_tolerance
     ("text", "seconds", "words"),
     [("5 %", 0.015, "5 %"), (0.05, 0.015, "5 %"), ("15 ms", 0.015, "15 ms"), (0, 0.0, "0 %")],
 )
-def test_of_300_ms(text, seconds, words):
+def test_tolerances_of_300_ms_are_as_written(text, seconds, words):
     tolerance = parse_time_tolerance(text)
     assert tolerance.of(0.3) == pytest.approx(seconds)
     assert str(tolerance) == words

@@ -51,7 +51,7 @@ class TestRemap:
         assert self.rule(endpoint("/cmdvel")) == "/cmdvel:=/cmd_vel"
         assert self.rule(endpoint("/speed")) == "/speed:=/cmd_vel"
 
-    def test_nothing_is_guessed(self):
+    def test_an_unclear_name_is_never_guessed(self):
         assert not self.rule()
         assert not self.rule(endpoint("/cmdvel", type="geometry_msgs/msg/Vector3"))
         assert not self.rule(endpoint("/cmdvel"), endpoint("/speed"))
@@ -172,7 +172,7 @@ class TestPublished:
 
 
 class TestSubscribed:
-    def test_passes(self):
+    def test_a_subscription_to_the_topic_passes(self):
         run = with_endpoints(endpoint("/scan", kind=Kind.SUBSCRIPTION))
         assert judge("topic.subscribed", run, topic="/scan").status is Status.PASSED
 
@@ -198,7 +198,7 @@ class TestSubscribed:
 
 
 class TestType:
-    def test_passes(self):
+    def test_a_topic_of_the_type_passes(self):
         finding = judge("topic.type", recording(), topic="/cmd_vel", type=TWIST)
         assert finding.status is Status.PASSED
 

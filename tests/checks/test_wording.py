@@ -18,7 +18,7 @@ from grader.findings.wording import codes, counted, listing, value_text
         ([str(n) for n in range(20)], "0, 1, 2, 3, 4, 5, 6, 7 and 12 more"),
     ],
 )
-def test_listing(items, words):
+def test_a_list_reads_as_a_sentence(items, words):
     assert listing(items) == words
 
 
@@ -29,7 +29,7 @@ def test_codes_with_another_last_word():
 @pytest.mark.parametrize(
     ("number", "words"), [(0, "0 messages"), (1, "1 message"), (2, "2 messages")]
 )
-def test_counted(number, words):
+def test_a_number_and_its_noun_agree(number, words):
     assert counted(number, "message") == words
 
 

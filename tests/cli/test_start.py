@@ -40,7 +40,7 @@ def test_a_starter_with_an_interface_generates_it(rosgrade: Rosgrade, tmp_path: 
     assert found["fields"] == "failed"
 
 
-def test_nothing_is_overwritten(rosgrade: Rosgrade, tmp_path: Path) -> None:
+def test_a_file_that_is_there_is_never_overwritten(rosgrade: Rosgrade, tmp_path: Path) -> None:
     rosgrade("start", "timed_publisher", "src")
     node = tmp_path / "src" / "bot_publisher" / "bot_publisher" / "bot_publisher.py"
     node.write_text("mine")

@@ -476,7 +476,9 @@ ALL = [
 
 
 @pytest.mark.parametrize(("names", "check", "subject", "parameters"), ALL)
-def test_it_answers(names: str, check: str, subject: Any, parameters: dict[str, Any]) -> None:
+def test_the_explanation_answers_for_its_case(
+    names: str, check: str, subject: Any, parameters: dict[str, Any]
+) -> None:
     judged = subject() if callable(subject) else subject
     with answers() as found:
         judge(check, judged, **parameters)

@@ -42,13 +42,13 @@ class TestReferences:
     def test_numbers_with_and_without_units(self):
         assert read([1.2, "30 cm", "90 deg"]).goal == Goal(1.2, 0.3, math.pi / 2)
 
-    def test_names(self):
+    def test_names_stand_for_the_values_of_the_run(self):
         form = read(["goal_x", 0, "goal_theta"])
         pose = form.goal.pose({"goal_x": 0.5, "goal_theta": 4.0})
         assert (pose.x_m, pose.y_m) == (0.5, 0.0)
         assert math.isclose(pose.yaw_rad, 4.0 - math.tau)
 
-    def test_an_unknown_name(self):
+    def test_an_unknown_name_is_refused(self):
         with pytest.raises(UnknownValue, match=r"no random value 'goal_z'\. Did you mean 'goal_x'"):
             Goal("goal_z", 0.0, 0.0).pose({"goal_x": 1.0})
         with pytest.raises(UnknownValue, match="It has none"):
@@ -64,7 +64,7 @@ class TestReferences:
             (["$goal_x", 0, 0], "x: .*write 'goal_x'"),
         ],
     )
-    def test_what_is_neither(self, goal, message):
+    def test_what_is_neither_number_nor_name_is_refused(self, goal, message):
         with pytest.raises(ValidationError, match=message):
             read(goal)
 
@@ -98,7 +98,7 @@ class TestGround:
         assert math.isclose(sight.distance_m, distance, abs_tol=1e-9)
 
     @given(distance=st.floats(0.5, 3.0), aside=st.floats(-0.4, 0.4))
-    def test_a_pillar(self, distance, aside):
+    def test_a_pillar_is_as_near_as_its_side(self, distance, aside):
         sight = ahead(scene({"p": ((distance, aside, distance, aside, 0.2),)}), standing())
         if abs(aside) > 0.2:
             assert sight is None
@@ -107,7 +107,7 @@ class TestGround:
             half_m = math.sqrt(max(0.0, 0.04 - aside**2))
             assert math.isclose(sight.distance_m, distance - half_m, abs_tol=1e-8)
 
-    def test_nothing_behind_counts(self):
+    def test_what_is_behind_is_not_ahead(self):
         world = scene({"wall": ((-1.0, -1.0, -1.0, 1.0, 0.0),)})
         assert ahead(world, standing()) is None
         near = nearest(world, standing())

@@ -61,7 +61,7 @@ def test_a_flood_is_judged_by_its_beginning():
         ([0.3, 0.3, 0.3, 0.36], (3,)),
     ],
 )
-def test_irregular_intervals(seconds, irregular):
+def test_irregular_intervals_have_no_period(seconds, irregular):
     assert judge(seconds, LIMITS).irregular == irregular
 
 

@@ -118,7 +118,7 @@ def raw(stamp_ns: int, *fields: float, sequence: int = 1) -> RawMessage:
     return RawMessage("/cmd_vel", "geometry_msgs/msg/Twist", cdr, stamp_ns, stamp_ns + 50, sequence)
 
 
-def test_everything_comes_back(tmp_path: Path) -> None:
+def test_all_that_was_written_is_read_again(tmp_path: Path) -> None:
     recording = a_recording()
     again = read_recording(written(tmp_path, recording))
     assert again == recording

@@ -30,7 +30,7 @@ from grader.safe_text import clean, encodable, one_line
         ("tab\tand Grüße, 日本, π ≈ 3", "tab\tand Grüße, 日本, π ≈ 3"),
     ],
 )
-def test_clean(text, shown):
+def test_control_characters_never_reach_a_terminal(text, shown):
     assert clean(text) == shown
 
 
@@ -38,7 +38,7 @@ def test_an_escape_sequence_without_end_takes_only_its_line():
     assert clean("\x1b]0;title\nthe next line") == "\nthe next line"
 
 
-def test_one_line():
+def test_a_text_of_many_lines_becomes_one():
     assert one_line("first\n\n  second\tcolumn\r\n") == "first ⏎   second    column"
 
 

@@ -212,7 +212,7 @@ class TestHostileText:
             (tag, list(attributes)) for tag, attributes in harmless.elements
         ]
 
-    def test_is_never_active(self, attack):
+    def test_hostile_text_is_never_active(self, attack):
         for _, attributes in page(everywhere(attack)).elements:
             assert not {"src", "srcdoc", "action", "formaction", "style"} & set(attributes)
             assert not any(name.startswith("on") for name in attributes)
@@ -222,7 +222,7 @@ class TestHostileText:
         html = everywhere(attack).html()
         assert not re.search("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202e]", html)
 
-    def test_is_shown(self, attack):
+    def test_hostile_text_is_shown_as_it_is(self, attack):
         visible = "<U+202E>␀" if "\x1b" in attack else attack.replace("`", "")
         assert page(everywhere(attack)).text.count(visible) > 10
 

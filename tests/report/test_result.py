@@ -84,7 +84,7 @@ def test_a_check_with_its_evidence():
     assert {check["author_hint"] for check in written(full_points())["checks"]} == {""}
 
 
-def test_a_run():
+def test_a_run_is_in_the_result():
     (scenario,) = written(lost_points())["scenarios"]
     assert scenario == {
         "id": "listen",

@@ -35,7 +35,7 @@ def luminance(colour):
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize(("front", "ground", "least"), PAIRS)
-def test_contrast(theme, front, ground, least):
+def test_every_text_has_enough_contrast(theme, front, ground, least):
     colours = themes()[theme]
     low, high = sorted([luminance(colours[front]), luminance(colours[ground])])
     assert (high + 0.05) / (low + 0.05) >= least

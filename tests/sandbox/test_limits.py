@@ -63,7 +63,7 @@ def test_a_wrong_limit_is_refused_with_its_reason(written: object, problem: str)
         LimitOptions.model_validate(written)
 
 
-def test_usage_is_measured(tmp_path: Path) -> None:
+def test_what_a_program_uses_is_measured(tmp_path: Path) -> None:
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / "b").write_bytes(bytes(range(256)) * 4096)
     (tmp_path / "link").symlink_to("/")

@@ -63,6 +63,6 @@ def test_compose_is_the_product_of_matrices(parent: Pose, child: Pose) -> None:
 
 
 @given(POSE, POSE)
-def test_relative_undoes_compose(parent: Pose, child: Pose) -> None:
+def test_relative_is_the_inverse_of_compose(parent: Pose, child: Pose) -> None:
     back = matrix(relative(parent, compose(parent, child)))
     assert np.allclose(back, matrix(child), atol=1e-12)

@@ -54,7 +54,9 @@ def test_chord_clearance_is_reached() -> None:
 
 
 @given(POINT, POINT, st.floats(0.01, 2.0))
-def test_circle_clearance(p: tuple[float, float], c: tuple[float, float], r: float) -> None:
+def test_the_clearance_of_a_circle_is_from_its_edge(
+    p: tuple[float, float], c: tuple[float, float], r: float
+) -> None:
     assert circle("c", *c, r).clearance_m(*p) == pytest.approx(
         abs(complex(*p) - complex(*c)) - r, abs=1e-12
     )

@@ -106,7 +106,7 @@ def due_ms(rate: float, seconds: int = 10, **window: str) -> list[int]:
 
 
 @given(st.integers(1, 100))
-def test_no_rate_drifts(rate: int) -> None:
+def test_no_rate_drifts_over_a_long_run(rate: int) -> None:
     assert len(due_ms(rate)) == 10 * rate
 
 

@@ -70,7 +70,7 @@ def test_what_is_written_until_the_end_is_read(
     assert (outcome.status, outcome.output) == (0, "Finished\n")
 
 
-def test_it_reads_nothing(tmp_path: Path) -> None:
+def test_a_bounded_program_gets_no_input(tmp_path: Path) -> None:
     assert (
         run("print(repr(input()))", tmp_path)
         .output.strip()

@@ -88,5 +88,5 @@ def test_a_string_that_is_no_text_can_be_written_down() -> None:
 
 @settings(deadline=None)
 @given(st.binary(max_size=300))
-def test_no_bytes_raise(data: bytes) -> None:
+def test_no_bytes_of_a_source_raise(data: bytes) -> None:
     assert isinstance(parse(data, "node.py"), (ast.Module, SourceError))

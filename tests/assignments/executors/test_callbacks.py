@@ -139,7 +139,7 @@ class TestRun:
         assert finding.status is Status.PASSED
         assert finding.evidence.spans[-1].end_s == STOP_S
 
-    def test_another_period(self):
+    def test_another_period_loses_and_is_told(self):
         runs = [("timer_1", 0.5 + 2 * index, 0.9 + 2 * index) for index in range(3)]
         words = failed("run", run(*runs), ["timer_1"], period="1 s")
         assert "`timer_1` starts every 2 s (median)" in words
@@ -252,7 +252,7 @@ class TestRun:
         )
         assert f"The process made the node `{NODE}` twice" in words
 
-    def test_too_few_runs(self):
+    def test_too_few_runs_lose_and_are_counted(self):
         words = failed("run", run(*only(serial(), "timer_1")[:2]), ["timer_1"], period="1 s")
         assert "ran only 2 times" in words
 
@@ -278,7 +278,7 @@ class TestRun:
         assert "for 4 messages" in words
         assert "Create one subscription" in words
 
-    def test_nothing_was_sent(self):
+    def test_a_message_that_was_never_sent_costs_nothing(self):
         ends = (endpoint("/chatter", kind=Kind.SUBSCRIPTION, type=STRING),)
         subject = run(*parallel(), endpoints=ends)
         assert judged("run", subject, ["chatter"], stimulus="/chatter").status is Status.ERROR
@@ -301,24 +301,24 @@ class TestNearMisses:
     def test_no_report_at_all(self):
         assert EVENTS in failed("run", run(), TIMERS, period="1 s")
 
-    def test_another_name(self):
+    def test_another_name_of_a_callback_is_told(self):
         runs = [("Timer1", *item[1:]) for item in only(parallel(), "timer_1")]
         words = failed("run", run(*runs), ["timer_1"], period="1 s")
         assert "no report of `timer_1`, but reports of `Timer1`" in words
 
-    def test_other_words(self):
+    def test_other_words_in_a_report_are_told(self):
         subject = run(messages={EVENTS: (report(1.0, "timer_1 started"),)})
         words = failed("run", subject, ["timer_1"], period="1 s")
         assert "no message on `/events` is a report" in words
         assert "there is 'timer_1 started', for example" in words
         assert "such as `timer_1 start`" in words
 
-    def test_only_starts(self):
+    def test_starts_without_ends_are_told(self):
         runs = [(name, begin, None) for name, begin, _ in only(parallel(), "timer_1")]
         words = failed("run", run(*runs), ["timer_1"], period="1 s")
         assert "`timer_1` reported 5 starts, but no ends" in words
 
-    def test_only_ends(self):
+    def test_ends_without_starts_are_told(self):
         subject = run(messages={EVENTS: (report(1.0, "timer_1 end"),)})
         words = failed("run", subject, ["timer_1"], period="1 s")
         assert "reported its end, but never its start" in words
@@ -333,7 +333,7 @@ class TestNearMisses:
         words = failed("run", run(*only(parallel(), "timer_1")), TIMERS, period="1 s")
         assert "`timer_2` never ran; reports came of `timer_1`" in words
 
-    def test_the_process_died(self):
+    def test_a_process_that_ended_is_told_first(self):
         words = failed(
             "run", run(("timer_1", 1.0, None), processes=(died(1, 1.4),),
                        log=output(traceback("AttributeError: no attribute 'evnts'"))),
@@ -347,7 +347,7 @@ class TestWork:
     def test_as_long_as_it_should(self):
         assert judged("work", run(*serial()), TIMERS, duration="400 ms").status is Status.PASSED
 
-    def test_milliseconds_for_seconds(self):
+    def test_milliseconds_in_place_of_seconds_are_told(self):
         runs = [("timer_1", second, second + 0.0004) for second in (1, 2, 3)]
         words = failed("work", run(*runs), ["timer_1"], duration="400 ms")
         assert "works 400 us (median of 3 runs)" in words
@@ -432,7 +432,7 @@ class TestNeverOverlap:
         assert "`chatter` ran twice at the same time for 100 ms" in words
         assert "MutuallyExclusiveCallbackGroup" in words
 
-    def test_others_may_overlap(self):
+    def test_callbacks_that_are_not_named_may_overlap(self):
         assert judged("never_overlap", run(*parallel()), ["chatter"]).status is Status.PASSED
 
     def test_a_callback_that_never_ran_proves_nothing(self):
@@ -451,12 +451,12 @@ class TestOverlap:
     def words(self, subject, **more):
         return failed("overlap", subject, ["timer_1"], others=["timer_2"], **more)
 
-    def test_timers_together(self):
+    def test_timers_that_run_together_pass(self):
         finding = self.overlap(run(*parallel()))
         assert finding.status is Status.PASSED
         assert finding.observed == "`timer_1` did so 5 times"
 
-    def test_messages_and_timers(self):
+    def test_messages_during_timers_pass(self):
         finding = judged("overlap", run(*parallel()), ["chatter"], others=list(TIMERS))
         assert finding.status is Status.PASSED
 
@@ -466,7 +466,7 @@ class TestOverlap:
         assert "never ran at the same time" in self.words(run(*runs))
         assert self.overlap(run(*runs), by="10 ms").status is Status.PASSED
 
-    def test_one_thread(self):
+    def test_one_thread_loses_and_is_named(self):
         spin = declared("spin", executor="SingleThreadedExecutor", threads=1)
         words = self.words(run(*serial(), declarations=(spin,)))
         assert "`timer_1` never ran at the same time as `timer_2`" in words

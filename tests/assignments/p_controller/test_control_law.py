@@ -64,7 +64,7 @@ class TestLaw:
         verdict = law(commands)
         assert not (verdict.law is Law.PROPORTIONAL and verdict.r2 >= 0.9)
 
-    def test_the_wrong_sign(self):
+    def test_a_gain_of_the_wrong_sign_is_told(self):
         verdict = law([(e / 1.2, -0.8 * e / 1.2) for e in ERRORS])
         assert verdict.law is Law.WRONG_SIGN
 
@@ -76,8 +76,8 @@ class TestLaw:
         verdict = law([(e, math.sin(1000.0 * e)) for e in ERRORS])
         assert not (verdict.law is Law.PROPORTIONAL and verdict.r2 >= 0.9)
 
-    def test_nothing_but_zeros(self):
+    def test_commands_of_zeros_alone_are_no_law(self):
         assert law([(e, 0.0) for e in ERRORS]).law is Law.ZERO
 
-    def test_nothing_to_correct(self):
+    def test_without_an_error_there_is_no_law(self):
         assert law([(0.01, 0.0)] * 20).law is Law.NOTHING_TO_DO

@@ -63,7 +63,7 @@ class TestLate:
 
 
 class TestTwice:
-    def test_twice_in_time(self):
+    def test_a_second_answer_in_time_is_seen(self):
         assert paired([0, 10], [(1, 0), (2, 0), (11, 1), (12, 1)]) == (0, 0, 1, 1)
 
     def test_the_second_comes_after_the_next_question(self):

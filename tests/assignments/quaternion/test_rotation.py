@@ -141,7 +141,7 @@ class TestByHand:
         assert finding.status is Status.PASSED
         assert finding.observed.startswith("all of 2 cases right, largest error")
 
-    def test_three_fixed_turns(self):
+    def test_three_turns_about_fixed_axes_agree(self):
         # Roll 90 about x, then yaw 90 about the fixed z: x goes to y, y to z, z to x.
         third = [0.5, 0.5, 0.5, 0.5]
         asked = [math.pi / 2, 0, math.pi / 2]
@@ -231,7 +231,7 @@ class TestZero:
         assert "ZeroDivisionError" in words
         assert "node.py:14" in words
 
-    def test_a_zero_quaternion(self):
+    def test_a_zero_quaternion_is_answered_by_no_rotation(self):
         asked = [[0, 0, 0, 0], [HALF, 0, 0, HALF]]
         quarter = [math.pi / 2, 0, 0]
         for zero in (None, [0, 0, 0]):
@@ -456,7 +456,7 @@ def test_right_code_with_rounding_errors_passes(function, style, seed):
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("function", ["axis_angle", "zero_axis"])
-def test_single_precision_passes(function, seed):
+def test_answers_of_single_precision_are_right(function, seed):
     conversion, asked = asked_of(function, seed)
     answers = [single_precision_quaternion(row) for row in asked]
     finding = judged(conversion, asked, answers)
@@ -492,11 +492,11 @@ class TestPairing:
     conversion, asked = asked_of("axis_angle")
     answers = right(conversion, asked)
 
-    def test_late_answers(self):
+    def test_late_answers_are_told(self):
         finding = judged(self.conversion, self.asked, self.answers, late_s=0.75)
         assert finding.status is Status.PASSED
 
-    def test_doubled_answers(self):
+    def test_doubled_answers_are_told(self):
         doubled = [[one, one] for one in self.answers]
         assert judged(self.conversion, self.asked, doubled).status is Status.PASSED
 
