@@ -23,6 +23,8 @@ from grader.submission.intake.archive import SUFFIXES
 from grader.submission.intake.locate import Located, check_path, opened, submission_id
 from grader.submission.intake.members import MIB
 from grader.submission.intake.paths import shown
+from grader.submission.read.bag import read_bags
+from grader.submission.read.document import read_headings
 from grader.submission.read.package import Package, read_package, record_packages
 from grader.submission.read.source import Allowance
 from grader.submission.record import SubmissionRecord
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox
 
 _MAX_PACKAGES = 200
+_MOST_PATHS = 5000
 _ARCHIVES = (*SUFFIXES, ".rar", ".7z")
 
 
@@ -136,10 +139,18 @@ def _prepare(located: Located, builder: Builder) -> Prepared:
     packages = [
         read_package(located, folder, ros, allowance) for folder in located.packages[:_MAX_PACKAGES]
     ]
-    problem = find_problem(located, packages)
-    if problem is not None:
-        records = record_packages(packages, ros, None)
-        return Prepared(SubmissionRecord(located.id, located.sha256, problem, records), None)
+    record = SubmissionRecord(
+        located.id,
+        located.sha256,
+        find_problem(located, packages),
+        record_packages(packages, ros, None),
+        leftovers=located.leftovers,
+        files=tuple(shown(file.path) for file in located.files[:_MOST_PATHS]),
+        headings=read_headings(located.root, located.files),
+        bags=read_bags(located.root, located.files),
+    )
+    if record.problem is not None:
+        return Prepared(record, None)
     used = {name for package in packages for name in package.named}
     used -= {package.name for package in packages}
     ros = completed(ros, used, builder.cache, builder.on_progress)
@@ -162,8 +173,7 @@ def _prepare(located: Located, builder: Builder) -> Prepared:
     if built.install is not None:
         hashes = {path: digest for p in packages for path, digest in p.hashes.items()}
         installed = inspect(built.install, sources.folders, hashes)
-    records = record_packages(packages, ros, installed)
-    record = SubmissionRecord(located.id, located.sha256, None, records, built.build)
+    record = replace(record, packages=record_packages(packages, ros, installed), build=built.build)
     return Prepared(record, built.install, ros.underlays)
 
 

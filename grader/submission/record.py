@@ -160,6 +160,9 @@ class PackageRecord:
         missing_targets: Executables whose ``module:function`` does not exist, with what is wrong.
         files: Python files as installed -> path in the submission; relative to site-packages
             (``bot_publisher/node.py``), or ``lib/<package>/...`` for scripts.
+        description: Text of package.xml.
+        maintainers: Names and e-mail addresses in package.xml, as ``name <e-mail>``.
+        licenses: Licences in package.xml.
         groups: Groups that package.xml makes it a member of (REP-149).
         cmake: Its CMakeLists.txt, or None.
         definitions: Its ``.msg``, ``.srv`` and ``.action`` files, and others beside them.
@@ -182,6 +185,9 @@ class PackageRecord:
     misplaced_executables: tuple[str, ...] = ()
     missing_targets: tuple[tuple[str, SourceError], ...] = ()
     files: tuple[tuple[str, str], ...] = ()
+    description: str = ""
+    maintainers: tuple[str, ...] = ()
+    licenses: tuple[str, ...] = ()
     groups: tuple[str, ...] = ()
     cmake: str | None = None
     definitions: tuple[Definition, ...] = ()
@@ -218,11 +224,39 @@ class BuildRecord:
 
 
 @dataclass(frozen=True)
+class BagTopic:
+    """A topic in a bag."""
+
+    name: str
+    type: str
+    messages: int
+
+
+@dataclass(frozen=True)
+class BagRecord:
+    """A bag as ``ros2 bag record`` writes it.
+
+    Attributes:
+        path: Folder of its metadata.yaml.
+        problem: Why it cannot be read to its end, or None.
+    """
+
+    path: str
+    problem: str | None = None
+    duration_s: float = 0.0
+    topics: tuple[BagTopic, ...] = ()
+
+
+@dataclass(frozen=True)
 class SubmissionRecord:
     """Everything known of a submission before it runs.
 
     Attributes:
         problem: Why nothing can be graded (empty, not a workspace, refused archive), or None.
+        leftovers: What builds and runs made and was handed in too, such as ``build``.
+        files: Paths of what was handed in; at most 5000.
+        headings: Path of each text (Markdown, reStructuredText) -> its headings.
+        bags: Recordings of ``ros2 bag record``.
         build: None where nothing was built.
     """
 
@@ -231,6 +265,10 @@ class SubmissionRecord:
     problem: str | None = None
     packages: tuple[PackageRecord, ...] = ()
     build: BuildRecord | None = None
+    leftovers: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    headings: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    bags: tuple[BagRecord, ...] = ()
 
     @property
     def foreign_imports(self) -> frozenset[str]:

@@ -127,7 +127,7 @@ def test_what_is_saved_while_it_is_read_is_read_again(
 ) -> None:
     root = tree.write({"a.py": "x", "b.py": "x"})
 
-    def save(*_: object) -> object:
+    def save(*_: object, **__: object) -> object:
         monkeypatch.undo()
         (root / "a.py").unlink()
         if saved is not None:

@@ -27,6 +27,9 @@ def changed(old: str, new: str) -> Manifest:
 def test_name_build_type_and_dependencies_are_read() -> None:
     assert read(MANIFEST) == Manifest(
         name="bot_publisher",
+        description="Publishes a Twist",
+        maintainers=("Ada <ada@example.org>",),
+        licenses=("Apache-2.0",),
         build_type="ament_python",
         dependencies=(
             Dependency("rclpy", "depend", 8),

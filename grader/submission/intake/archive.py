@@ -51,11 +51,17 @@ _BROKEN = (
 )
 
 
-def unpack(archive: Path, into: Path, limits: ArchiveLimits | None = None) -> None:
+def unpack(
+    archive: Path,
+    into: Path,
+    limits: ArchiveLimits | None = None,
+    leftovers: set[str] | None = None,
+) -> None:
     """Unpack a zip or a plain or compressed tar; they are told apart by content.
 
     Args:
         into: An existing, empty folder.
+        leftovers: Gets the paths of what builds and runs made, which is not unpacked.
 
     Raises:
         SubmissionError: It is no archive, broken, encrypted, unsafe or too large; names the
@@ -86,7 +92,7 @@ def unpack(archive: Path, into: Path, limits: ArchiveLimits | None = None) -> No
                 plain.seek(member.place)
                 return plain
 
-        entries = admit(found, archive=name, archive_bytes=size, limits=limits)
+        entries = admit(found, archive=name, archive_bytes=size, limits=limits, leftovers=leftovers)
         _make(entries, content, into)
 
 

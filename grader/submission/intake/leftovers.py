@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Set
+from fnmatch import fnmatch
 
 from grader.submission.intake.paths import parents
 from grader.submission.read.manifest import MANIFEST
@@ -29,6 +30,22 @@ _EDITORS = re.compile(
     """,
     re.VERBOSE | re.DOTALL,
 )
+
+
+# What git and macOS add without being asked is not among them.
+_MADE = (
+    *("__pycache__", "*.pyc", "*.egg-info", ".venv", "venv", "node_modules"),
+    *(".pytest_cache", ".mypy_cache", ".ruff_cache"),
+)
+
+
+def built(path: str) -> str | None:
+    """The folder that a build, a run or a test made, of a path that is left out; or None."""
+    for folder in (*reversed(parents(path)), path):
+        name = folder.rpartition("/")[2]
+        if any(fnmatch(name, pattern) for pattern in _MADE):
+            return folder
+    return path if path.rpartition("/")[2] in COLCON_FOLDERS else None
 
 
 def is_left_out(path: str) -> bool:

@@ -14,7 +14,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.errors import GraderFault, SubmissionError, machine_fault
-from grader.submission.intake.leftovers import COLCON_FOLDERS, MARKS, is_left_out, is_leftover
+from grader.submission.intake.leftovers import (
+    COLCON_FOLDERS,
+    MARKS,
+    built,
+    is_left_out,
+    is_leftover,
+)
 from grader.submission.intake.members import MIB, ArchiveLimits, LeadsOut, links_inside
 from grader.submission.intake.paths import is_within, join, parents, shown
 from grader.submission.read.manifest import MANIFEST
@@ -60,8 +66,13 @@ def unreadable(path: str, error: OSError) -> SubmissionError | GraderFault:
     return machine_fault(error, Path(path)) or cannot_be_read
 
 
-def list_files(root: Path, limits: ArchiveLimits | None = None) -> list[SubmissionFile]:
+def list_files(
+    root: Path, limits: ArchiveLimits | None = None, leftovers: set[str] | None = None
+) -> list[SubmissionFile]:
     """List a folder, the same way on every machine.
+
+    Args:
+        leftovers: Gets the paths of what builds and runs made, which is not listed.
 
     Raises:
         SubmissionError: Too many or too large files, a file that cannot be read, or a symbolic
@@ -73,7 +84,11 @@ def list_files(root: Path, limits: ArchiveLimits | None = None) -> list[Submissi
     total = 0
     try:
         for path, entry in _walk(root, ".", False, limits.depth):
-            if entry.is_symlink():
+            if entry is None:
+                found = built(path)
+                if leftovers is not None and found is not None:
+                    leftovers.add(found)
+            elif entry.is_symlink():
                 links[path] = _target(root, path)
             elif entry.is_file(follow_symlinks=False):
                 status = entry.stat(follow_symlinks=False)
@@ -101,7 +116,8 @@ def list_files(root: Path, limits: ArchiveLimits | None = None) -> list[Submissi
 
 def _walk(
     root: Path, folder: str, in_package: bool, depth: int
-) -> Iterator[tuple[str, os.DirEntry[str]]]:
+) -> Iterator[tuple[str, os.DirEntry[str] | None]]:
+    """Paths with their entries; what a tool left behind has none."""
     with os.scandir(root / folder) as found:
         entries = sorted(found, key=lambda entry: entry.name)
     if depth < 0:
@@ -111,11 +127,13 @@ def _walk(
         path = join(folder, entry.name)
         if not entry.is_dir(follow_symlinks=False):
             linked_leftover = entry.is_symlink() and entry.name in COLCON_FOLDERS
-            if not (is_left_out(entry.name) or entry.name.endswith(".pyc") or linked_leftover):
-                yield path, entry
+            left = is_left_out(entry.name) or entry.name.endswith(".pyc") or linked_leftover
+            yield path, None if left else entry
             continue
         marks = {mark for mark in MARKS if (root / path / mark).exists()}
-        if not is_leftover(entry.name, marks, in_package):
+        if is_leftover(entry.name, marks, in_package):
+            yield path, None
+        else:
             yield from _walk(root, path, in_package, depth - 1)
 
 

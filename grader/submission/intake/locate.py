@@ -46,6 +46,7 @@ class Located:
         sha256: Hash over the files' paths, contents and executable bits, as hex.
         root: The private copy; holds exactly ``files``, which are sorted by path.
         packages: Folders with a ``package.xml``, sorted; ``.`` for the submission itself.
+        leftovers: What builds and runs made and was handed in too; it is not in the copy.
     """
 
     id: str
@@ -53,6 +54,7 @@ class Located:
     root: Path
     files: tuple[SubmissionFile, ...]
     packages: tuple[str, ...]
+    leftovers: tuple[str, ...] = ()
 
 
 @contextmanager
@@ -66,19 +68,24 @@ def opened(path: Path | str) -> Iterator[Located]:
     """
     source = check_path(path)
     with Scratch("submission") as scratch:
-        listed = source
+        listed, leftovers = source, set[str]()
         if not source.is_dir():
             listed = scratch / "unpacked"
             listed.mkdir()
-            archive.unpack(source, listed)
+            archive.unpack(source, listed, leftovers=leftovers)
         root = scratch / "submission"
-        files, sha256 = _snapshot(listed, root)
+        files, sha256 = _snapshot(listed, root, leftovers)
+        if leftovers and listed is not source:
+            # Two archives that differ in them are two submissions. In a folder they come and go.
+            names = "\0".join(sorted(leftovers))
+            sha256 = hashlib.sha256(f"{sha256}\0{names}".encode("utf-8", "replace")).hexdigest()
         yield Located(
             id=submission_id(source),
             sha256=sha256,
             root=root,
             files=tuple(files),
             packages=tuple(find_packages(file.path for file in files)),
+            leftovers=tuple(sorted(map(shown, leftovers))),
         )
 
 
@@ -122,11 +129,11 @@ def submission_id(source: Path) -> str:
     return shown(name)
 
 
-def _snapshot(source: Path, root: Path) -> tuple[list[SubmissionFile], str]:
+def _snapshot(source: Path, root: Path, leftovers: set[str]) -> tuple[list[SubmissionFile], str]:
     """Copy a folder as it was at one moment, as far as one can tell."""
     for pause_s in (*_PAUSES_S, None):
         try:
-            files = list_files(source)
+            files = list_files(source, leftovers=leftovers)
             wrapper = wrapper_of(files)
             files = inside(files, wrapper)
             return files, _copy(source / wrapper, files, root)

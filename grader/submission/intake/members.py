@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from grader.errors import SubmissionError
-from grader.submission.intake.leftovers import is_left_out, is_within_leftover
+from grader.submission.intake.leftovers import built, is_left_out, is_within_leftover
 from grader.submission.intake.paths import parents, shown
 
 MIB = 2**20
@@ -70,9 +70,17 @@ class Refused(Exception):
 
 
 def admit(
-    members: Iterable[Member], *, archive: str, archive_bytes: int, limits: ArchiveLimits
+    members: Iterable[Member],
+    *,
+    archive: str,
+    archive_bytes: int,
+    limits: ArchiveLimits,
+    leftovers: set[str] | None = None,
 ) -> list[Member]:
     """Check every member; nothing may be unpacked when one of them is refused.
+
+    Args:
+        leftovers: Gets the paths of what builds and runs made, which is not unpacked.
 
     Returns:
         What to unpack, with safe relative paths as names. Links to nothing are left out.
@@ -90,6 +98,9 @@ def admit(
             if count > limits.members_with_tools or (kept and len(entries) >= limits.members):
                 raise Refused(f"the archive holds more than {limits.members} members")
             if not kept:
+                found = built(path)
+                if leftovers is not None and found is not None:
+                    leftovers.add(found)
                 continue
             if member.kind is Kind.SPECIAL:
                 raise Refused("a device, pipe or other special file is refused")

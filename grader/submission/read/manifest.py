@@ -20,6 +20,7 @@ DEPENDENCY_KINDS = frozenset(_KINDS.split())
 
 _MAX_BYTES = 256 * 1024
 _MAX_DEPENDENCIES = 500
+_LONGEST_TEXT = 1000
 _DEFAULT_BUILD_TYPE = "catkin"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 _UNCLOSED = (
@@ -40,6 +41,7 @@ class Manifest:
             broken before it says.
         error: Why colcon does not accept it, or None.
         misplaced: Entries inside <export>, where they do not count, of a kind ``export/depend``.
+        maintainers: As ``name <e-mail>``.
         groups: Groups that it is a member of (REP-149).
     """
 
@@ -48,6 +50,9 @@ class Manifest:
     error: SourceError | None = None
     dependencies: tuple[Dependency, ...] = ()
     misplaced: tuple[Dependency, ...] = ()
+    description: str = ""
+    maintainers: tuple[str, ...] = ()
+    licenses: tuple[str, ...] = ()
     groups: tuple[str, ...] = ()
 
 
@@ -98,6 +103,13 @@ def read_manifest(data: bytes, file: str, environment: Mapping[str, str]) -> Man
         error=SourceError(file, *error) if error else None,
         dependencies=tuple(dependencies[:_MAX_DEPENDENCIES]),
         misplaced=tuple(misplaced[:_MAX_DEPENDENCIES]),
+        description=" ".join(document.texts("description"))[:_LONGEST_TEXT],
+        maintainers=tuple(
+            f"{one.text.strip()} <{one.attributes.get('email', '')}>"
+            for one in document.elements[:_MAX_DEPENDENCIES]
+            if one.tag == "maintainer"
+        ),
+        licenses=tuple(document.texts("license")[:_MAX_DEPENDENCIES]),
         groups=tuple(document.texts("member_of_group")[:_MAX_DEPENDENCIES]),
     )
 

@@ -1,0 +1,159 @@
+"""Checks of the files of a submission: leftovers of builds, texts, bags."""
+
+from __future__ import annotations
+
+from fnmatch import fnmatch
+
+from pydantic import Field
+
+from grader.checks.check import Parameters, Subject, check
+from grader.diagnosis.cause import Cause
+from grader.findings.finding import Finding
+from grader.findings.wording import code, codes, counted, listing
+from grader.spec.name import InterfaceName, TopicName
+from grader.spec.quantity import Duration
+from grader.spec.unit import format_duration
+from grader.submission.record import BagRecord, SubmissionRecord
+
+
+class Clean(Parameters):
+    """Parameters of archive.clean."""
+
+    asks = "nothing that a build or a run makes, such as `build` or `__pycache__`"
+
+
+@check("archive.clean", Subject.SUBMISSION, Clean)
+def clean(submission: SubmissionRecord, parameters: Clean) -> Finding:
+    """The submission holds nothing that a build or a run makes.
+
+    That is `build`, `install` and `log` of colcon, `__pycache__`, `*.pyc`, `*.egg-info`, virtual
+    environments and caches of tools. A folder is judged as it is, and so is a workspace in which
+    you have just built.
+    """
+    if not submission.leftovers:
+        return Finding.passed(parameters.asked_for, "there is nothing of that kind")
+    return Finding.failed(
+        parameters.asked_for,
+        f"it holds {codes(submission.leftovers)}",
+        "Hand in the sources only. `git archive HEAD -o handin.zip` packs what is committed; put "
+        f"{codes(sorted({one.rpartition('/')[2] for one in submission.leftovers}))} into "
+        "`.gitignore`.",
+    )
+
+
+class File(Parameters):
+    """Parameters of archive.file."""
+
+    path: str = Field(
+        min_length=1,
+        description="Path in the submission, or a file name in any folder; `*` and `?` stand for "
+        "any text and any character, as in `README*`. Lower and upper case are the same.",
+    )
+    headings: tuple[str, ...] = Field(
+        (), description="Words that headings of the text must contain, one heading for each."
+    )
+
+    def _asked(self) -> str:
+        words = listing(f'"{heading}"' for heading in self.headings)
+        return f"a file {code(self.path)}" + (f" with the headings {words}" if words else "")
+
+    def matches(self, path: str) -> bool:
+        """Whether a path is meant."""
+        pattern = self.path.lower()
+        return any(fnmatch(one.lower(), pattern) for one in (path, path.rpartition("/")[2]))
+
+
+@check("archive.file", Subject.SUBMISSION, File)
+def file(submission: SubmissionRecord, parameters: File) -> Finding:
+    """The submission holds the file, with the expected headings.
+
+    Headings are those of Markdown (`# Usage`, or underlined with `===` or `---`) and of
+    reStructuredText. One text must hold all of them.
+    """
+    found = [path for path in submission.files if parameters.matches(path)]
+    if not found:
+        return Finding.failed(
+            parameters.asked_for,
+            "there is no such file",
+            f"Add the file {code(parameters.path)} to what you hand in.",
+        )
+    texts = dict(submission.headings)
+    missing = min((_missing(parameters, texts.get(path, ())) for path in found), key=len)
+    if not missing:
+        return Finding.passed(parameters.asked_for, f"found {codes(found)}")
+    headings = [heading for path in found for heading in texts.get(path, ())]
+    there = listing(f'"{heading}"' for heading in headings) or "none"
+    wanted = listing(f'"{heading}"' for heading in missing)
+    return Finding.failed(
+        parameters.asked_for,
+        f"{codes(found)} lacks {wanted}; its headings: {there}",
+        f"Write a section with the heading `# {missing[0]}`.",
+    )
+
+
+def _missing(parameters: File, headings: tuple[str, ...]) -> list[str]:
+    return [
+        wanted
+        for wanted in parameters.headings
+        if not any(wanted.casefold() in heading.casefold() for heading in headings)
+    ]
+
+
+class Bag(Parameters):
+    """Parameters of archive.bag."""
+
+    topics: dict[TopicName, InterfaceName] = Field(
+        default_factory=dict, description="Topics with messages in the bag -> their types."
+    )
+    lasts: Duration | None = Field(None, description="Least time from first to last message.")
+
+    def _asked(self) -> str:
+        topics = codes(self.topics)
+        lasts = f" of at least {format_duration(self.lasts)}" if self.lasts is not None else ""
+        return f"a bag{lasts}" + (f" with messages on {topics}" if topics else "")
+
+
+@check("archive.bag", Subject.SUBMISSION, Bag)
+def bag(submission: SubmissionRecord, parameters: Bag) -> Finding:
+    """The submission holds a recorded bag that can be read.
+
+    Judged by reading every message of the bags that `ros2 bag record` wrote, in MCAP or SQLite.
+    """
+    causes = [(one, _why_not(one, parameters)) for one in submission.bags]
+    for one, cause in causes:
+        if cause is None:
+            messages = counted(sum(topic.messages for topic in one.topics), "message")
+            observed = f"{code(one.path)} has {messages} in {format_duration(one.duration_s)}"
+            return Finding.passed(parameters.asked_for, observed)
+    if not causes:
+        nothing = "there is no bag, a folder with `metadata.yaml` and an `.mcap` or `.db3` file"
+        cause = Cause(nothing, "Hand in the whole folder that `ros2 bag record` made.")
+    else:
+        cause = next(cause for _, cause in causes if cause is not None)
+    return cause.finding(parameters.asked_for)
+
+
+def _why_not(bag: BagRecord, parameters: Bag) -> Cause | None:
+    """Why a bag is not what is asked for, or None."""
+    here = code(bag.path)
+    if bag.problem is not None:
+        return Cause(
+            f"{here}: {bag.problem}",
+            "End `ros2 bag record` with Ctrl-C and wait until it has ended. `ros2 bag info` must "
+            "be able to read the bag.",
+        )
+    types = {topic.name: topic.type for topic in bag.topics if topic.messages}
+    for topic, kind in parameters.topics.items():
+        if types.get(topic) != kind:
+            there = f"as {code(types[topic])}" if topic in types else "no message"
+            others = f"; it has {codes(types)}" if types else ""
+            return Cause(
+                f"{here} has {there} on {code(topic)}{others if topic not in types else ''}",
+                f"Record {code(topic)} ({kind}) while the node publishes on it.",
+            )
+    if parameters.lasts is not None and bag.duration_s < parameters.lasts:
+        seen = f"{here} lasts {format_duration(bag.duration_s)}"
+        return Cause(seen, "Record for a longer time.")
+    if not types:
+        return Cause(f"{here} has no message", "Record while the node publishes.")
+    return None
