@@ -177,11 +177,7 @@ def _lack(named: NamedFields, message: dict[str, Any]) -> str:
         if isinstance(named.fields, str):
             value_at(message, _INDEX.sub("[0]", named.fields))
             return ""
-        if _INDEX.search("".join(named.fields)):
-            wanted = dict(named.fields)
-        else:
-            wanted = expected_leaves(named.fields, message)
-        for path, expected in wanted.items():
+        for path, expected in expected_leaves(named.fields, message).items():
             sample = value_at(message, _INDEX.sub("[0]", path))
             why = unreachable(expected, sample, tolerance_of(named.tolerance, path))
             if why:

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from grader.findings.condition import is_comparison
 from grader.findings.finding import Table
 from grader.findings.value import (
     Difference,
@@ -44,7 +45,31 @@ def unlike(
 
 def words(value: Mapping[str, Any]) -> str:
     """Write fields as ``a = 2, b = 3``; ``nothing`` for none."""
-    return ", ".join(f"{path} = {value_text(item)}" for path, item in _plain(value)) or "nothing"
+    return ", ".join(f"{path} {_wanted(item)}" for path, item in _plain(value)) or "nothing"
+
+
+def within_words(tolerance: Tolerance) -> str:
+    """Write a tolerance that is worth a word as `` (within 0.1)``."""
+    if not isinstance(tolerance, Mapping):
+        return "" if tolerance <= 1e-6 else f" (within {tolerance:g})"
+    parts = (f"{path} within {amount:g}" for path, amount in tolerance.items())
+    return f" ({', '.join(parts)})" if tolerance else ""
+
+
+def _wanted(value: Any) -> str:
+    if not isinstance(value, str) or not is_comparison(value):
+        return f"= {value_text(value)}"
+    return f"= {value}" if ".." in value else value
+
+
+def instead(item: Difference) -> str:
+    """Write a difference as ``sum = 4 instead of 5``."""
+    return f"{item.field} = {value_text(item.observed)} instead of {_expected_text(item)}"
+
+
+def _expected_text(item: Difference) -> str:
+    is_condition = isinstance(item.expected, str) and isinstance(item.observed, int | float | None)
+    return str(item.expected) if is_condition else value_text(item.expected)
 
 
 def the_goal(goal: Goal) -> str:
@@ -79,15 +104,12 @@ def fields_hint(what: str, value: Mapping[str, Any], wrong: Sequence[str]) -> st
 
 def difference_words(found: Sequence[Difference]) -> str:
     """Write differences as ``sum = 4 instead of 5``."""
-    return ", ".join(
-        f"{item.field} = {value_text(item.observed)} instead of {value_text(item.expected)}"
-        for item in found[:4]
-    )
+    return ", ".join(map(instead, found[:4]))
 
 
 def difference_table(title: str, found: Sequence[Difference]) -> Table:
     """The same as a table."""
-    rows = ((item.field, value_text(item.expected), value_text(item.observed)) for item in found)
+    rows = ((item.field, _expected_text(item), value_text(item.observed)) for item in found)
     return Table(title, ("field", "expected", "observed"), tuple(rows)[:50])
 
 

@@ -4,42 +4,49 @@ from __future__ import annotations
 
 import math
 import re
-import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Annotated, Any
 
 from pydantic import AfterValidator
 
+from grader.findings import condition
+from grader.findings.condition import Condition, is_comparison, is_near
+from grader.spec.expression import Expression
 from grader.spec.nearest_name import did_you_mean
 
-EXACT = 1e-9
+EXACT = condition.EXACT
 """Largest difference of two numbers that are meant to be the same."""
 
 Tolerance = float | Mapping[str, float]
 """Largest difference of two numbers: of every field, or by path, where others are exact."""
 
-FLOAT32_MAX = 3.4028234663852886e38
-
-_NAME = r"[A-Za-z][A-Za-z0-9_]*(?:\[[0-9]{1,9}\])*"
-_PATH = re.compile(rf"{_NAME}(?:\.{_NAME})*")
 _STEP = re.compile(r"[A-Za-z0-9_]+")
+_QUATERNION = "xyzw"
 
 
 def _field_path(text: str) -> str:
-    if not _PATH.fullmatch(text):
+    try:
+        Expression.of(text)
+    except ValueError as error:
         raise ValueError(
             f"{text!r} is not a field: write its path, such as 'pose.pose.position.x' or "
-            "'ranges[0]'"
-        )
+            f"'ranges[0]', or an expression such as 'yaw(pose.pose.orientation)' ({error})"
+        ) from None
     return text
 
 
 FieldPath = Annotated[str, AfterValidator(_field_path)]
+"""The path of a field, or an expression of fields."""
 
 
 class NoSuchField(ValueError):
     """The expected value names a field that the message does not have, or of another kind."""
+
+
+class NoSuchItem(NoSuchField):
+    """An array of the message has fewer items than the assignment names."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +76,12 @@ def expected_leaves(expected: Mapping[str, Any], message: Mapping[str, Any]) -> 
         NoSuchField: A name is not a field of the message, or its value has another kind.
     """
     found: dict[str, Any] = {}
-    _expect([], expected, message, "", found)
+    _expect(expected, message, "", found)
+    for path, item in found.items():
+        try:
+            same(item, item_at(message, path), EXACT, message)
+        except NoSuchField as error:
+            raise NoSuchField(f"{path} is a number, but {error}") from None
     return found
 
 
@@ -86,19 +98,40 @@ def _field_of(message: Any, name: str, here: str) -> Any:
 
 
 def value_at(message: Mapping[str, Any], path: str) -> Any:
-    """The plain value in a field of a message; :class:`NoSuchField` if there is none."""
-    here: Any = message
-    done = "the message"
+    """The plain value in a field of a message, or of an expression of its fields.
+
+    Raises:
+        NoSuchField: There is none.
+    """
+    try:
+        found = Expression.of(path).value(lambda name: _part_of(message, name))
+    except TypeError as error:
+        raise NoSuchField(f"{path} cannot be computed: {error}") from None
+    if isinstance(found, Mapping):
+        raise NoSuchField(f"{path} is a message: name one of its fields ({', '.join(found)})")
+    return found
+
+
+def item_at(message: Mapping[str, Any], path: str) -> Any:
+    """The same; None where an array is too short, which is no mistake of the assignment."""
+    try:
+        return value_at(message, path)
+    except NoSuchItem:
+        return None
+
+
+def _part_of(message: Any, path: str, around: str = "") -> Any:
+    """What is in a field of a message, whose own path is ``around``: perhaps a message itself."""
+    here = message
     for step in _STEP.findall(path):
         if isinstance(here, Sequence) and not isinstance(here, str) and step.isdigit():
             if int(step) >= len(here):
-                raise NoSuchField(f"{done} has {len(here)} items, so there is no [{step}]")
+                raise NoSuchItem(f"{around} has {len(here)} items, so there is no [{step}]")
             here = here[int(step)]
+            around += f"[{step}]"
         else:
-            here = _field_of(here, step, done)
-        done = step
-    if isinstance(here, Mapping):
-        raise NoSuchField(f"{path} is a message: name one of its fields ({', '.join(here)})")
+            here = _field_of(here, step, around or "the message")
+            around = f"{around}.{step}" if around else step
     return here
 
 
@@ -110,19 +143,39 @@ def number_at(message: Mapping[str, Any], path: str) -> float:
     return float(value)
 
 
-def _expect(names: list[str], item: Any, message: Any, path: str, found: dict[str, Any]) -> None:
-    if names:
-        inner = _field_of(message, names[0], path or "the message")
-        _expect(names[1:], item, inner, f"{path}.{names[0]}" if path else names[0], found)
-    elif isinstance(item, Mapping):
-        for key, inner in item.items():
-            _expect(str(key).split("."), inner, message, path, found)
+def _expect(item: Any, message: Any, path: str, found: dict[str, Any]) -> None:
+    if isinstance(item, Mapping):
+        for name, inner in item.items():
+            here = f"{path}.{name}" if path else str(name)
+            try:
+                _expect(inner, _named(message, str(name), path), here, found)
+            except NoSuchItem:
+                found[here] = inner
     elif isinstance(message, Mapping):
         raise NoSuchField(f"{path} is a message: name its fields ({', '.join(message)})")
-    elif _kind(item) != _kind(message):
+    elif not _is_asked(item, message) and _kind(item) != _kind(message):
         raise NoSuchField(f"{path} {_other_kind(item, message)}")
     else:
         found[path] = item
+
+
+def _named(message: Any, key: str, around: str) -> Any:
+    """What a key of an expected value names, in the message that is at the path ``around``."""
+    try:
+        expression = Expression.of(key)
+    except ValueError as error:
+        raise NoSuchField(f"{around or 'the message'} has no field {key!r}: {error}") from None
+    if expression.is_field:
+        return _part_of(message, key, around)
+    if around:
+        raise NoSuchField(f"write {key!r} outside of {around!r}, with the whole paths of fields")
+    return value_at(message, key)
+
+
+def _is_asked(item: Any, value: Any) -> bool:
+    """Whether a text is expected of a number: it is a condition."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return isinstance(item, str) and item != "" and number
 
 
 def _other_kind(item: Any, value: Any) -> str:
@@ -134,6 +187,8 @@ def _other_kind(item: Any, value: Any) -> str:
 
 def unreachable(expected: Any, sample: Any, tolerance: float) -> str:
     """Why a field can never have an expected value, to follow its name; nothing if it can."""
+    if _is_asked(expected, sample):
+        return ""
     if _kind(expected) != _kind(sample):
         return _other_kind(expected, sample)
     items, samples = _items(expected), _items(sample)
@@ -168,16 +223,32 @@ def differences(
     """
     found = []
     for path, wanted in expected.items():
-        observed = value_at(message, path)
-        if not same(wanted, observed, tolerance_of(tolerance, path)):
+        observed, circle = item_at(message, path), Expression.of(path).circle
+        if not same(wanted, observed, tolerance_of(tolerance, path), message, circle):
             found.append(Difference(path, wanted, observed))
+    found = [one for one in found if not _is_opposite(one.field, expected, message, tolerance)]
     if rest_zero:
+        known = {name for path in expected for name in Expression.of(path).fields}
         for path, observed in leaves(message).items():
-            named = any(path == known or path.startswith(known + "[") for known in expected)
+            named = any(path == name or path.startswith((f"{name}[", f"{name}.")) for name in known)
             if not named and not _is_zero(observed, tolerance_of(tolerance, path)):
                 zero = [] if _items(observed) is not None else type(observed)()
                 found.append(Difference(path, zero, observed))
     return tuple(found)
+
+
+def _is_opposite(
+    path: str, expected: Mapping[str, Any], message: Mapping[str, Any], tolerance: Tolerance
+) -> bool:
+    """Whether a field is of a quaternion that is -q where q is expected: the same rotation."""
+    around = path[:-2] if path[-2:-1] == "." else ""
+    names = [f"{around}.{part}".removeprefix(".") for part in _QUATERNION]
+    if path not in names or any(_kind(expected.get(name)) != "a number" for name in names):
+        return False
+    return set(_part_of(message, around)) == set(_QUATERNION) and all(
+        same(-expected[name], value_at(message, name), tolerance_of(tolerance, name))
+        for name in names
+    )
 
 
 def tolerance_of(tolerance: Tolerance, path: str) -> float:
@@ -185,30 +256,52 @@ def tolerance_of(tolerance: Tolerance, path: str) -> float:
     return tolerance.get(path, EXACT) if isinstance(tolerance, Mapping) else tolerance
 
 
-def same(wanted: Any, observed: Any, tolerance: float) -> bool:
-    """Whether an observed value is the wanted one; NaN is the same as NaN.
+def same(
+    wanted: Any,
+    observed: Any,
+    tolerance: float,
+    message: Mapping[str, Any] = MappingProxyType({}),
+    circle: float = 0.0,
+) -> bool:
+    """Whether an observed value is the wanted one; a text asks something of a number.
 
-    A float32 field holds the float32 that is nearest to the wanted number: that is the same.
+    Args:
+        message: With the fields that expressions in the text name.
+        circle: Of an angle a full turn in its unit.
+
+    Raises:
+        NoSuchField: The text asks nothing of a number, or names what the message does not have.
     """
     wanted_items, observed_items = _items(wanted), _items(observed)
     if wanted_items is not None and observed_items is not None:
         return len(wanted_items) == len(observed_items) and all(
-            same(a, b, tolerance) for a, b in zip(wanted_items, observed_items, strict=True)
+            same(*pair, tolerance, message)
+            for pair in zip(wanted_items, observed_items, strict=True)
         )
+    if _is_asked(wanted, observed):
+        try:
+            asked = Condition.of(wanted)
+            return asked.holds(observed, tolerance, lambda name: _part_of(message, name), circle)
+        except NoSuchItem:
+            return False
+        except NoSuchField as error:
+            raise NoSuchField(f"{wanted!r} is expected of it: {error}") from None
+        except (TypeError, ValueError) as error:
+            raise NoSuchField(
+                f"{wanted!r} is expected of it: write a number, '> 0', '0.1 .. 0.5' or an "
+                f"expression of fields ({error})"
+            ) from None
     truth = isinstance(wanted, bool) or isinstance(observed, bool)
     if truth or not (isinstance(wanted, int | float) and isinstance(observed, int | float)):
         # A tolerance is for numbers: false is never near enough to true.
         return bool(wanted == observed)
-    if math.isnan(wanted) or math.isnan(observed):
-        return math.isnan(wanted) and math.isnan(observed)
-    if wanted == observed or abs(wanted - observed) <= tolerance:
-        return True
-    in_range = abs(wanted) <= FLOAT32_MAX
-    return in_range and observed == struct.unpack("f", struct.pack("f", wanted))[0]
+    return is_near(wanted, observed, tolerance, circle)
 
 
 def same_value(wanted: Any, observed: Any) -> bool:
-    """Whether two values of parameters are the same: ``true`` is not 1."""
+    """Whether a parameter has the wanted value: ``true`` is not 1, and '1' neither."""
+    if _is_asked(wanted, observed) and not is_comparison(wanted):
+        return False
     return isinstance(wanted, bool) == isinstance(observed, bool) and same(wanted, observed, EXACT)
 
 

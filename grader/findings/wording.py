@@ -37,7 +37,9 @@ def counted(number: int, noun: str, plural: str | None = None) -> str:
 
 def value_text(value: Any) -> str:
     """Write a value of a message field exactly, so that two different ones never look alike."""
-    if isinstance(value, bool):
+    if value is None:
+        text = "nothing"
+    elif isinstance(value, bool):
         text = str(value).lower()
     elif isinstance(value, float):
         text = repr(value) if math.isfinite(value) else str(value)

@@ -12,6 +12,7 @@ from itertools import combinations
 from grader.findings.value import number_at
 from grader.findings.wording import code
 from grader.recording.model import NS, LogLine, Message, Recording
+from grader.spec.expression import Expression
 
 _NUMBER = re.compile(
     r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[-+]?\b(?:inf|nan)\b",
@@ -97,19 +98,21 @@ def exchanged(text: str, values: Mapping[str, float], decimals: int) -> tuple[st
 
 
 def _last(path: str) -> str:
-    return path.rpartition(".")[2].lower()
+    return path.partition("(")[0].rpartition(".")[2].lower()
 
 
-def shows(number: float, value: float, decimals: int) -> bool:
+def shows(number: float, value: float, decimals: int, circle: float = 0.0) -> bool:
     """Whether a printed number stands for a value.
 
     Args:
         decimals: How many of its decimals must be right; the last of them may be one off,
             because cutting off is right too.
+        circle: Of an angle a full turn in its unit.
     """
     if not (math.isfinite(number) and math.isfinite(value)):
         return number == value or (math.isnan(number) and math.isnan(value))
-    return abs(number - value) <= 10.0**-decimals + _FLOAT_NOISE
+    difference = math.remainder(number - value, circle) if circle else number - value
+    return abs(difference) <= 10.0**-decimals + _FLOAT_NOISE
 
 
 @dataclass(frozen=True)
@@ -235,5 +238,5 @@ def shown(printed: Sequence[float], wanted: Wanted, decimals: int) -> set[str]:
     return {
         path
         for path, value in wanted.values.items()
-        if any(shows(number, value, decimals) for number in printed)
+        if any(shows(number, value, decimals, Expression.of(path).circle) for number in printed)
     }

@@ -92,7 +92,8 @@ class _Reader:
         if isinstance(node, yaml.ScalarNode) and kind in _SCALARS:
             return self._scalar(node, kind, place)
         tag = f"!!{kind}" if node.tag.startswith(_TAG) else node.tag
-        self._report(node, place, f"the tag {tag} is not allowed here")
+        advice = ": a comparison needs quotes, as in '!= 0'" if tag == "!=" else ""
+        self._report(node, place, f"the tag {tag} is not allowed here{advice}")
         return None
 
     def _mapping(self, node: yaml.MappingNode, place: Place) -> dict[str, Any]:
@@ -149,6 +150,7 @@ _ADVICE = {
     "unknown escape character": "write a text with a backslash in single quotes, as in '\\d+'",
     "expected <block end>": "does this line stand as far to the right as those that it belongs to, "
     "and is every quote before it closed?",
+    "while scanning a block scalar": "a comparison needs quotes, as in '> 0'",
     "while": "is a comma, a bracket or a quote missing?",
 }
 

@@ -116,6 +116,36 @@ def found(mistakes: Callable[[str], list[str]], ros_with: Callable[..., None]) -
             f"contains.sum: {ADD}sum is a number, but a text is expected of it",
         ),
         (
+            "messages.equal",
+            "topic: /twist, value: {linear.x: fast}",
+            f"value: {TWIST}linear.x is a number, but 'fast' is expected of it: the message has no "
+            "field 'fast'; it has angular, linear.",
+        ),
+        (
+            "messages.equal",
+            "topic: /twist, value: {hypot(linear.x, linear.z): 1}",
+            f"value: {TWIST}the message has no field 'hypot(linear.x': 'hypot(linear.x' cannot be "
+            "read: inside {...} an expression with a comma needs quotes",
+        ),
+        (
+            "messages.equal",
+            "topic: /twist, value: {'norm(linear)': '3 .. 1'}",
+            f"value: {TWIST}norm(linear) is a number, but '3 .. 1' is expected of it: write a "
+            "number, '> 0', '0.1 .. 0.5' or an expression of fields (the lowest value of '3 .. 1' "
+            "is above the highest)",
+        ),
+        (
+            "messages.follows",
+            "topic: /twist, source: /twist, fields: {linear.x: yaw(linear)}, tolerance: 1",
+            f"fields.linear.x: {TWIST}yaw(linear) cannot be computed: a quaternion has x, y, z and "
+            "w",
+        ),
+        (
+            "messages.follows",
+            "topic: /twist, source: /twist, fields: {linear.x: linear.y}, tolerance: {linear.q: 1}",
+            f"tolerance.linear.q: {TWIST}linear has no field 'q'; it has x, y, z.",
+        ),
+        (
             "action.result",
             "action: /count, within: 1 s, result: {numbers: [1, 2.5]}",
             f"result: {COUNT}numbers is a whole number, but 2.5 is expected of it",
@@ -139,6 +169,15 @@ def test_a_field_that_a_message_does_not_have_is_told_with_its_line(
         ("messages.equal", "topic: /twist, value: {linear: {x: 1}, angular.z: 0.5}"),
         ("messages.equal", "topic: /path, value: {sizes: [1, 2, 3], points: [{x: 1}]}"),
         ("messages.equal", "topic: /lab, value: {whatever: 1}"),
+        (
+            "messages.equal",
+            "topic: /twist, value: {norm(linear): '<= 0.22', angular.z: 0 .. 90 deg}",
+        ),
+        (
+            "messages.equal",
+            "topic: /path, value: {'sizes[2]': '> sizes[1]', 'points[7].x': '!= 0'}",
+        ),
+        ("messages.sequence", "topic: /twist, field: norm(linear), values: [0, '> 0']"),
         (
             "messages.follows",
             "topic: /path, source: /twist, tolerance: 1, fields: {'points[7].x': linear.x}",

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from grader.checks.messages.derived_messages import yaw
 from grader.findings.finding import Status
 from grader.recording.model import Recording
+from grader.spec.expression import yaw
 from tests.checks.builder import (
     endpoint,
     failing,
@@ -104,6 +104,32 @@ def verdict(subject: Recording, **changes):
 
 def failure(subject: Recording) -> str:
     return failing("messages.follows", subject, **PARAMETERS)
+
+
+class TestExpressions:
+    def test_both_sides_may_be_expressions_and_angles_are_compared_on_the_circle(self):
+        fields = {
+            "pose.theta - 7": "yaw(pose.pose.orientation) - 7",
+            "speed / 2": "hypot(twist.twist.linear.x, 0) / 2",
+        }
+        assert verdict(run(right), fields=fields).status is Status.PASSED
+        fields["speed / 2"] = "hypot(twist.twist.linear.x, 0) / 3"
+        found = verdict(run(right), fields=fields)
+        assert found.status is Status.FAILED
+        assert "`speed / 2` = " in found.observed
+
+    def test_each_field_may_have_its_own_tolerance(self):
+        def rough(time_s):
+            x, theta, speed = place(time_s)
+            return status(x + 0.05, theta, speed)
+
+        tolerance = {"pose.x": 0.06, "pose.theta": 0.01, "speed": 0.01}
+        assert verdict(run(rough), tolerance=tolerance).status is Status.PASSED
+        tolerance = {**tolerance, "pose.x": 0.01, "speed": 0.02}
+        found = verdict(run(rough), tolerance=tolerance)
+        assert found.status is Status.FAILED
+        assert "`pose.x`" in found.observed and "speed" not in found.observed
+        assert "(pose.x within 0.01, pose.theta within 0.01, speed within 0.02)" in found.expected
 
 
 class TestPasses:

@@ -32,6 +32,7 @@ POSITION = {
     "at_least": 2,
 }
 FRONT = {"topic": "/scan", "fields": ["ranges[0]"], "at_least": 2}
+HEADING = {"topic": "/odom", "fields": ["yaw(pose.pose.orientation)"], "at_least": 2}
 # One sends from 1 s to 2 s, the other from 3 s to 4 s.
 ODOM_TIMES_S = [1.0, 1.2, 1.4, 1.6, 1.8, 2.0]
 SCAN_TIMES_S = [3.0, 3.2, 3.4, 3.6, 3.8, 4.0]
@@ -114,6 +115,19 @@ def position(log=(), **changes):
 
 def front(log=(), **changes):
     return failing("log.follows", run(log, **changes), **FRONT)
+
+
+class TestExpressions:
+    @pytest.mark.parametrize("text", ["heading: 3.14", "heading: -3.14"])
+    def test_a_heading_is_what_follows_from_the_quaternion_on_the_circle(self, text):
+        backwards = odometry()
+        backwards["pose"]["pose"]["orientation"] = {"x": 0.0, "y": 0.0, "z": 1.0, "w": 0.0}
+        messages = {"/odom": sent("/odom", ODOMETRY, backwards, ODOM_TIMES_S)}
+        followed = run(lines(text, ODOM_TIMES_S), messages=messages)
+        assert judge("log.follows", followed, **HEADING).status is Status.PASSED
+        wrong = run(lines("heading: 1.57", ODOM_TIMES_S), messages=messages)
+        assert "yaw(pose.pose.orientation)" in judge("log.follows", wrong, **HEADING).expected
+        assert judge("log.follows", wrong, **HEADING).status is Status.FAILED
 
 
 class TestAnyFormatIsRight:

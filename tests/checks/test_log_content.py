@@ -19,6 +19,7 @@ from tests.checks.builder import (
 )
 from tests.checks.requests import logs
 
+PASSED = Status.PASSED
 READY = {"text": "ready", "level": "INFO"}
 
 
@@ -39,6 +40,26 @@ class TestRecords:
 
     def test_printed_lines_are_none(self):
         assert not logged(logging(output("[INFO] not a logger\nready")))
+
+
+class TestNumbers:
+    def test_a_number_in_the_record_is_judged_however_it_is_written(self):
+        run = logging(logs("distance=1.37m"))
+        assert judge("log.contains", run, text="distance", number="1.3 .. 1.4").status is PASSED
+        assert judge("log.contains", run, number="> 1").status is PASSED
+        assert "none" in failing("log.contains", run, text="distance", number="< 1").split("|")[0]
+
+    def test_a_printed_number_counts_where_the_assignment_says_so(self):
+        run = logging(logs("ready"), output("distance 1.37", stream="stdout"))
+        wanted = {"text": "distance", "number": "1.3 .. 1.4"}
+        assert "is printed, not logged" in failing("log.contains", run, **wanted)
+        found = judge("log.contains", run, **wanted, printed=True)
+        assert found.status is PASSED
+        assert found.evidence.log == ("distance 1.37",)
+
+    def test_a_logged_line_counts_once_where_printed_lines_count(self):
+        run = logging(logs("distance 1.37"))
+        assert judge("log.contains", run, number=1.37, printed=True, at_most=1).status is PASSED
 
 
 class TestContains:

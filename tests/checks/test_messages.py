@@ -276,7 +276,7 @@ class TestEqual:
             ({"liner": {"x": 1.0}}, "Did you mean 'linear'?"),
             ({"linear": 1.0}, "linear is a message: name its fields (x, y, z)"),
             ({"linear": {"x": {"y": 1.0}}}, "linear.x has no field 'y': it is a plain value"),
-            ({"linear.x": "fast"}, "linear.x is a number, but a text is expected of it"),
+            ({"linear.x": "fast"}, "linear.x is a number, but 'fast' is expected of it"),
         ],
     )
     def test_a_wrong_field_in_the_assignment_costs_no_student_a_point(self, value, words):

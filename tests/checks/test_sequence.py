@@ -41,6 +41,14 @@ def test_a_message_that_was_lost_on_its_way_leaves_its_place_out():
     assert "data" in failing("messages.sequence", counting(0, 1, 3, 4), **sequence(step=1))
 
 
+def test_a_value_may_be_a_comparison_and_the_field_an_expression():
+    run = counting(-1, 4, 9)
+    wanted = sequence(field="data / 2", values=["< 0", 2, "4 .. 5"])
+    assert judge("messages.sequence", run, **wanted).status is Status.PASSED
+    wanted["values"][1] = "!= 2"
+    assert "2 instead of '!= 2' in message 2 of 3" in failing("messages.sequence", run, **wanted)
+
+
 @pytest.mark.parametrize(
     ("values", "parameters", "words"),
     [

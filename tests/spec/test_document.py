@@ -121,6 +121,8 @@ def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path: Path) -> N
         ('a: "\\d+"', 1, "write a text with a backslash in single quotes, as in '\\d+'"),
         ("- a\nb: 1\n", 2, "does this line stand as far to the right as those that it belongs to,"),
         ("a: [1, 2\nb: 3\n", 2, "(is a comma, a bracket or a quote missing?)"),
+        ("a: > 0", 1, "(a comparison needs quotes, as in '> 0')"),
+        ("a: != 0", 1, "the tag != is not allowed here: a comparison needs quotes, as in '!= 0'"),
         ("a: 1\nb: @x", 2, "cannot start any token (a text that begins with it needs quotes)"),
         ("a: 1\n---\nb: 2", 2, "expected a single document"),
         ("a: *b", 1, "found undefined alias"),

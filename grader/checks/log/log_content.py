@@ -15,11 +15,13 @@ from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.blocked_executor import left_s, why_not_called
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.wrong_rhythm import why_paused
+from grader.findings.condition import Condition
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import until_the_end
+from grader.findings.value import EXACT, same
 from grader.findings.wording import code, counted, percent
-from grader.measure.printed import logged_text, quote
-from grader.recording.model import NS, Recording
+from grader.measure.printed import logged_text, numbers, quote
+from grader.recording.model import NS, LogLine, Recording
 from grader.spec.name import QualifiedNodeName
 from grader.spec.nearest_name import nearest
 from grader.spec.quantity import Frequency, Ratio
@@ -78,6 +80,27 @@ def _pattern(text: str) -> str:
     return text
 
 
+def _number(text: str) -> str:
+    try:
+        named = [bound.fields for bound in Condition.of(text).bounds]
+    except ValueError as error:
+        raise ValueError(f"write a number, '> 0' or '0.1 .. 0.5': {error}") from None
+    if any(named):
+        raise ValueError(f"{text!r} names a field, but a line of the log has none")
+    return text
+
+
+def _printed(recording: Recording) -> list[LogLine]:
+    """Lines of output until the end of the observation that no logger wrote."""
+    return [
+        line
+        for line in recording.log
+        if line.stream != "rosout"
+        and logged_text(line.text) == line.text
+        and line.time_ns <= recording.stop_ns
+    ]
+
+
 class Records(Parameters):
     """Part of the parameters of the checks of log records."""
 
@@ -109,6 +132,10 @@ class Matching(Records):
     pattern: Annotated[str, AfterValidator(_pattern)] | None = Field(
         None, description="A regular expression of Python that is found in the record."
     )
+    number: Annotated[str, AfterValidator(_number)] | float | None = Field(
+        None,
+        description="What a number in the record must be, such as `42`, `> 0` or `0.1 .. 0.5`.",
+    )
     level: Level | None = Field(None, description="Level of the record; by default any.")
 
     @property
@@ -117,12 +144,17 @@ class Matching(Records):
         level = f"{self.level} " if self.level else ""
         what = f" with “{self.text}”" if self.text is not None else ""
         what += f" that match {code(self.pattern)}" if self.pattern is not None else ""
+        what += f" with a number {self.number}" if self.number is not None else ""
         whose = f" of {code(self.node)}" if self.node else ""
         return f"{level}log messages{whose}{what}"
 
     def says(self, text: str) -> bool:
         """Whether a record's text is meant."""
         if self.text is not None and self.text.casefold() not in text.casefold():
+            return False
+        if self.number is not None and not any(
+            same(self.number, number, EXACT) for number in numbers(text)
+        ):
             return False
         return self.pattern is None or re.search(self.pattern, text) is not None
 
@@ -140,11 +172,22 @@ class Contains(Matching):
 
     at_least: int = Field(1, ge=0, description="Least number of such records.")
     at_most: int | None = Field(None, ge=0, description="Largest number of such records.")
+    printed: bool = Field(
+        False, description="Whether lines that a process prints count, too. They have no level."
+    )
+
+    def of(self, recording: Recording) -> list[Logged]:
+        """The records, and what was printed if that counts."""
+        lines = _printed(recording) if self.printed else []
+        return sorted(
+            [*super().of(recording), *(Logged(one.time_ns, "", "", one.text) for one in lines)],
+            key=lambda item: item.time_ns,
+        )
 
     @model_validator(mode="after")
     def _sensible(self) -> Contains:
-        if self.text is None and self.pattern is None:
-            raise ValueError("say what the records contain: 'text' or 'pattern'")
+        if self.text is None and self.pattern is None and self.number is None:
+            raise ValueError("say what the records contain: 'text', 'pattern' or 'number'")
         if self.at_most is not None and self.at_most < self.at_least:
             raise ValueError(f"at_least ({self.at_least}) is more than at_most ({self.at_most})")
         return self
@@ -155,7 +198,7 @@ def contains(recording: Recording, parameters: Contains) -> Finding:
     """The node logs the expected text at the expected level.
 
     Judged by the log records, on /rosout and in the output. Each record counts once. Printed lines
-    do not count.
+    do not count, except with `printed: true`.
     """
     low, high = parameters.at_least, parameters.at_most
     bounds = f"{low} or more" if high is None else f"{low} to {high}" if low < high else str(low)
@@ -192,13 +235,7 @@ def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]
     cause = cause or why_not_called(recording, seen, nodes)
     if cause is not None:
         return cause
-    lines = [
-        line
-        for line in recording.log
-        if line.stream != "rosout"
-        and logged_text(line.text) == line.text
-        and parameters.says(line.text)
-    ]
+    lines = [line for line in _printed(recording) if parameters.says(line.text)]
     if lines and not found:
         moment = Moment("printed", recording.since_launch_s(lines[0].time_ns))
         return Cause(
@@ -333,8 +370,14 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
 def _evidence(recording: Recording, records: list[Logged]) -> Evidence:
     return Evidence(
         moments=tuple(
-            Moment(f"{item.level} logged", recording.since_launch_s(item.time_ns))
+            Moment(
+                f"{item.level} logged" if item.level else "printed",
+                recording.since_launch_s(item.time_ns),
+            )
             for item in records[:_SHOWN]
         ),
-        log=tuple(f"[{item.level}] [{item.logger}]: {item.text}" for item in records[:_SHOWN]),
+        log=tuple(
+            f"[{item.level}] [{item.logger}]: {item.text}" if item.level else item.text
+            for item in records[:_SHOWN]
+        ),
     )

@@ -3,103 +3,58 @@
 from __future__ import annotations
 
 import math
-import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import AfterValidator, TypeAdapter
-
-from grader.findings.value import FieldPath, NoSuchField, leaves, number_at, value_at
+from grader.findings.value import NoSuchItem, Tolerance, leaves, number_at, tolerance_of
 from grader.measure.numbering import lost
 from grader.recording.model import NS, Message, Recording
+from grader.spec.expression import Expression
 
-_YAW = re.compile(r"yaw\((?P<path>.*)\)")
-_PATH: TypeAdapter[str] = TypeAdapter(FieldPath)
 _QUATERNION = ("x", "y", "z", "w")
 
 Row = tuple[float, ...]
 """A number for each field."""
 
 
-@dataclass(frozen=True)
-class SourceValue:
-    """A number that follows from a message: one of its fields, or the yaw of a quaternion.
+def error(value: Expression, observed: float, wanted: float) -> float:
+    """How far a number is off; of angles the difference on the circle."""
+    difference = observed - wanted
+    if value.circle and math.isfinite(difference):
+        return math.remainder(difference, value.circle)
+    return difference
 
-    Attributes:
-        is_yaw: Whether it is the yaw of the quaternion at ``path``, in radians.
+
+def mistakes(value: Expression, message: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    """What students take instead: words that end the sentence "it is ...", and the number.
+
+    The words of all messages of a type are the same, in the same order, as far as their arrays
+    have the same length.
     """
-
-    text: str
-    path: str
-    is_yaw: bool
-
-    @classmethod
-    def of(cls, text: str) -> SourceValue:
-        """Read ``twist.twist.linear.x`` or ``yaw(pose.pose.orientation)``."""
-        match = _YAW.fullmatch(text)
-        return cls(text, _PATH.validate_python(match["path"] if match else text), match is not None)
-
-    @property
-    def paths(self) -> tuple[str, ...]:
-        """The fields that hold its numbers."""
-        return tuple(f"{self.path}.{part}" for part in _QUATERNION) if self.is_yaw else (self.path,)
-
-    def number(self, message: Mapping[str, Any]) -> float:
-        """The number that follows from a message."""
-        if self.is_yaw:
-            return yaw(*(number_at(message, path) for path in self.paths))
-        return number_at(message, self.path)
-
-    def error(self, observed: float, wanted: float) -> float:
-        """How far a number is off; of angles the difference on the circle."""
-        difference = observed - wanted
-        if self.is_yaw and math.isfinite(difference):
-            return math.remainder(difference, math.tau)
-        return difference
-
-    def mistakes(self, message: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
-        """What students take instead: words that end the sentence "it is ...", and the number.
-
-        The words of all messages of a type are the same, in the same order, as far as their
-        arrays have the same length.
-        """
-        right = self.number(message)
-        if self.is_yaw:
-            x, y, z, w = (number_at(message, path) for path in self.paths)
-            for part, number in zip(_QUATERNION, (x, y, z, w), strict=True):
-                yield (
-                    f"`{part}` of the quaternion, which is no angle: convert the quaternion",
-                    number,
-                )
-            yield "the yaw in degrees: ROS has angles in radians (REP-103)", math.degrees(right)
-            yield "the yaw with the wrong sign", -right
-            yield "half of the yaw: atan2(z, w) is half of the angle", math.atan2(z, w)
-            turn = 2.0 * math.acos(max(-1.0, min(1.0, w)))
-            yield "2 acos(w), which has lost the sign of the yaw", turn
-            turn = 2.0 * math.asin(max(-1.0, min(1.0, z)))
-            yield "2 asin(z), which is wrong where w is negative: math.atan2 knows both", turn
-            turn = math.atan(math.tan(right))
-            yield "the yaw without its quadrant: math.atan2(a, b), not math.atan(a / b)", turn
-        else:
-            yield f"`{self.path}` with the wrong sign", -right
-            yield f"`{self.path}` without its sign, as of math.hypot() or abs()", abs(right)
-        for path, number in leaves(message).items():
-            if path != self.path and isinstance(number, int | float):
-                yield f"`{path}`", float(number)
-
-
-SourceText = Annotated[str, AfterValidator(lambda text: SourceValue.of(text).text)]
-
-
-def yaw(x: float, y: float, z: float, w: float) -> float:
-    """Heading of a quaternion: its rotation about the fixed z axis, in [-pi, pi].
-
-    Source: REP-103, and the usual conversion to roll, pitch, yaw.
-    """
-    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    right = number_at(message, value.text)
+    quaternion = "".join(value.fields)
+    if value.text.replace(" ", "") == f"yaw({quaternion})":
+        x, y, z, w = (number_at(message, f"{quaternion}.{part}") for part in _QUATERNION)
+        for part, number in zip(_QUATERNION, (x, y, z, w), strict=True):
+            yield f"`{part}` of the quaternion, which is no angle: convert the quaternion", number
+        yield "the yaw in degrees: ROS has angles in radians (REP-103)", math.degrees(right)
+        yield "the yaw with the wrong sign", -right
+        yield "half of the yaw: atan2(z, w) is half of the angle", math.atan2(z, w)
+        turn = 2.0 * math.acos(max(-1.0, min(1.0, w)))
+        yield "2 acos(w), which has lost the sign of the yaw", turn
+        turn = 2.0 * math.asin(max(-1.0, min(1.0, z)))
+        yield "2 asin(z), which is wrong where w is negative: math.atan2 knows both", turn
+        turn = math.atan(math.tan(right))
+        yield "the yaw without its quadrant: math.atan2(a, b), not math.atan(a / b)", turn
+    else:
+        yield f"`{value.text}` with the wrong sign", -right
+        yield f"`{value.text}` without its sign, as of math.hypot() or abs()", abs(right)
+    for path, number in leaves(message).items():
+        if path != value.text and isinstance(number, int | float):
+            yield f"`{path}`", float(number)
 
 
 @dataclass(frozen=True)
@@ -135,19 +90,22 @@ class DerivedMessages:
     """
 
     fields: tuple[str, ...]
-    values: tuple[SourceValue, ...]
-    tolerance: float
+    values: tuple[Expression, ...]
+    tolerances: Row
     sources: tuple[Message, ...]
     table: tuple[Row, ...]
 
     @classmethod
     def of(
-        cls, sources: tuple[Message, ...], fields: Mapping[str, str], tolerance: float
+        cls, sources: tuple[Message, ...], fields: Mapping[str, str], tolerance: Tolerance
     ) -> DerivedMessages:
         """Read the sources; raises NoSuchField where a field is not there, or holds no number."""
-        values = tuple(map(SourceValue.of, fields.values()))
-        table = tuple(tuple(one.number(item.value) for one in values) for item in sources)
-        return cls(tuple(fields), values, tolerance, sources, table)
+        values = tuple(map(Expression.of, fields.values()))
+        tolerances = tuple(tolerance_of(tolerance, field) for field in fields)
+        table = tuple(
+            tuple(number_at(item.value, text) for text in fields.values()) for item in sources
+        )
+        return cls(tuple(fields), values, tolerances, sources, table)
 
     def samples(
         self, recording: Recording, messages: Sequence[Message], within_s: float
@@ -178,7 +136,7 @@ class DerivedMessages:
     def errors(self, values: Row, window: range) -> tuple[Row, ...]:
         """How far values are off from those of some sources."""
         return tuple(
-            tuple(one.error(*pair) for one, *pair in zip(self.values, values, right, strict=True))
+            tuple(map(error, self.values, values, right))
             for right in self.table[window.start : window.stop]
         )
 
@@ -191,15 +149,15 @@ class DerivedMessages:
         return [
             index
             for index, row in enumerate(errors)
-            if all(abs(error) <= self.tolerance for error in row[fields])
+            if all(
+                abs(off) <= most
+                for off, most in zip(row[fields], self.tolerances[fields], strict=True)
+            )
         ]
 
 
 def _number(message: Message, field: str) -> float:
     try:
         return number_at(message.value, field)
-    except NoSuchField:
-        array = field.rpartition("[")[0]
-        if array and isinstance(value_at(message.value, array), Sequence):
-            return math.nan
-        raise
+    except NoSuchItem:
+        return math.nan

@@ -7,15 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from pydantic import Field
 
-from grader.checks.check import NamedFields, Parameters, Subject, check
-from grader.checks.messages.derived_messages import (
-    DerivedMessages,
-    Sample,
-    SourceText,
-    SourceValue,
-)
+from grader.checks.check import NamedFields, Parameters, Subject, check, toleranced
+from grader.checks.messages.derived_messages import DerivedMessages, Sample, mistakes
 from grader.checks.need import Recorded
 from grader.diagnosis.no_messages import why_few, why_silent
+from grader.findings.fields import FieldTolerance, within_words
 from grader.findings.finding import Evidence, Finding, Moment, Plot
 from grader.findings.value import FieldPath, NoSuchField
 from grader.findings.wording import code, codes, counted, listing
@@ -38,14 +34,12 @@ class Follows(Parameters):
 
     topic: TopicName = Field(description="Topic of the messages that are judged.")
     source: TopicName = Field(description="Recorded topic that their values come from.")
-    fields: dict[FieldPath, SourceText] = Field(
+    fields: dict[FieldPath, FieldPath] = Field(
         min_length=1,
         description="Field of the judged message -> where its value comes from: a field of the "
-        "source, or `yaw(pose.pose.orientation)` for the heading of a quaternion.",
+        "source, or an expression such as `yaw(pose.pose.orientation)`.",
     )
-    tolerance: float = Field(
-        gt=0, allow_inf_nan=False, description="Largest difference, in the unit of the field."
-    )
+    tolerance: FieldTolerance
     within: Duration = Field(0.5, description="Largest age of the values.", validate_default=False)
     settle: Duration = Field(
         2.0,
@@ -58,10 +52,9 @@ class Follows(Parameters):
     def named_fields(self) -> Iterator[NamedFields]:
         """The judged fields, and those of the source."""
         for field, text in self.fields.items():
-            value = SourceValue.of(text)
             yield NamedFields(("fields", field), self.topic, field)
-            for path in value.paths:
-                yield NamedFields(("fields", field), self.source, path)
+            yield NamedFields(("fields", field), self.source, text)
+        yield from toleranced("fields", self.topic, {}, self.tolerance)
 
 
 @check("messages.follows", Subject.RECORDING, Follows)
@@ -74,7 +67,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     """
     topic, source = code(parameters.topic), code(parameters.source)
     pairs = listing(f"{code(field)} = {code(value)}" for field, value in parameters.fields.items())
-    expected = f"on {topic} the values of {source}: {pairs} (within {parameters.tolerance:g})"
+    expected = f"on {topic} the values of {source}: {pairs}{within_words(parameters.tolerance)}"
     messages, sources = recording.on(parameters.topic), recording.on(parameters.source)
     if not messages:
         return why_silent(recording, parameters.topic).finding(expected)
@@ -85,8 +78,8 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         samples = derived.samples(recording, messages, parameters.within)
     except NoSuchField as error:
         return Finding.error(expected, f"the assignment expects what does not exist: {error}")
-    columns = zip(*derived.table, strict=True)
-    if not all(_spread(column) > _CONCLUSIVE * parameters.tolerance for column in columns):
+    columns = zip(derived.tolerances, zip(*derived.table, strict=True), strict=True)
+    if not all(_spread(column) > _CONCLUSIVE * tolerance for tolerance, column in columns):
         return Finding.error(expected, f"the values on {source} hardly change: it cannot be judged")
     right = {sample.number for sample in samples if derived.fitting(sample.errors)}
     judged = _judged(recording, parameters, samples, right)
@@ -194,7 +187,7 @@ def _lag_s(derived: DerivedMessages, wrong: list[Sample]) -> float | None:
         if not older:
             return None
         ages.append((sample.message.stamp_ns - derived.sources[older[-1]].stamp_ns) / NS)
-    still = _spread([sample.values[0] for sample in wrong]) <= derived.tolerance
+    still = _spread([sample.values[0] for sample in wrong]) <= derived.tolerances[0]
     # A value that never changes is old as well, but that says less.
     return None if still and len(wrong) > 1 else sorted(ages)[len(ages) // 2]
 
@@ -215,13 +208,13 @@ def _explanation(
         return ": the same number in every message"
     wrong = [sample for sample in wrong if not derived.fitting(sample.errors, index)]
     rows = sorted({row for sample in (*seen, *wrong) for row in sample.window})
-    mistakes = [derived.values[index].mistakes(derived.sources[row].value) for row in rows]
+    tolerance = derived.tolerances[index]
+    found = [mistakes(derived.values[index], derived.sources[row].value) for row in rows]
     # Arrays of the sources may have other lengths, which come last: those are left out.
-    for same_mistake in zip(*mistakes, strict=False):
+    for same_mistake in zip(*found, strict=False):
         series = {row: number for row, (_, number) in zip(rows, same_mistake, strict=True)}
-        if _spread(list(series.values())) > derived.tolerance and all(
-            _share(samples, index, series, derived.tolerance) >= _NEARLY_ALL
-            for samples in (seen, wrong)
+        if _spread(list(series.values())) > tolerance and all(
+            _share(samples, index, series, tolerance) >= _NEARLY_ALL for samples in (seen, wrong)
         ):
             return f": it is {same_mistake[0][0]}"
     return ""
@@ -253,5 +246,5 @@ def _plot(recording: Recording, derived: DerivedMessages, judged: list[Sample], 
         f"error of {field}",
         tuple(recording.since_launch_s(sample.message.stamp_ns) for sample, _ in finite),
         tuple(error for _, error in finite),
-        (-derived.tolerance, derived.tolerance),
+        (-derived.tolerances[index], derived.tolerances[index]),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -13,25 +13,31 @@ from grader.checks.need import Published, Recorded
 from grader.diagnosis.explanation import explain
 from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
 from grader.diagnosis.wrong_value import WrongValue, accumulates, was_integer
-from grader.findings.fields import FieldTolerance, difference_table, words
+from grader.findings.fields import (
+    FieldTolerance,
+    difference_table,
+    instead,
+    within_words,
+    words,
+)
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.value import (
     EXACT,
     Difference,
     FieldPath,
     NoSuchField,
-    Tolerance,
     differences,
     expected_leaves,
+    item_at,
     leaves,
     number_at,
     same,
     tolerance_of,
-    value_at,
 )
 from grader.findings.wording import code, codes, counted, value_text
 from grader.measure.numbering import is_numbered, published
 from grader.recording.model import Kind, Recording
+from grader.spec.expression import Expression
 from grader.spec.name import TopicName
 
 _MOST_FIELDS = 8
@@ -159,16 +165,9 @@ class Equal(Parameters):
         rest = ", all else 0" if self.rest == "zero" else ""
         enough = f", {self.at_least} or more" if self.at_least > 1 else ""
         return (
-            f"{words(self.value)}{rest}{_within(self.tolerance)} in every message on "
+            f"{words(self.value)}{rest}{within_words(self.tolerance)} in every message on "
             f"{code(self.topic)}{enough}"
         )
-
-
-def _within(tolerance: Tolerance) -> str:
-    if not isinstance(tolerance, Mapping):
-        return "" if tolerance <= 1e-6 else f" (within {tolerance:g})"
-    parts = (f"{path} within {amount:g}" for path, amount in tolerance.items())
-    return f" ({', '.join(parts)})" if tolerance else ""
 
 
 @check("messages.equal", Subject.RECORDING, Equal)
@@ -210,10 +209,8 @@ def _wrong(
     messages = recording.on(parameters.topic)
     wrong = sum(map(bool, by_message))
     first, found = next(item for item in enumerate(by_message, start=1) if item[1])
-    observed = f"message {first} of {len(messages)} has " + ", ".join(
-        f"{item.field} = {value_text(item.observed)} instead of {value_text(item.expected)}"
-        for item in found[:_MOST_FIELDS]
-    )
+    observed = f"message {first} of {len(messages)} has "
+    observed += ", ".join(map(instead, found[:_MOST_FIELDS]))
     more = len(found) - _MOST_FIELDS
     observed += f" and {counted(more, 'more wrong field')}" if more > 0 else ""
     field, message = found[0].field, messages[first - 1]
@@ -312,7 +309,7 @@ def sequence(recording: Recording, parameters: Series) -> Finding:
     messages = recording.on(parameters.topic)
     if not messages:
         return why_silent(recording, parameters.topic).finding(expected)
-    read = value_at if parameters.values else number_at
+    read = item_at if parameters.values else number_at
     try:
         found = [read(message.value, parameters.field) for message in messages]
     except NoSuchField as error:
@@ -323,10 +320,12 @@ def sequence(recording: Recording, parameters: Series) -> Finding:
     numbered = is_numbered(messages)
     places = [m.sequence - 1 if numbered else index for index, m in enumerate(messages)]
     wanted = _wanted_values(parameters, found, places)
+    tolerance, circle = parameters.tolerance, Expression.of(parameters.field).circle
     wrong = [
         index
         for index, value in enumerate(wanted)
-        if value is not None and not same(value, found[index], parameters.tolerance)
+        if value is not None
+        and not same(value, found[index], tolerance, messages[index].value, circle)
     ]
     if wrong:
         return _wrong_order(recording, parameters, found, wanted, wrong[0])
