@@ -20,7 +20,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from grader import resources
-from grader.assignment import model, mutant
+from grader.assignment import model, mutant, variable
 from grader.assignment.own_check import FOLDER, lesson_checks
 from grader.assignment.stimuli.stimulus import stimulus_models
 from grader.checks.catalogue import CATALOGUE
@@ -40,6 +40,7 @@ _MADE = "<!-- Made by `python -m grader.docs` from the code: change it there. --
 _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
     "assignment": {
         "The whole file": model.Assignment,
+        "variables": variable.Variable,
         "packages": model.Package,
         "scenarios": model.Scenario,
         "launch": model.Launch,

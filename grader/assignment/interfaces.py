@@ -16,6 +16,7 @@ from grader import resources, ros
 from grader.assignment.binding import BoundCheck
 from grader.assignment.model import Assignment
 from grader.assignment.stimuli.message import Find, part_of
+from grader.assignment.variable import Values, fill_text
 from grader.checks.check import NamedFields
 from grader.errors import GraderFault, Problem
 from grader.findings.value import NoSuchField, expected_leaves, tolerance_of, unreachable, value_at
@@ -43,13 +44,15 @@ class Interfaces:
     Attributes:
         own: Package -> its folder, of the assignment and of rosgrade; the first win.
         prefixes: ament prefixes of ROS; None where it is not installed.
+        values: What stands for the variables in ``own``.
     """
 
     own: Mapping[str, Path]
     prefixes: Sequence[Path] | None
+    values: Values
 
     @classmethod
-    def of(cls, folder: Path) -> Interfaces:
+    def of(cls, folder: Path, values: Values) -> Interfaces:
         """Look around."""
         files = [*resources.carried_interfaces().glob(f"*/{_MANIFEST}")]
         files += sorted((folder / FOLDER).rglob(_MANIFEST))
@@ -57,21 +60,21 @@ class Interfaces:
             prefixes: Sequence[Path] | None = ros.find().prefixes
         except GraderFault:
             prefixes = None
-        return cls({file.parent.name: file.parent for file in files}, prefixes)
+        own = {fill_text(file.parent.name, values): file.parent for file in files}
+        return cls(own, prefixes, values)
 
     def find(self, interface: str) -> str:
         """The text of a definition; KeyError where there is none at hand."""
         package, kind, name = interface.split("/")
-        for folder in self._folders(package):
-            file = folder / kind / f"{name}.{kind}"
-            if file.is_file():
-                return file.read_text(encoding="utf-8", errors="replace")
+        for stem, file in self._files(package, kind):
+            if stem == name:
+                text = file.read_text(encoding="utf-8", errors="replace")
+                return fill_text(text, self.values)
         raise KeyError(interface)
 
     def names(self, package: str, kind: str) -> list[str]:
         """Names of the interfaces of one kind in a package."""
-        files = (file for at in self._folders(package) for file in (at / kind).glob(f"*.{kind}"))
-        return sorted({file.stem for file in files})
+        return sorted({stem for stem, _ in self._files(package, kind)})
 
     @cached_property
     def packages(self) -> set[str]:
@@ -80,9 +83,20 @@ class Interfaces:
         found = {file.name for index in indices for file in index.glob("rosidl_interfaces/*")}
         return found | set(self.own)
 
-    def _folders(self, package: str) -> list[Path]:
+    def _files(self, package: str, kind: str) -> Iterator[tuple[str, Path]]:
         own = [self.own[package]] if package in self.own else []
-        return [*own, *(prefix / "share" / package for prefix in self.prefixes or ())]
+        for folder in (*own, *(prefix / "share" / package for prefix in self.prefixes or ())):
+            for file in sorted((folder / kind).glob(f"*.{kind}")):
+                yield fill_text(file.stem, self.values), file
+
+
+def write_interfaces(folder: Path, values: Values, target: Path) -> None:
+    """Write the packages of an assignment with values in the places of variables."""
+    for file in sorted((folder / FOLDER).rglob("*")):
+        if file.is_file():
+            copy = target / fill_text(str(file.relative_to(folder / FOLDER)), values)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_text(fill_text(file.read_text("utf-8"), values), "utf-8")
 
 
 def interface_problems(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 
@@ -14,11 +14,12 @@ from grader.assignment.binding import BoundCheck, bind
 from grader.assignment.interfaces import Interfaces, field_problems, interface_problems
 from grader.assignment.model import NOTHING_WITHHELD, Assignment, Scenario, Withheld
 from grader.assignment.own_check import lesson_checks
+from grader.assignment.variable import Values, filled, read_variables
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
-from grader.errors import AssignmentError, UsageError
+from grader.errors import AssignmentError, Problem, UsageError
 from grader.spec.nearest_name import nearest_or_all
-from grader.spec.source import in_order, read_source
+from grader.spec.source import Source, in_order, read_source
 
 ASSIGNMENT_FILE = "assignment.yaml"
 
@@ -30,6 +31,9 @@ class LoadedAssignment:
     Attributes:
         sha256: Hash over the paths and contents of the files in its folder, as hex.
         checks: One per entry of ``checks``, in the author's order.
+        values: What stands in it for each variable: the author's examples at first.
+        source: The YAML as it is written, with the variables in it.
+        given: Values from outside for every submission.
     """
 
     assignment: Assignment
@@ -37,6 +41,9 @@ class LoadedAssignment:
     sha256: str
     checks: tuple[BoundCheck, ...]
     withheld: Withheld = NOTHING_WITHHELD
+    values: Values = field(default_factory=dict)
+    source: Source | None = field(default=None, repr=False, compare=False)
+    given: Values = field(default_factory=dict)
 
     @property
     def folder(self) -> Path:
@@ -101,30 +108,41 @@ def load_assignment(
     Mistakes in its form are told first; once there are none, what does not fit together.
     """
     file = find_assignment(name)
-    source = read_source(file)
-    assignment = source.read(Assignment)
-    try:
-        own = lesson_checks(file.parent)
-    except ValueError as error:
-        raise AssignmentError(file, [source.problem(("checks",), str(error))]) from error
-    known = {**catalogue, **own}
-    tried = [bind(source, index, spec, known) for index, spec in enumerate(assignment.checks)]
-    bound = [check for check, _ in tried if check is not None]
-    found = [problem for _, problems in tried for problem in problems]
-    found += rules.problems(source, assignment, [check for check, _ in tried])
+    written = read_source(file)
+    values = {name: str(one.example) for name, one in read_variables(written).items()}
+    source = filled(written, values)
+    assignment, tried, found = bound_checks(source, catalogue)
+    found += rules.problems(source, assignment, tried)
     folder = file.resolve().parent.name
     if file.name == ASSIGNMENT_FILE and assignment.id != folder:
         text = f"{assignment.id!r} is not the name of its folder, {folder!r}"
         found.append(source.problem(("id",), text))
+    bound = tuple(check for check in tried if check is not None)
     if not found:
-        interfaces = Interfaces.of(file.parent)
+        interfaces = Interfaces.of(file.parent, values)
         found += simulation.problems(source, assignment, interfaces)
         found += interface_problems(source, assignment, bound, interfaces)
         found += field_problems(source, assignment, bound, interfaces)
     if found:
         raise AssignmentError(file, in_order(found))
     digest = folder_sha256(file.parent) if file.name == ASSIGNMENT_FILE else _sha256(file)
-    return LoadedAssignment(assignment, file, digest, tuple(bound))
+    return LoadedAssignment(assignment, file, digest, bound, values=values, source=written)
+
+
+def bound_checks(
+    source: Source, catalogue: Mapping[str, Check] = CATALOGUE
+) -> tuple[Assignment, list[BoundCheck | None], list[Problem]]:
+    """Read an assignment and its checks, with what is wrong in them; None for such a check."""
+    assignment = source.read(Assignment)
+    try:
+        own = lesson_checks(source.file.parent)
+    except ValueError as error:
+        problem = source.problem(("checks",), str(error))
+        raise AssignmentError(source.file, [problem]) from error
+    known = {**catalogue, **own}
+    tried = [bind(source, index, spec, known) for index, spec in enumerate(assignment.checks)]
+    found = [problem for _, problems in tried for problem in problems]
+    return assignment, [check for check, _ in tried], found
 
 
 def folder_sha256(folder: Path, besides: Path | None = None) -> str:

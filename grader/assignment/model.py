@@ -13,6 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import ConfigDict, Field, model_validator
 
 from grader.assignment.stimuli.stimulus import Stimulus
+from grader.assignment.variable import Variable
 from grader.sandbox.limits import BUILD, BUILD_OUTPUT_BYTES, SandboxLimits
 from grader.spec.name import (
     Durability,
@@ -372,6 +373,10 @@ class Assignment(Model):
     rosgrade: Literal[1] = Field(description="Version of this format.")
     id: Id = Field(description="Name of the assignment and of its folder.")
     title: str = Field(description="Title in one line.")
+    variables: dict[Id, Variable] = Field(
+        default_factory=dict,
+        description="Names that students, groups or the roster choose: name -> its origin.",
+    )
     packages: tuple[Package, ...] = Field(
         min_length=1, description="Packages that students hand in."
     )

@@ -28,6 +28,7 @@ from grader.checks.check import Subject
 from grader.errors import GraderFault, Problem
 from grader.findings.value import same_value
 from grader.spec.document import Place
+from grader.spec.name import package_name
 from grader.spec.nearest_name import did_you_mean, nearest_or_all
 from grader.spec.source import Source
 from grader.spec.unit import format_duration
@@ -43,6 +44,11 @@ def problems(
     """Find everything that does not fit together."""
     for key, name in (("packages", "name"), ("scenarios", "id"), ("checks", "id")):
         yield from source.duplicates(name, key)
+    for index, package in enumerate(assignment.packages):
+        try:
+            package_name(package.name)
+        except ValueError as error:
+            yield source.problem(("packages", index, "name"), str(error))
     for index, scenario in enumerate(assignment.scenarios):
         for place, text in _scenario(assignment, scenario):
             yield source.problem(("scenarios", index, *place), text)

@@ -6,11 +6,12 @@ import dataclasses
 import math
 from collections.abc import Collection
 
-from grader.assignment.load import LoadedAssignment
+from grader.assignment.load import LoadedAssignment, bound_checks
 from grader.assignment.model import Visibility, Withheld
 from grader.assignment.mutant import required_by
+from grader.assignment.variable import Values, filled
 from grader.checks.check import Subject
-from grader.errors import UsageError
+from grader.errors import AssignmentError, UsageError
 from grader.spec.nearest_name import nearest_or_all
 
 
@@ -82,6 +83,27 @@ def visible_part(loaded: LoadedAssignment) -> LoadedAssignment:
     withheld = Withheld(len(hidden), math.fsum(spec.points for spec in hidden))
     part = select(loaded, tuple(spec.id for spec in visible))
     return dataclasses.replace(part, withheld=loaded.withheld + withheld)
+
+
+def with_values(loaded: LoadedAssignment, values: Values) -> LoadedAssignment:
+    """The same part of an assignment with other values in the places of its variables.
+
+    Raises:
+        AssignmentError: A name is not possible where it stands.
+    """
+    if loaded.source is None or values == loaded.values:
+        return loaded
+    source = filled(loaded.source, values)
+    assignment, bound, problems = bound_checks(source)
+    if problems:
+        raise AssignmentError(source.file, problems)
+    checks = tuple(check for check in bound if check is not None)
+    whole = dataclasses.replace(loaded, assignment=assignment, checks=checks, values=values)
+    return select(
+        whole,
+        tuple(check.spec.id for check in loaded.checks),
+        tuple(scenario.id for scenario in loaded.assignment.scenarios),
+    )
 
 
 def _refuse_unknown(

@@ -51,6 +51,7 @@ class Batch:
     retry: frozenset[str] = frozenset()
     _entries: dict[str, Entry] = field(default_factory=dict)
     _twins: dict[str, list[str]] = field(default_factory=dict)
+    _given: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def read(
         self, rows: Sequence[HandedIn], on_read: Callable[[str], None] = lambda _: None
@@ -63,10 +64,17 @@ class Batch:
             nearest = did_you_mean(name, [row.key for row in rows])
             raise UsageError(f"--retry: there is no submission called {name}.{nearest}")
         paths: dict[str, Path] = {}
-        first: dict[str, str] = {}
+        first: dict[tuple[str, str], str] = {}
         teams = _teams(rows)
+        columns = {
+            name: one.column.casefold()
+            for name, one in self.loaded.assignment.variables.items()
+            if one.column is not None
+        }
         for row in rows:
             on_read(row.key)
+            given = {name: row.columns.get(column, "") for name, column in columns.items()}
+            self._given[row.key] = {name: value for name, value in given.items() if value}
             team = teams.get(row.key, "")
             entry = Entry(
                 row.key, row.name, row.late, problem=row.problem, fault=row.fault, team=team
@@ -74,7 +82,8 @@ class Batch:
             if row.path is not None:
                 entry = self._identified(entry, row.path)
                 distinct = entry.sha256 in ("", NO_FILES)
-                original = row.key if distinct else first.setdefault(entry.sha256, row.key)
+                same = (entry.sha256, str(self._given[row.key]))
+                original = row.key if distinct else first.setdefault(same, row.key)
                 if original != row.key:
                     entry = replace(entry, same_as=original)
                     self._twins.setdefault(original, []).append(row.key)
@@ -98,7 +107,10 @@ class Batch:
                 while waiting and len(running) < executor.capacity:
                     key, path = waiting.pop()
                     partial = self.ledger.partial(key)
-                    running[executor.submit(key, path, partial)] = (key, partial)
+                    running[executor.submit(key, path, partial, self._given[key])] = (
+                        key,
+                        partial,
+                    )
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in finished:
                     key, partial = running.pop(future)
@@ -129,6 +141,9 @@ class Batch:
     def _is_done(self, key: str) -> bool:
         result = self.ledger.result(key)
         if result is None or result.submission.sha256 != self._entries[key].sha256:
+            return False
+        given = self._given[key]
+        if given and dict(find(self.ledger.folder(key)).submission.given) != given:
             return False
         # Of the same submissions only one is graded, whichever of them was named.
         same = {key, *self._twins.get(key, ())}

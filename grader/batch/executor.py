@@ -5,11 +5,12 @@ from __future__ import annotations
 import logging
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
 from grader.batch.grading import Grading
-from grader.batch.worker import Order, Parcel, grade_into, grade_remotely, unpack
+from grader.batch.worker import Given, Order, Parcel, grade_into, grade_remotely, unpack
 from grader.errors import GraderFault, RosgradeError, UsageError
 
 _CONNECT_S = 15
@@ -30,8 +31,10 @@ class BatchExecutor(Protocol):
     def capacity(self) -> int:
         """So many are worth handing over at once, as things are now; at least one."""
 
-    def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
+    def submit(self, key: str, path: Path, folder: Path, given: Given) -> Future[None]:
         """Grade what is at a path, and leave report, result and recordings in a folder.
+
+        ``given`` are the values of variables that the roster says.
 
         A future that ends with :class:`ExecutorLost` says nothing of its submission.
         """
@@ -49,9 +52,9 @@ class LocalExecutor:
         self._grading = grading
         self._pool = ThreadPoolExecutor(max_workers=jobs, thread_name_prefix="submission")
 
-    def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
+    def submit(self, key: str, path: Path, folder: Path, given: Given) -> Future[None]:
         """See :class:`BatchExecutor`."""
-        return self._pool.submit(grade_into, self._grading, key, path, folder)
+        return self._pool.submit(grade_into, self._grading, key, path, folder, given)
 
     def close(self) -> None:
         """See :class:`BatchExecutor`."""
@@ -114,11 +117,11 @@ class DaskExecutor:
     def _lost(self) -> ExecutorLost:
         return ExecutorLost(f"the Dask scheduler at {self._address} was lost")
 
-    def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
+    def submit(self, key: str, path: Path, folder: Path, given: Given) -> Future[None]:
         """See :class:`BatchExecutor`."""
         done: Future[None] = Future()
         try:
-            parcel = Parcel.of(key, path)
+            parcel = replace(Parcel.of(key, path), given=given)
         except RosgradeError as error:
             done.set_exception(error)
             return done

@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import BuildLimitOptions
@@ -16,6 +17,7 @@ from grader.batch.type_support import TypeSupport
 from grader.errors import GraderFault, UsageError, machine_fault
 from grader.findings.finding import Status
 from grader.grade import Grade, grade
+from grader.grade.naming import named
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording, to_json
 from grader.report.files import write_whole
@@ -77,9 +79,11 @@ class Grading:
         on_build: Callable[[str], None] = lambda _: None,
         name: str | None = None,
         on_output: Callable[[str], None] = lambda _: None,
+        given: Mapping[str, str] = MappingProxyType({}),
     ) -> Graded:
-        """Grade one submission."""
-        self._type_support.prefixes(on_build)
+        """Grade one submission; ``given`` are the roster's values of variables."""
+        if not self._loaded.values:
+            self._type_support.prefixes(on_build)
         sandbox = self._runner.sandbox
         if sandbox is not None:
             sandbox = sandbox.allowing(self._loaded.assignment.libraries)
@@ -97,6 +101,8 @@ class Grading:
             )
         if name is not None:
             prepared = prepared.named(name)
+        outside = tuple(sorted({**self._loaded.given, **given}.items()))
+        prepared = replace(prepared, record=replace(prepared.record, given=outside))
         return self.grade_prepared(prepared, folder)
 
     @property
@@ -122,19 +128,31 @@ class Grading:
         runs: dict[str, int] = {}
         faults: dict[str, str] = {}
         recordings: dict[str, Recording] = {}
-        again = [scenario.id for scenario in self._scenarios] if prepared.install else []
+        loaded, unnamed = named(self._loaded, prepared.record)
+        support = self._type_support
+        if loaded is not self._loaded:
+            support = TypeSupport(loaded, self._runner.ros, self._cache)
+        can_run = prepared.install is not None and unnamed is None
+        again = [scenario.id for scenario in self._scenarios] if can_run else []
         alone: list[str] = []
         remaps = {scenario.id: frozenset[str]() for scenario in self._scenarios}
         first = 1
         for attempt in range(1, MOST_RUNS + 1):
-            run = partial(self._run, prepared, folder, remaps)
+            run = partial(self._run, loaded, support, prepared, folder, remaps)
             self._run_all(run, again, recordings, faults, alone=False)
             self._run_all(run, alone, recordings, faults, alone=True)
             runs.update((name, runs.get(name, 0) + 1) for name in (*again, *alone))
             result = grade(self._loaded, prepared.record, recordings, faults)
-            renamed = [name for name, known in remaps.items() if not result.remaps[name] <= known]
+            run_so_far = loaded.assignment.scenarios
+            renamed = [
+                scenario.id
+                for scenario in result.assignment.scenarios
+                if scenario not in run_so_far
+                or not result.remaps[scenario.id] <= remaps[scenario.id]
+            ]
             if attempt < MOST_RUNS and renamed:
                 remaps = {name: known | result.remaps[name] for name, known in remaps.items()}
+                loaded, _ = named(self._loaded, prepared.record, recordings)
                 again, alone, first = renamed, [], attempt + 1
                 # What is run again for its names is not run again for the machine.
                 runs.update(dict.fromkeys(renamed, 0))
@@ -182,6 +200,8 @@ class Grading:
 
     def _run(
         self,
+        loaded: LoadedAssignment,
+        support: TypeSupport,
         prepared: Prepared,
         folder: Path,
         remaps: Mapping[str, frozenset[str]],
@@ -189,8 +209,8 @@ class Grading:
         alone: bool,
     ) -> Recording:
         assert prepared.install is not None
-        assignment = self._loaded.assignment
-        scenario = next(item for item in self._scenarios if item.id == name)
+        assignment = loaded.assignment
+        scenario = next(item for item in assignment.scenarios if item.id == name)
         file = folder / f"{name}.mcap"
         try:
             self._runner.run(
@@ -202,7 +222,7 @@ class Grading:
                 seed=scenario_seed(assignment.id, name, prepared.record.sha256, self._seed),
                 worlds=self._loaded.folder,
                 underlays=prepared.underlays,
-                type_support=self._type_support.prefixes(),
+                type_support=support.prefixes(),
                 alone=alone,
                 remaps=sorted(remaps[name]),
             )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import stat
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from grader.submission.intake.archive import SUFFIXES
@@ -23,6 +23,7 @@ class HandedIn:
         path: What was handed in, or None for nothing; those of a team have the same.
         name: The student's, as people write it, or empty.
         problem: Why there is nothing to grade, or what the instructor should look at.
+        columns: What the roster says of the student, by header in lower case.
     """
 
     key: str
@@ -31,6 +32,7 @@ class HandedIn:
     late: bool = False
     problem: str = ""
     fault: str = ""
+    columns: Mapping[str, str] = field(default_factory=dict, compare=False)
 
 
 @dataclass(frozen=True)

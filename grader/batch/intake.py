@@ -86,7 +86,9 @@ def take_in_roster(
 
 
 def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn | None) -> HandedIn:
-    row = HandedIn(student.key, None, student.name, problem=student.problem)
+    row = HandedIn(
+        student.key, None, student.name, problem=student.problem, columns=student.columns
+    )
     if not student.submission:
         return with_problem(row, "handed in nothing")
     if cloned is not None:

@@ -6,7 +6,7 @@ import csv
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from grader.errors import UsageError
@@ -25,7 +25,7 @@ _NO_LETTER = re.compile(r"[\W_]+")
 
 @dataclass(frozen=True)
 class Student:
-    """One row of a roster."""
+    """One row of a roster; ``columns`` is all that it says, by header in lower case."""
 
     row: int
     id: str = ""
@@ -34,6 +34,7 @@ class Student:
     name: str = ""
     submission: str = ""
     problem: str = ""
+    columns: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @property
     def key(self) -> str:
@@ -138,17 +139,19 @@ def parse_roster(text: str, source: str) -> Roster:
             f"{source}:1: no column says who a student is; name one of them id, login, email or "
             f"name (there are: {', '.join(header) or 'none'})"
         )
-    return _collect(columns, rows[1:])
+    return _collect(header, columns, rows[1:])
 
 
-def _collect(columns: Mapping[str, int], rows: Sequence[tuple[int, list[str]]]) -> Roster:
+def _collect(
+    header: list[str], columns: Mapping[str, int], rows: Sequence[tuple[int, list[str]]]
+) -> Roster:
     students: dict[str, Student] = {}
     problems: list[str] = []
     for number, cells in rows:
         if not any(cells) or cells[0].casefold().startswith("points possible"):
             continue
         values = {field: cells[column] for field, column in columns.items() if column < len(cells)}
-        student = Student(number, **values)
+        student = Student(number, **values, columns=dict(zip(header, cells, strict=False)))
         if not student.key:
             problems.append(f"row {number}: has no name")
             continue

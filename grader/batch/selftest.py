@@ -108,7 +108,13 @@ def run_trial(
         submission = reference
     else:
         apply(trial.change, reference, submission)
-    graded = grading.grade(submission, folder / "recordings" / trial.id)
+    # There is no roster, and the reference has the author's examples.
+    given = {
+        name: loaded.values[name]
+        for name, variable in loaded.assignment.variables.items()
+        if variable.match is None
+    }
+    graded = grading.grade(submission, folder / "recordings" / trial.id, given=given)
     on_graded(graded)
     actual = {result.id: result.status for result in graded.grade.results}
     if trial.role is Role.STARTER:

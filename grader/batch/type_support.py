@@ -7,9 +7,10 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from grader.assignment.interfaces import FOLDER
+from grader.assignment.interfaces import FOLDER, write_interfaces
 from grader.assignment.load import LoadedAssignment
 from grader.ros import RosInstallation
+from grader.scratch import Scratch
 from grader.submission.build.build_cache import BuildCache
 from grader.submission.build.underlay import completed, install_prefix
 
@@ -42,4 +43,8 @@ class TypeSupport:
         own = self._loaded.folder / FOLDER
         if not own.is_dir():
             return ros.underlays
-        return (install_prefix(own, ros, cache, on_build), *ros.underlays)
+        if not self._loaded.values:
+            return (install_prefix(own, ros, cache, on_build), *ros.underlays)
+        with Scratch(FOLDER) as copy:
+            write_interfaces(self._loaded.folder, self._loaded.values, copy)
+            return (install_prefix(copy, ros, cache, on_build), *ros.underlays)

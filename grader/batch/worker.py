@@ -8,7 +8,8 @@ import os
 import stat
 import tarfile
 import threading
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from grader import ros
@@ -37,10 +38,15 @@ class Order:
     sandbox: Choice
 
 
-def grade_into(grading: Grading, key: str, path: Path, folder: Path) -> None:
+Given = Mapping[str, str]
+"""What the roster says for variables of the assignment, by their names."""
+
+
+def grade_into(grading: Grading, key: str, path: Path, folder: Path, given: Given) -> None:
     """Grade a submission and write report, result and recordings."""
     clock = Clock()
-    write_graded(grading.grade(path, folder / RECORDINGS_FOLDER, name=key), folder, clock)
+    graded = grading.grade(path, folder / RECORDINGS_FOLDER, name=key, given=given)
+    write_graded(graded, folder, clock)
 
 
 def pack(folder: Path) -> bytes:
@@ -85,6 +91,7 @@ class Parcel:
     content: bytes
     is_folder: bool
     refused: Prepared | None = None
+    given: Given = field(default_factory=dict)
 
     @classmethod
     def of(cls, key: str, path: Path) -> Parcel:
@@ -124,7 +131,7 @@ def grade_remotely(order: Order, parcel: Parcel) -> bytes:
             )
         else:
             parcel.open(path)
-            grade_into(grading, parcel.key, path, folder)
+            grade_into(grading, parcel.key, path, folder, parcel.given)
         return pack(folder)
 
 

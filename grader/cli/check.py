@@ -25,6 +25,7 @@ from grader.cli.formats import (
 from grader.cli.options import (
     AssignmentName,
     Checks,
+    Chosen,
     Hidden,
     Quiet,
     ReportFolder,
@@ -33,6 +34,7 @@ from grader.cli.options import (
     Seed,
     Verbose,
     assignment_places,
+    chosen_names,
     chosen_sandbox,
 )
 from grader.cli.screen.console import open_page, output_console, say
@@ -56,6 +58,7 @@ def check(
     scenario: Scenarios = None,
     only: Checks = None,
     seed: Seed = None,
+    chosen: Chosen = None,
     hidden: Hidden = False,
     files: FormatFiles = MappingProxyType({}),
     junit_family: JunitFamilyName = JunitFamily.XUNIT2,
@@ -108,7 +111,7 @@ def check(
             from grader.submission.intake.locate import check_path
 
             refuse_swapped(assignment, submission)
-            whole = load_assignment(assignment)
+            whole = chosen_names(load_assignment(assignment), chosen)
             shown = whole if hidden else visible_part(whole)
             loaded = select(shown, tuple(only or ()), tuple(scenario or ()))
             check_path(submission)

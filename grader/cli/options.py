@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,9 +10,11 @@ import typer
 
 from grader import resources
 from grader.cli.screen.progress import Progress
+from grader.errors import UsageError
 from grader.sandbox.choice import Choice
 
 if TYPE_CHECKING:
+    from grader.assignment.load import LoadedAssignment
     from grader.sandbox.sandbox import Sandbox
 
 AssignmentName = Annotated[str, typer.Argument(help="Id of the assignment, or its folder.")]
@@ -33,6 +36,14 @@ Hidden = Annotated[
     bool,
     typer.Option("--hidden", help="Also run and show hidden checks: for instructors."),
 ]
+Chosen = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Value of a variable of the assignment, such as your group's number; may be repeated.",
+    ),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")]
 Verbose = Annotated[
     bool,
@@ -51,6 +62,15 @@ SandboxChoice = Annotated[
 def assignment_places(name: str) -> tuple[Path, Path]:
     """Where an assignment may lie: at that path, or among those of rosgrade's own."""
     return Path(name), resources.assignments() / name
+
+
+def chosen_names(loaded: LoadedAssignment, chosen: list[str] | None) -> LoadedAssignment:
+    """The assignment with the values that were chosen for its variables."""
+    given = {name: value for name, _, value in (text.partition("=") for text in chosen or ())}
+    if not given.keys() <= loaded.values.keys() or not all(given.values()):
+        names = ", ".join(loaded.values) or "none"
+        raise UsageError(f"--set: expected NAME=VALUE for a variable of the assignment ({names})")
+    return replace(loaded, given=given)
 
 
 def chosen_sandbox(choice: Choice, progress: Progress) -> Sandbox | None:

@@ -37,6 +37,7 @@ def replay(
     from grader.batch.type_support import TypeSupport
     from grader.errors import UsageError
     from grader.grade.judge import why_not_run
+    from grader.grade.naming import named
     from grader.recording.mcap_reader import read_recording
     from grader.run.replay import replay as replay_recording
     from grader.submission.intake.locate import check_path
@@ -53,6 +54,8 @@ def replay(
     installation = ros.find()
     with progress.shown():
         prepared = prepare(submission, installation, cache=cache_folder(), on_progress=progress.say)
+        record = replace(prepared.record, given=recorded.submission.given)
+        loaded, _ = named(loaded, record, {recorded.scenario: recorded})
         type_support = TypeSupport(loaded, installation, cache_folder()).prefixes(progress.say)
     reason = why_not_run(prepared.record, [one.name for one in loaded.assignment.packages])
     if prepared.install is None or reason is not None:

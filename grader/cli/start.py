@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.options import AssignmentName
+from grader.cli.options import AssignmentName, Chosen, chosen_names
 from grader.cli.screen.console import say
 
 
@@ -19,15 +19,21 @@ def start(
             metavar="DIR", help="Folder for the package, such as the src of your workspace."
         ),
     ] = Path(),
+    chosen: Chosen = None,
 ) -> None:
     """Create a package to start from: it builds and runs.
 
     You write what it does. Existing files are never overwritten.
     """
     from grader.assignment.load import load_assignment
+    from grader.assignment.selection import with_values
     from grader.starter import write_starter
 
-    for written in write_starter(load_assignment(assignment), folder):
+    loaded = chosen_names(load_assignment(assignment), chosen)
+    loaded = with_values(loaded, {**loaded.values, **loaded.given})
+    for name in loaded.values.keys() - loaded.given:
+        say(f"{name} is {loaded.values[name]} in what is written; choose with --set {name}=VALUE")
+    for written in write_starter(loaded, folder):
         say(f"Written: {written}")
     say("\nNext, read the task, then grade your work after every save:\n")
     say(f"  rosgrade show {assignment}")

@@ -14,6 +14,7 @@ import typer
 from grader.cli.options import (
     AssignmentName,
     Checks,
+    Chosen,
     Hidden,
     Quiet,
     ReportFolder,
@@ -22,6 +23,7 @@ from grader.cli.options import (
     Seed,
     Verbose,
     assignment_places,
+    chosen_names,
     chosen_sandbox,
 )
 from grader.cli.screen.console import open_page, output_console, print_error, say
@@ -51,6 +53,7 @@ def watch(
     scenario: Scenarios = None,
     only: Checks = None,
     seed: Seed = None,
+    chosen: Chosen = None,
     hidden: Hidden = False,
     sandbox: SandboxChoice = Choice.AUTO,
     port: Annotated[
@@ -81,7 +84,7 @@ def watch(
     from grader.submission.intake.locate import check_path
 
     def load() -> LoadedAssignment:
-        whole = load_assignment(assignment)
+        whole = chosen_names(load_assignment(assignment), chosen)
         shown = whole if hidden else visible_part(whole)
         return select(shown, tuple(only or ()), tuple(scenario or ()))
 

@@ -9,6 +9,7 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.findings.finding import Evidence
 from grader.findings.wording import code, codes
+from grader.spec.name import package_name
 from grader.spec.nearest_name import nearest
 from grader.submission.build.build_log import modules_not_found, not_found
 from grader.submission.build.toolchain import TOOLS
@@ -94,12 +95,22 @@ def other_package_name(symptom: NoPackage) -> Cause:
         if build_type in _CMAKE
         else "in setup.py, setup.cfg, resource/ and the folder of the Python module"
     )
+    seen = f"found package {code(match)}" if match else f"found {codes(symptom.names)} only"
     return Cause(
-        f"found package {code(match)}" if match else f"found {codes(symptom.names)} only",
+        seen + "".join(map(breach_of_rep_144, [match] if match else symptom.names)),
         f"Write <name>{name}</name> in package.xml, and the same name {others}."
         + ("" if match else " A package inside another one is not found: put them side by side."),
         Evidence(places=places[:10]),
     )
+
+
+def breach_of_rep_144(name: str) -> str:
+    """What is wrong with the name of a package that colcon builds all the same, or nothing."""
+    try:
+        package_name(name)
+    except ValueError as error:
+        return f", but {error}"
+    return ""
 
 
 def why_no_manifest(submission: SubmissionRecord, name: str) -> Cause | None:

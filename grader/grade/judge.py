@@ -20,6 +20,7 @@ from grader.checks.doubt import is_doubtful
 from grader.diagnosis.not_built import why_lacking, why_not_built
 from grader.findings.finding import Finding, Status
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
+from grader.grade.naming import named
 from grader.grade.runtime_imports import with_runtime_imports
 from grader.recording.model import Ending, Recording
 from grader.submission.record import SubmissionRecord
@@ -38,7 +39,7 @@ def grade(
     recordings: Mapping[str, Recording],
     faults: Mapping[str, str] = MappingProxyType({}),
 ) -> Grade:
-    """Judge a submission.
+    """Judge a submission, with its names in the places of the assignment's variables.
 
     A check whose requirement did not pass is skipped, unless that failed by a wrong name which the
     runs put right. A check that raises is an error of ours and keeps its traceback.
@@ -47,6 +48,7 @@ def grade(
         recordings: By scenario id; empty where nothing could be launched.
         faults: By scenario id: why there is no recording.
     """
+    loaded, unnamed = named(loaded, submission, recordings)
     bound = {item.spec.id: item for item in loaded.checks}
     known = with_runtime_imports(submission, recordings.values())
     results: dict[str, CheckResult] = {}
@@ -57,7 +59,8 @@ def grade(
         if roots:
             findings = (_skipped([results[root] for root in roots]),)
         else:
-            findings = tuple(_findings(bound[name], loaded, known, recordings, faults))
+            why = unnamed if unnamed and _is_about_names(bound[name], loaded) else None
+            findings = tuple(_findings(bound[name], loaded, known, recordings, faults, why))
         spec = bound[name].spec
         status = min((item.finding.status for item in findings), key=SEVERITY.index)
         credit = 1.0 if status is Status.PASSED else 0.0
@@ -115,7 +118,12 @@ def _findings(
     submission: SubmissionRecord,
     recordings: Mapping[str, Recording],
     faults: Mapping[str, str],
+    unnamed: Finding | None,
 ) -> Iterator[ScenarioFinding]:
+    if unnamed is not None:
+        whole = [scenario.id for scenario in loaded.scenarios_of(bound)]
+        yield from (ScenarioFinding(scenario, unnamed) for scenario in whole or (None,))
+        return
     if bound.check.subject is Subject.SUBMISSION:
         yield _judge(bound, submission, None)
         return
@@ -141,6 +149,14 @@ def _findings(
                 incomplete = _why_incomplete(submission, launched, finding.expected)
                 judged = replace(judged, finding=incomplete or finding)
             yield judged
+
+
+def _is_about_names(bound: BoundCheck, loaded: LoadedAssignment) -> bool:
+    """Whether a check needs a run, or names what the submission chooses."""
+    written = loaded.source.data["checks"] if loaded.source else ()
+    own = str([entry.get("with") for entry in written if entry.get("id") == bound.spec.id])
+    is_run = bound.check.subject is Subject.RECORDING
+    return is_run or any(f"{{{name}}}" in own for name in loaded.values)
 
 
 def why_not_run(submission: SubmissionRecord, packages: Iterable[str]) -> Finding | None:

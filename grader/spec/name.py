@@ -32,10 +32,12 @@ def _rule(pattern: str, words: str) -> Callable[[str], str]:
 
 
 check_id = _rule(ID, "an id: use lower case letters, digits and underscores")
-package_name = _rule(
-    ID,
-    "a package name: lower case letters, digits and underscores, beginning with a letter (REP-144)",
+_PACKAGE = (
+    "a package name: lower case letters, digits and underscores, beginning with a letter (REP-144)"
 )
+package_name = _rule(ID, _PACKAGE)
+# colcon builds it, with no more than a warning: a student's package may have such a name.
+_built_name = _rule(r"[A-Za-z0-9][A-Za-z0-9_-]*", _PACKAGE)
 node_name = _rule(NODE, "a node name: letters, digits and underscores, not beginning with a digit")
 library_name = _rule(
     LIBRARY,
@@ -73,12 +75,13 @@ def interface_name(name: str) -> str:
 
 
 def _form(pattern: str, words: str) -> WithJsonSchema:
-    """The rule for a name, for editors and for the documentation."""
-    return WithJsonSchema({"type": "string", "pattern": f"^{pattern}$", "x-words": words})
+    """The rule for a name, for editors and for the documentation; a variable may stand in it."""
+    pattern = rf"^{pattern}$|\{{[a-z]"
+    return WithJsonSchema({"type": "string", "pattern": pattern, "x-words": words})
 
 
 Id = Annotated[str, AfterValidator(check_id), _form(ID, "id, such as `period_2`")]
-PackageName = Annotated[str, AfterValidator(package_name), _form(ID, "package name")]
+PackageName = Annotated[str, AfterValidator(_built_name), _form(ID, "package name")]
 NodeName = Annotated[str, AfterValidator(node_name), _form(NODE, "node name")]
 QualifiedNodeName = Annotated[str, AfterValidator(qualified_node_name)]
 Namespace = Annotated[

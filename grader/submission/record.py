@@ -258,6 +258,7 @@ class SubmissionRecord:
         headings: Path of each text (Markdown, reStructuredText) -> its headings.
         bags: Recordings of ``ros2 bag record``.
         build: None where nothing was built.
+        given: Variable of the assignment -> its value, from the roster or from `--set`.
     """
 
     id: str
@@ -269,6 +270,7 @@ class SubmissionRecord:
     files: tuple[str, ...] = ()
     headings: tuple[tuple[str, tuple[str, ...]], ...] = ()
     bags: tuple[BagRecord, ...] = ()
+    given: tuple[tuple[str, str], ...] = ()
 
     @property
     def foreign_imports(self) -> frozenset[str]:

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import errno
 import shutil
+from collections.abc import Mapping
 from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
+from grader.assignment.variable import Variable
 from grader.batch.batch import NOT_YET, Batch, Done
 from grader.batch.class_files import copies, find_reports, notes
 from grader.batch.executor import BatchExecutor, ExecutorLost, LocalExecutor
@@ -22,6 +25,7 @@ from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
 from grader.batch.handed_in import HandedIn
 from grader.batch.intake import take_in
 from grader.batch.ledger import Entry, Ledger
+from grader.batch.roster import parse_roster
 from grader.errors import GraderFault, UsageError
 from grader.findings.finding import Status
 from grader.report.model.result import make_result
@@ -82,9 +86,11 @@ class FailingCrew:
 
     def __init__(self, error: Exception) -> None:
         self._error = error
+        self.given: dict[str, Mapping[str, str]] = {}
 
-    def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
+    def submit(self, key: str, path: Path, folder: Path, given: Mapping[str, str]) -> Future[None]:
         """Fail."""
+        self.given[key] = given
         done: Future[None] = Future()
         done.set_exception(self._error)
         return done
@@ -278,3 +284,21 @@ def test_an_interrupted_batch_knows_what_it_has_not_come_to(course: Class) -> No
         left = {item.entry.key: item for item in batch.left(())}
     assert {key for key, item in left.items() if item.result is not None} == {"ana", "cai"}
     assert left["ben"].entry.problem == left["dee"].entry.problem == NOT_YET
+
+
+@pytest.mark.parametrize(("team", "same_as"), [("red", "ana"), ("blue", "")])
+def test_the_same_submission_of_another_team_is_graded_with_the_names_of_that_team(
+    course: Class, team: str, same_as: str
+) -> None:
+    variables = {"team": Variable(column="Team", example="red")}
+    assignment = course.loaded.assignment.model_copy(update={"variables": variables})
+    roster = parse_roster(f"login,team\nana,red\nben,\ncai,{team}\n", "class.csv")
+    rows = take_in(course.folder / "class", course.folder, roster)
+    with course.ledger.opened():
+        batch = Batch(replace(course.loaded, assignment=assignment), course.ledger)
+        entries, to_do = batch.read(rows)
+        executor = FailingCrew(ExecutorLost("all workers are gone"))
+        with pytest.raises(ExecutorLost):
+            list(batch.grade(to_do, executor))
+    assert [one.same_as for one in entries if one.key == "cai"] == [same_as]
+    assert executor.given == {"ana": {"team": "red"}}

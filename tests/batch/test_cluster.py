@@ -123,7 +123,7 @@ def test_a_cluster_takes_what_its_workers_can_and_is_lost_with_its_scheduler(
     await_that(lambda: executor.capacity == 2)
     submission = tmp_path / "ana"
     shutil.copytree(resources.reference() / ASSIGNMENT, submission)
-    on_its_way = executor.submit("ana", submission, tmp_path)
+    on_its_way = executor.submit("ana", submission, tmp_path, {})
     cluster.processes[0].kill()
     with pytest.raises(ExecutorLost, match=r"the Dask scheduler at tcp://.* was lost"):
         on_its_way.result(LIMIT_S)

@@ -14,6 +14,7 @@ from grader.checks.need import Need, Submitted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_executable import why_no_executable, why_nothing_to_run
 from grader.diagnosis.not_built import (
+    breach_of_rep_144,
     existing_package,
     why_no_manifest,
     why_not_built,
@@ -52,9 +53,13 @@ def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding:
     """The package is there and has a valid package.xml.
 
     Judged by the submitted files: a valid package.xml with this name and the expected build type.
+    A name that a variable found must also keep REP-144: it begins with a lower case letter.
     """
     stop_if(why_no_manifest(submission, parameters.package))
     package = existing_package(submission, parameters.package)
+    if breach := breach_of_rep_144(package.name):
+        seen = f"found in {code(package.path)}{breach}"
+        return Finding.failed(parameters.asked_for, seen, "Give the package another name.")
     if parameters.build_type in (None, package.build_type):
         return Finding.passed(parameters.asked_for, f"found in {code(package.path)}")
     manifest = SourceError(package.file("package.xml"), None, f"build type {package.build_type}")

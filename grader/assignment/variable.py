@@ -1,0 +1,156 @@
+"""Names that students, groups or the roster choose, and the places of the YAML where they stand."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from grader.errors import AssignmentError, Problem
+from grader.spec.source import Model, Source
+
+KEY = "variables"
+ANY = "any"
+_PLACE = re.compile(r"(?<!\$)\{([a-z][a-z0-9_]*)\}")
+_NUMBER = re.compile(r"0|[1-9][0-9]*")
+
+Values = Mapping[str, str]
+"""What stands for each variable, by its name."""
+
+
+class Variable(Model):
+    """A name that a student, a group or the roster chooses; `{name}` stands for it.
+
+    `{name}` may stand in every text of the YAML: in packages, executables, types, topics, files,
+    parameters, titles and hints; and in `interfaces/`, in texts and in names of folders and files.
+    A text that begins with a brace, or is inside `{}` or `[]`, needs quotes. Alone, a number is a
+    number. Braces around any other name stay as they are.
+    """
+
+    match: str | None = Field(
+        None,
+        description="Form of the name in what was handed in, such as `group{n}_gp2`: `{n}` is the "
+        "part that was chosen, of letters, digits and underscores. `any`: the whole name is free, "
+        "and there is exactly one.",
+    )
+    in_: Literal[
+        "packages",
+        "executables",
+        "interfaces",
+        "nodes",
+        "publishers",
+        "subscriptions",
+        "services",
+        "actions",
+    ] = Field(
+        "packages",
+        alias="in",
+        description="Where a name of this form is looked for. `nodes`, `services`, `actions` and "
+        "the topics of `publishers` and `subscriptions` are found in runs: where the student has "
+        "another name than the example, the run is repeated with that name.",
+    )
+    of: str | None = Field(
+        None,
+        description="Only executables of this package; only publishers, subscriptions, services "
+        "or actions of this type.",
+    )
+    column: str | None = Field(
+        None,
+        description="Column of the roster with the value. Without a roster, `--set NAME=VALUE` "
+        "says it, or `match` finds it.",
+    )
+    example: str | int = Field(
+        description="A possible value, which the reference and the starter package have. If it is "
+        "a number, only digits can be chosen.",
+    )
+
+    @model_validator(mode="after")
+    def _has_origin(self) -> Variable:
+        if self.match is None and self.column is None:
+            raise ValueError("give a 'match', such as group{n}_bot or any, or a 'column'")
+        if not re.fullmatch(self.part, str(self.example)):
+            raise ValueError("the 'example' must be of letters, digits and underscores")
+        return self
+
+    @property
+    def is_of_runs(self) -> bool:
+        """Whether it is found in runs, and not in what was handed in."""
+        return self.in_ not in ("packages", "executables", "interfaces")
+
+    @property
+    def part(self) -> str:
+        """Regular expression of its values; of `any` they are whole names."""
+        if self.match == ANY:
+            return ".+"
+        return "[0-9]+" if isinstance(self.example, int) else "[A-Za-z0-9_]+"
+
+
+def fill(value: Any, values: Values) -> Any:
+    """A part of a document with the values in their places."""
+    if isinstance(value, dict):
+        return {fill_text(key, values): fill(item, values) for key, item in value.items()}
+    if isinstance(value, list):
+        return [fill(item, values) for item in value]
+    if not isinstance(value, str):
+        return value
+    text = fill_text(value, values)
+    return int(text) if _PLACE.fullmatch(value) and _NUMBER.fullmatch(text) else text
+
+
+def fill_text(text: str, values: Values) -> str:
+    """A text with the values in their places."""
+    return _PLACE.sub(lambda place: values.get(place[1], place[0]), text)
+
+
+def filled(source: Source, values: Values) -> Source:
+    """A document with the values in their places."""
+    if not values:
+        return source
+    data = {**fill(source.data, values), KEY: source.data[KEY]}
+    lines = {
+        tuple(fill_text(step, values) if isinstance(step, str) else step for step in place): line
+        for place, line in source.lines.items()
+    }
+    return replace(source, data=data, lines=lines)
+
+
+def form(name: str, variables: Mapping[str, Variable], values: Values) -> re.Pattern[str]:
+    """The form of a variable's names; what is chosen is the group ``value``."""
+    variable = variables[name]
+    if variable.match == ANY:
+        return re.compile(f"(?P<value>{variable.part})")
+    steps = _PLACE.split(fill_text(str(variable.match), values))
+    steps[::2] = map(re.escape, steps[::2])
+    parts = [variables[step].part for step in steps[1::2]]
+    first = steps.index(name, 1)
+    steps[1::2] = parts
+    steps[first] = f"(?P<value>{variable.part})"
+    return re.compile("".join(steps))
+
+
+def read_variables(source: Source) -> dict[str, Variable]:
+    """The variables of an assignment.
+
+    Raises:
+        AssignmentError: One is not as it must be; what else is wrong in the document shows later.
+    """
+    written = source.data.get(KEY)
+    names = list(written) if isinstance(written, dict) else []
+    found: dict[str, Variable] = {}
+    problems: list[Problem] = []
+    for name in names:
+        variable, mistakes = source.examine(Variable, (KEY, name))
+        problems += mistakes
+        if variable is None:
+            continue
+        found[name] = variable
+        places = _PLACE.findall(variable.match or "")
+        if variable.match not in (None, ANY) and not {name} <= {*places} <= {*names}:
+            text = f"{variable.match!r} must have {{{name}}} in it, and may have other variables"
+            problems.append(source.problem((KEY, name, "match"), text))
+    if problems:
+        raise AssignmentError(source.file, problems)
+    return found

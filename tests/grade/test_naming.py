@@ -1,0 +1,187 @@
+"""Names that students choose: found in what was handed in, in runs, or in the roster."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from grader.assignment.load import LoadedAssignment, load_assignment
+from grader.assignment.selection import select
+from grader.errors import UsageError
+from grader.findings.finding import Status
+from grader.grade import grade
+from grader.grade.naming import named
+from grader.recording.interaction import Service
+from grader.recording.model import Recording
+from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
+from tests.checks.builder import recording
+
+TOGGLE = "std_srvs/srv/SetBool"
+YAML = """\
+rosgrade: 1
+id: names
+title: The bot of group {n}
+variables:
+  n: {match: "group{n}_gp2", in: packages, example: 7}
+  run: {match: any, in: executables, of: "group{n}_gp2", example: bot}
+  toggle: {match: any, in: services, of: std_srvs/srv/SetBool, example: /toggle}
+  team: {column: Team, match: "{team}_maps", in: packages, example: red}
+packages:
+  - name: group{n}_gp2
+    executables: ["{run}"]
+  - name: "{team}_maps"
+scenarios:
+  - id: main
+    launch: [{package: "group{n}_gp2", executable: "{run}", parameters: {group: "{n}"}}]
+    stimuli: [{call: "{toggle}", type: std_srvs/srv/SetBool}]
+    timeout: 5 s
+checks:
+  - {id: maps, uses: package.found, with: {package: "{team}_maps"}, points: 1}
+  - {id: bot, uses: package.found, with: {package: "group{n}_gp2"}, points: 1, hint: "{n} {other}"}
+  - {id: service, uses: service.exists, with: {service: "{toggle}"}, points: 1, requires: [bot]}
+"""
+
+
+@pytest.fixture
+def loaded(tmp_path: Path) -> LoadedAssignment:
+    folder = tmp_path / "names"
+    folder.mkdir()
+    (folder / "assignment.yaml").write_text(YAML, encoding="utf-8")
+    return load_assignment(folder)
+
+
+def submission(
+    *packages: str, scripts: tuple[str, ...] = ("bot",), **given: str
+) -> SubmissionRecord:
+    return SubmissionRecord(
+        "ana",
+        "ab" * 32,
+        packages=tuple(
+            PackageRecord(name, f"src/{name}", entry_points=tuple((s, "m:main") for s in scripts))
+            for name in packages
+        ),
+        build=BuildRecord(succeeded=True, duration_s=1.0),
+        given=tuple(given.items()),
+    )
+
+
+def runs(record: SubmissionRecord, *services: str) -> Mapping[str, Recording]:
+    offered = tuple(Service(name, TOGGLE, "/bot", appeared_ns=0) for name in services)
+    run = recording()
+    made = dataclasses.replace(run, scenario="main", services=offered, submission=record)
+    return {"main": made}
+
+
+def test_the_example_stands_in_an_assignment_until_there_is_a_submission(
+    loaded: LoadedAssignment,
+) -> None:
+    assert loaded.assignment.title == "The bot of group 7"
+    assert [one.name for one in loaded.assignment.packages] == ["group7_gp2", "red_maps"]
+    assert loaded.checks[1].spec.hint == "7 {other}"
+
+
+def test_names_of_the_submission_stand_everywhere_and_a_number_alone_is_a_number(
+    loaded: LoadedAssignment,
+) -> None:
+    record = submission("group12_gp2", "blue_maps", scripts=("driver",))
+    found, why = named(loaded, record)
+    assert why is None
+    launch = found.assignment.scenarios[0].launch[0]
+    assert (launch.package, launch.executable) == ("group12_gp2", "driver")
+    assert launch.parameters == {"group": 12}
+    assert found.assignment.title == "The bot of group 12"
+    assert found.values["team"] == "blue"
+
+
+def test_a_part_of_an_assignment_stays_the_same_part(loaded: LoadedAssignment) -> None:
+    part = select(loaded, ("maps",))
+    found, _ = named(part, submission("group12_gp2", "blue_maps"))
+    assert [check.spec.id for check in found.checks] == ["maps"]
+    assert found.assignment.scenarios == ()
+
+
+def test_where_no_name_fits_each_check_of_it_tells_the_form_and_what_was_found(
+    loaded: LoadedAssignment,
+) -> None:
+    graded = grade(loaded, submission("team7", "red_maps"), {})
+    result = graded.result("bot")
+    assert result.status is Status.FAILED
+    finding = result.decisive.finding
+    assert finding.expected == (
+        "one package with a name of the form `group{n}_gp2`, such as `group7_gp2`"
+    )
+    assert finding.observed == "found `team7` and `red_maps`"
+    assert graded.result("service").status is Status.SKIPPED
+    assert graded.graded
+
+
+def test_two_names_that_fit_are_both_told(loaded: LoadedAssignment) -> None:
+    graded = grade(loaded, submission("group7_gp2", "group12_gp2", "red_maps"), {})
+    assert graded.result("bot").decisive.finding.observed == (
+        "found `group7_gp2` and `group12_gp2`"
+    )
+
+
+def test_a_free_choice_must_be_a_single_one(loaded: LoadedAssignment) -> None:
+    _, why = named(loaded, submission("group7_gp2", scripts=("bot", "test")))
+    assert why is not None
+    assert why.expected == "one executable of `group7_gp2` of any name, such as `bot`"
+    assert why.observed == "found `bot` and `test`"
+
+
+def test_the_roster_comes_before_what_was_handed_in(loaded: LoadedAssignment) -> None:
+    record = submission("group7_gp2", "blue_maps", team="green")
+    found, _ = named(loaded, record)
+    assert found.values["team"] == "green"
+    result = grade(loaded, record, {}).result("maps")
+    assert "green_maps" in result.decisive.finding.expected
+
+
+def test_a_value_of_the_roster_that_is_no_name_is_no_fault_of_the_student(
+    loaded: LoadedAssignment,
+) -> None:
+    with pytest.raises(UsageError, match="'Team' of the roster holds 'red team'"):
+        named(loaded, submission("group7_gp2", team="red team"))
+
+
+def test_a_service_of_any_name_is_found_in_the_run_by_its_type(loaded: LoadedAssignment) -> None:
+    record = submission("group7_gp2", "red_maps")
+    assert named(loaded, record)[0].values["toggle"] == "/toggle"
+    assert named(loaded, record, runs(record, "/light"))[0].values["toggle"] == "/light"
+    graded = grade(loaded, record, runs(record, "/light"))
+    assert graded.result("service").status is Status.PASSED
+
+
+@pytest.mark.parametrize("services", [(), ("/light", "/lamp")])
+def test_none_or_two_services_of_the_type_are_what_the_check_finds(
+    loaded: LoadedAssignment, services: tuple[str, ...]
+) -> None:
+    record = submission("group7_gp2", "red_maps")
+    result = grade(loaded, record, runs(record, *services)).result("service")
+    assert result.status is Status.FAILED
+    assert "`/toggle`" in result.decisive.finding.expected
+    assert all(service in result.decisive.finding.observed for service in services)
+
+
+def test_a_package_name_that_begins_with_a_digit_breaks_rep_144_and_is_graded(
+    loaded: LoadedAssignment,
+) -> None:
+    record = submission("group7_gp2", "7up_maps")
+    found, why = named(loaded, record)
+    assert why is None and found.values["team"] == "7up"
+    finding = grade(loaded, record, {}).result("maps").decisive.finding
+    assert finding.status is Status.FAILED
+    assert "REP-144" in finding.observed
+
+
+def test_a_name_that_ros_does_not_allow_is_told_and_not_run(tmp_path: Path) -> None:
+    folder = tmp_path / "names"
+    folder.mkdir()
+    text = YAML.replace('{call: "{toggle}"', '{call: "/{team}/toggle"')
+    (folder / "assignment.yaml").write_text(text, encoding="utf-8")
+    _, why = named(load_assignment(folder), submission("group7_gp2", "7up_maps"))
+    assert why is not None
+    assert "'/7up/toggle' is not a ROS topic name" in why.observed
