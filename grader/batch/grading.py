@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -14,6 +14,7 @@ from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import BuildLimitOptions
 from grader.batch.reference_run import read_references
 from grader.batch.type_support import TypeSupport
+from grader.checks.need import StudentTests
 from grader.errors import GraderFault, UsageError, machine_fault
 from grader.findings.finding import Status
 from grader.grade import Grade, grade
@@ -27,6 +28,7 @@ from grader.run.runner import Runner, scenario_seed
 from grader.sandbox.python_tree import check_installed
 from grader.submission.build.bounded import OutputLimits
 from grader.submission.build.colcon import BuildLimits
+from grader.submission.build.own_tests import LIBRARY
 from grader.submission.prepare import Prepared, prepare
 
 RECORDINGS_FOLDER = "recordings"
@@ -65,7 +67,9 @@ class Grading:
         self._runner = runner
         self._cache = cache
         self._seed = seed
-        check_installed(loaded.assignment.libraries)
+        self._tested = frozenset(_tested(loaded))
+        self._libraries = (*loaded.assignment.libraries, *([LIBRARY] if self._tested else ()))
+        check_installed(self._libraries)
         self._build_limits = _build_limits(loaded.assignment.build_limits)
         self._type_support = TypeSupport(loaded, runner.ros, cache)
         self._scenarios = loaded.assignment.scenarios
@@ -86,7 +90,7 @@ class Grading:
             self._type_support.prefixes(on_build)
         sandbox = self._runner.sandbox
         if sandbox is not None:
-            sandbox = sandbox.allowing(self._loaded.assignment.libraries)
+            sandbox = sandbox.allowing(self._libraries)
         # Each of them takes a CPU or more; beyond that they would only hold up each other.
         with self._builds:
             prepared = prepare(
@@ -98,6 +102,7 @@ class Grading:
                 sandbox=sandbox,
                 stop=self._stop,
                 on_output=on_output,
+                tested=self._tested,
             )
         if name is not None:
             prepared = prepared.named(name)
@@ -233,6 +238,14 @@ class Grading:
             # A full disk, a folder that was removed: it is tried again, and the others go on.
             told = GraderFault(f"this machine: {str(error)[:_LONGEST_WORDS]}")
             raise machine_fault(error) or told from error
+
+
+def _tested(loaded: LoadedAssignment) -> Iterator[str]:
+    """The packages whose own tests a check judges."""
+    for bound in loaded.checks:
+        for need in bound.parameters.needs:
+            if isinstance(need, StudentTests):
+                yield getattr(bound.parameters, need.package)
 
 
 def _build_limits(options: BuildLimitOptions) -> BuildLimits:

@@ -119,6 +119,13 @@ class Submitted(Need):
 
 
 @dataclass(frozen=True)
+class StudentTests(Submitted):
+    """A package whose own tests are run after the build."""
+
+    words = "`{package}` among `packages`; its tests are run with pytest after the build"
+
+
+@dataclass(frozen=True)
 class RuffRules(Need):
     """Rules that ruff has: others are never broken."""
 

@@ -66,6 +66,7 @@ def prepare(
     sandbox: Sandbox | None = None,
     stop: threading.Event | None = None,
     on_output: Callable[[str], None] = lambda _: None,
+    tested: frozenset[str] = frozenset(),
 ) -> Prepared:
     """Find the packages of a submission, read them, build them.
 
@@ -76,6 +77,7 @@ def prepare(
         sandbox: What it is built in, or None.
         on_output: Called with each line of the build's log as it comes; an earlier build's log
             comes at once.
+        tested: Packages whose own tests are run after the build.
 
     Raises:
         UsageError: Nothing is at ``path``, or it is a URL.
@@ -91,6 +93,7 @@ def prepare(
         stop=stop,
         on_progress=on_progress,
         on_output=on_output,
+        tested=tested,
     )
 
     def attempt(is_second: bool) -> Prepared:

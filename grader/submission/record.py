@@ -202,6 +202,21 @@ class PackageRecord:
 
 
 @dataclass(frozen=True)
+class PytestRecord:
+    """A run of the student's own tests of a package.
+
+    Attributes:
+        problem: Why pytest did not come to its end, or None.
+        failed: Tests that failed, with the error; at most 100.
+    """
+
+    package: str
+    passed: int = 0
+    failed: tuple[tuple[str, str], ...] = ()
+    problem: str | None = None
+
+
+@dataclass(frozen=True)
 class BuildRecord:
     """What ``colcon build`` did.
 
@@ -211,6 +226,7 @@ class BuildRecord:
         lacking: Packages that CMake did not find, because this machine does not have them.
         culprit: The student's file and line that the log names first, or None.
         log: The end of colcon's output, student's paths mapped back, at most 64 KiB.
+        tests: Runs of the tests that the assignment asks for, of packages that were built.
     """
 
     succeeded: bool
@@ -221,6 +237,7 @@ class BuildRecord:
     lacking: tuple[str, ...] = ()
     culprit: SourceError | None = None
     log: str = ""
+    tests: tuple[PytestRecord, ...] = ()
 
 
 @dataclass(frozen=True)

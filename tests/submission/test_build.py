@@ -379,3 +379,26 @@ def test_a_build_that_is_killed_from_outside_is_built_again_and_never_kept(
         graded_now()
     assert len(killed) == 2
     assert list(cache.rglob("build.json")) == []
+
+
+def test_the_students_own_tests_run_with_what_was_built(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    tests = f"{FOLDER}/test"
+    tree.package()
+    tree.write(
+        {
+            f"{tests}/test_flake8.py": "from ament_flake8.main import main_with_errors\n",
+            f"{tests}/test_node.py": "from bot_publisher import node\n\n"
+            "def test_right():\n    assert node.__file__\n\n"
+            "def test_wrong():\n    assert 1 == 2\n",
+        }
+    )
+    cache = tree.root.parent / "cache"
+    record = prepare(
+        tree.root, real_ros, cache=cache, tested=frozenset({"bot_publisher"})
+    ).record.build
+    assert record is not None
+    [run] = record.tests
+    assert (run.passed, run.problem) == (1, None)
+    assert run.failed == (("test/test_node.py::test_wrong", "assert 1 == 2"),)

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, TypeVar
 from grader.errors import GraderFault, machine_fault
 from grader.out_of_memory import oom_kills
 from grader.ros import RosInstallation
-from grader.submission.build import build_log, standalone_build
+from grader.submission.build import build_log, own_tests, standalone_build
 from grader.submission.build.bounded import Outcome
 from grader.submission.build.build_cache import INSTALL, BuildCache, CachedBuild
 from grader.submission.build.build_error_location import Sources, find_build_error, last_started
@@ -54,6 +54,7 @@ def build_key(
     limits: BuildLimits,
     sandbox: Sandbox | None,
     is_standalone: bool,
+    tested: frozenset[str] = frozenset(),
 ) -> str:
     """Name a build by everything that it depends on."""
     watched = [prefix / "share/ament_index/resource_index/packages" for prefix in ros.prefixes]
@@ -77,6 +78,7 @@ def build_key(
         repr((limits.output, limits.room)),
         sorted(sandbox.libraries) if sandbox is not None else None,
         is_standalone,
+        sorted(tested),
     ]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
@@ -122,7 +124,9 @@ class Builder(BuildSetting):
             BuildKilled: It was ended by no limit of ours.
         """
         wall_s = self.limits.python_s if only_python else self.limits.other_s
-        key = build_key(located.sha256, self.ros, self.limits, self.sandbox, is_standalone)
+        key = build_key(
+            located.sha256, self.ros, self.limits, self.sandbox, is_standalone, self.tested
+        )
         self.on_progress("looking for an earlier build")
         with self.cache.locked(key, wait_s=wall_s + COMPILE_S):
             found = self.cache.find(key)
@@ -156,7 +160,7 @@ class Builder(BuildSetting):
         One that does not build alone is left out: it is built with the others, which also tells
         the student why it fails.
         """
-        quiet = replace(self, on_output=lambda _: None)
+        quiet = replace(self, on_output=lambda _: None, tested=frozenset())
         for name in names:
             folder = sources.folders[name]
             with only(located, folder, name) as part:
@@ -204,6 +208,10 @@ class Builder(BuildSetting):
         builds = [part.build for part in parts.values()]
         return replace(
             record,
+            tests=tuple(
+                own_tests.pytest_record(name, *colcon.test(sources.folders[name]))
+                for name in sorted(self.tested & finished)
+            ),
             duration_s=round(record.duration_s + sum(one.duration_s for one in builds), 3),
             log=build_log.ending("".join(one.log for one in builds) + record.log),
         )

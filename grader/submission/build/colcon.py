@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from grader.errors import GraderFault
 from grader.ros import RosInstallation, site_packages
 from grader.sandbox.limits import BUILD, SandboxLimits
-from grader.submission.build import build_log
+from grader.submission.build import build_log, own_tests
 from grader.submission.build.bounded import Outcome, OutputLimits, run_bounded
 from grader.submission.intake.members import MIB
 from grader.tree import MOST_DEEP, cut_deep
@@ -59,6 +59,7 @@ class BuildSetting:
         sandbox: What everything runs in, or None.
         stop: Set when the builds are no longer wanted.
         on_output: Called with each line of the log as it comes.
+        tested: Packages whose own tests are run after the build.
     """
 
     ros: RosInstallation
@@ -67,6 +68,7 @@ class BuildSetting:
     stop: threading.Event | None = None
     on_progress: Callable[[str], None] = lambda _: None
     on_output: Callable[[str], None] = lambda _: None
+    tested: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -132,6 +134,15 @@ class Colcon:
             options = ["-I", "-S", "-m", "compileall", "-qq"]
             self._run([str(self.setting.ros.python), *options, *folders], COMPILE_S)
 
+    def test(self, folder: str) -> tuple[Outcome, str]:
+        """Run the tests of a package that was built; also where it lies, as pytest names it."""
+        python, place = str(self.setting.ros.python), str(self.root / folder)
+        command = [python, "-m", own_tests.LIBRARY, *own_tests.pytest_options(place)]
+        overlaid = self.setting.ros.environment({}, (self.install,))
+        variables = {**self.environment, **overlaid, "COLUMNS": own_tests.COLUMNS}
+        outcome = self._run(command, own_tests.WALL_S, variables=variables)
+        return outcome, os.path.relpath(place, self.scratch)
+
     @cached_property
     def environment(self) -> dict[str, str]:
         """Variables of a build; none of the caller's, on which what is kept would depend."""
@@ -170,7 +181,11 @@ class Colcon:
         return Path(shutil.copy(_CMAKE_INCLUDE, self.scratch))
 
     def _run(
-        self, command: Sequence[str], wall_s: float, on_line: Callable[[str], None] | None = None
+        self,
+        command: Sequence[str],
+        wall_s: float,
+        on_line: Callable[[str], None] | None = None,
+        variables: Mapping[str, str] | None = None,
     ) -> Outcome:
         """Run a part of the build, in the sandbox if there is one."""
         setting = self.setting
@@ -179,7 +194,7 @@ class Colcon:
         folders = (self.scratch, self.root, self.install)
         with contextlib.ExitStack() as stack:
             room = None
-            environment: Mapping[str, str] = self.environment
+            environment = variables or self.environment
             if setting.sandbox is not None:
                 room = stack.enter_context(
                     setting.sandbox.build(setting.ros, folders, setting.limits.room)
