@@ -14,6 +14,7 @@ from grader.assignment.binding import BoundCheck, bind
 from grader.assignment.interfaces import Interfaces, field_problems, interface_problems
 from grader.assignment.model import NOTHING_WITHHELD, Assignment, Scenario, Withheld
 from grader.assignment.own_check import lesson_checks
+from grader.assignment.repeat import with_runs
 from grader.assignment.variable import Values, filled, read_variables
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
@@ -126,6 +127,7 @@ def load_assignment(
     if found:
         raise AssignmentError(file, in_order(found))
     digest = folder_sha256(file.parent) if file.name == ASSIGNMENT_FILE else _sha256(file)
+    assignment, bound = with_runs(assignment, bound)
     return LoadedAssignment(assignment, file, digest, bound, values=values, source=written)
 
 

@@ -285,6 +285,13 @@ class Scenario(Model):
 
     id: Id = Field(description="Short name, unique in the assignment.")
     title: str = Field("", description="What happens in the run, for the report.")
+    repeat: int = Field(
+        1,
+        ge=1,
+        le=10,
+        description="How many times it is run, each time with other random values. The runs of "
+        "`drive` are called `drive_1`, `drive_2`, ... See `counts` of the checks.",
+    )
     launch: tuple[Launch, ...] = Field(min_length=1, description="Processes of the student.")
     record: tuple[RecordedTopic, ...] = Field((), description="Topics to record.")
     stimuli: tuple[Stimulus, ...] = Field(
@@ -334,6 +341,15 @@ class Scenario(Model):
         return found
 
 
+class Counts(str, Enum):
+    """Which finding counts where a check judges several scenarios."""
+
+    WORST = "worst"
+    BEST = "best"
+    MEDIAN = "median"
+    MEAN = "mean"
+
+
 class CheckSpec(Model):
     """A check with its points."""
 
@@ -352,6 +368,11 @@ class CheckSpec(Model):
         (),
         description="Scenarios whose recordings it judges; by default all. Checks of a submission "
         "have no scenarios.",
+    )
+    counts: Counts = Field(
+        Counts.WORST,
+        description="Which of several scenarios or runs counts: the `worst`, the `best`, the "
+        "`median`, or the `mean` of them, which gives points for each.",
     )
     points: float = Field(ge=0, description="Points for passing.")
     requires: tuple[Id, ...] = Field(

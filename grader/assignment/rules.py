@@ -15,6 +15,7 @@ from typing import Any
 
 from grader.assignment.binding import BoundCheck
 from grader.assignment.model import SHOWN_FROM, Assignment, CheckSpec, Launch, Package, Scenario
+from grader.assignment.repeat import runs_of
 from grader.assignment.stimuli.kinds.join import Join
 from grader.assignment.stimuli.kinds.publish import Publish
 from grader.assignment.stimuli.kinds.request import (
@@ -49,7 +50,11 @@ def problems(
             package_name(package.name)
         except ValueError as error:
             yield source.problem(("packages", index, "name"), str(error))
+    ids = [scenario.id for scenario in assignment.scenarios]
     for index, scenario in enumerate(assignment.scenarios):
+        for run in sorted({*runs_of(scenario)} & {*ids} - {scenario.id}):
+            text = f"a run of {scenario.id!r} would be called as the scenario {run!r}"
+            yield source.problem(("scenarios", index, "repeat"), text)
         for place, text in _scenario(assignment, scenario):
             yield source.problem(("scenarios", index, *place), text)
     yield from _requirements(source, assignment.checks)

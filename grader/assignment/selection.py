@@ -9,6 +9,7 @@ from collections.abc import Collection
 from grader.assignment.load import LoadedAssignment, bound_checks
 from grader.assignment.model import Visibility, Withheld
 from grader.assignment.mutant import required_by
+from grader.assignment.repeat import with_runs
 from grader.assignment.variable import Values, filled
 from grader.checks.check import Subject
 from grader.errors import AssignmentError, UsageError
@@ -97,7 +98,7 @@ def with_values(loaded: LoadedAssignment, values: Values) -> LoadedAssignment:
     assignment, bound, problems = bound_checks(source)
     if problems:
         raise AssignmentError(source.file, problems)
-    checks = tuple(check for check in bound if check is not None)
+    assignment, checks = with_runs(assignment, [check for check in bound if check is not None])
     whole = dataclasses.replace(loaded, assignment=assignment, checks=checks, values=values)
     return select(
         whole,

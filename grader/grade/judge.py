@@ -1,20 +1,20 @@
 """Judging: every check of an assignment, on one submission and its recordings.
 
-A check is worth the credit of its worst scenario: it passes only where every scenario passes,
-and partial credit counts only as far as every scenario gives it. An author who wants points
-for each scenario writes a check for each.
+A check is worth the credit of its worst scenario, if its ``counts`` says nothing else: it passes
+only where every scenario passes, and partial credit counts only as far as every scenario gives it.
 """
 
 from __future__ import annotations
 
+import statistics
 import traceback
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from graphlib import TopologicalSorter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from grader.assignment.model import CheckSpec
+from grader.assignment.model import CheckSpec, Counts
 from grader.checks.check import Subject
 from grader.checks.doubt import is_doubtful
 from grader.diagnosis.not_built import why_lacking, why_not_built
@@ -30,6 +30,12 @@ if TYPE_CHECKING:
     from grader.assignment.binding import BoundCheck
     from grader.assignment.load import LoadedAssignment
 
+_CREDIT: Mapping[Counts, Callable[[Sequence[float]], float]] = {
+    Counts.WORST: min,
+    Counts.BEST: max,
+    Counts.MEDIAN: statistics.median_low,
+    Counts.MEAN: statistics.fmean,
+}
 _NOT_YOURS = "Nothing to fix on your side: tell your instructor."
 
 
@@ -62,10 +68,7 @@ def grade(
             why = unnamed if unnamed and _is_about_names(bound[name], loaded) else None
             findings = tuple(_findings(bound[name], loaded, known, recordings, faults, why))
         spec = bound[name].spec
-        status = min((item.finding.status for item in findings), key=SEVERITY.index)
-        credit = 1.0 if status is Status.PASSED else 0.0
-        if status is Status.FAILED:
-            credit = min(item.finding.credit for item in findings)
+        status, credit = _counted(spec.counts, [item.finding for item in findings])
         put_right = all(_is_put_right(item, recordings) for item in findings)
         results[name] = CheckResult(
             id=name,
@@ -78,12 +81,22 @@ def grade(
             findings=findings,
             waits_for=roots,
             hint=spec.hint,
+            credit=credit,
             put_right=put_right and status is Status.FAILED,
         )
     ordered = tuple(results[name] for name in bound)
     return Grade(
         loaded.assignment, loaded.sha256, submission, ordered, loaded.withheld, loaded.location
     )
+
+
+def _counted(counts: Counts, findings: Sequence[Finding]) -> tuple[Status, float]:
+    """Status and credit of a check that judged several scenarios."""
+    worst = min((finding.status for finding in findings), key=SEVERITY.index)
+    if worst in (Status.ERROR, Status.SKIPPED):
+        return worst, 0.0
+    credit = _CREDIT[counts]([finding.credit for finding in findings])
+    return (Status.PASSED if credit == 1.0 else Status.FAILED), credit
 
 
 def _is_put_right(item: ScenarioFinding, recordings: Mapping[str, Recording]) -> bool:

@@ -40,6 +40,7 @@ class CheckResult:
         points: Earned, in [0, max_points].
         scenarios: Ids of the scenarios that it judges; empty for the submission itself.
         findings: One per scenario in the assignment's order, at least one in all.
+        credit: Share of the points in [0, 1].
         put_right: It failed by a wrong name that the runs put right, so nothing waits for it.
     """
 
@@ -54,13 +55,14 @@ class CheckResult:
     waits_for: tuple[str, ...] = ()
     hint: str = ""
     put_right: bool = False
+    credit: float = 0.0
 
     @property
     def decisive(self) -> ScenarioFinding:
-        """The finding that decided: of the worst status, the first with the least credit."""
+        """The finding that decided: of this status, the first with the nearest credit."""
         return min(
-            self.findings,
-            key=lambda item: (SEVERITY.index(item.finding.status), item.finding.credit),
+            (item for item in self.findings if item.finding.status is self.status),
+            key=lambda item: abs(item.finding.credit - self.credit),
         )
 
     @property

@@ -49,6 +49,18 @@ def test_scenarios_of_hidden_checks_alone_are_not_run_for_students(tmp_path):
     ]
 
 
+def test_each_run_of_a_repeated_scenario_is_a_scenario(tmp_path, monkeypatch):
+    monkeypatch.setitem(globals(), "HARD", HARD.replace("id: hard\n", "id: hard\n    repeat: 2\n"))
+    whole = lesson(tmp_path)
+    assert [one.id for one in whole.assignment.scenarios] == ["run", "hard_1", "hard_2"]
+    judged = {bound.spec.id: whole.scenarios_of(bound) for bound in whole.checks}
+    assert [one.id for one in judged["starts"]] == ["hard_1", "hard_2"]
+    assert len(judged["alive"]) == 3
+    assert [one.id for one in select(whole, scenarios=("hard_2",)).assignment.scenarios] == [
+        "hard_2"
+    ]
+
+
 def test_where_all_is_visible_nothing_is_left_out(tmp_path):
     whole = lesson(tmp_path, "  - {id: alive, uses: node.alive, points: 1}\n")
     assert visible_part(whole) is whole

@@ -38,6 +38,7 @@ class Told:
     title: str = ""
     hint: str = ""
     visibility: str = "visible"
+    counts: str = "worst"
     uses: str = "told.told"
     parameters: Parameters = field(default_factory=NoParameters)
     asked: list[Any] = field(default_factory=list, compare=False)
@@ -53,6 +54,7 @@ class Told:
                 "scenarios": self.scenarios,
                 "hint": self.hint,
                 "visibility": self.visibility,
+                "counts": self.counts,
             }
         )
         check = Check(self.uses, self.subject, NoParameters, self._judge)

@@ -141,6 +141,27 @@ class TestScenarios:
         assert result.score == 1.0
         assert result.result("reaches").decisive.scenario == "far"
 
+    @pytest.mark.parametrize(
+        ("counts", "points", "status", "shown"),
+        [
+            ("worst", 0.0, Status.FAILED, "drive_1"),
+            ("best", 4.0, Status.PASSED, "drive_3"),
+            ("median", 2.0, Status.FAILED, "drive_2"),
+            ("mean", 2.0, Status.FAILED, "drive_2"),
+        ],
+    )
+    def test_of_several_runs_that_counts_which_the_author_says(self, counts, points, status, shown):
+        says = {"drive_1": FAIL, "drive_2": replace(FAIL, credit=0.5), "drive_3": PASS}
+        result = judge(Told("reaches", says, points=4, counts=counts), scenarios=tuple(says))
+        reaches = result.result("reaches")
+        assert (reaches.points, reaches.status) == (points, status)
+        assert reaches.decisive.scenario == shown
+
+    def test_the_best_of_runs_is_not_known_while_one_could_not_be_judged(self):
+        says = {"drive_1": PASS, "drive_2": Finding.error("", "")}
+        result = judge(Told("reaches", says, counts="best"), scenarios=tuple(says))
+        assert result.result("reaches").status is Status.ERROR
+
     def test_a_check_judges_only_the_scenarios_that_it_names(self):
         told = Told("node", scenarios=("renamed",))
         result = judge(told, scenarios=("listen", "renamed"))
