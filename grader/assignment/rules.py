@@ -305,7 +305,7 @@ def _(need: needs.Submitted, user: _User) -> Iterator[_Lack]:
     packages = {package.name: package for package in user.assignment.packages}
     if name not in packages:
         yield ("with", need.package), no_package(name, packages)
-    elif need.executable and executable not in packages[name].executables:
+    elif need.executable and executable not in (None, *packages[name].executables):
         yield ("with", need.executable), no_executable(executable, packages[name])
 
 
