@@ -12,6 +12,7 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
 from rclpy.node import Node
+from std_srvs.srv import Trigger
 
 STEP_S = 0.1
 LONGEST_M = 2.0
@@ -25,9 +26,11 @@ class DriveServer(Node):
         super().__init__('drive_server')
         self.speed = self.declare_parameter('speed', 0.2).value
         self.position: tuple[float, float] | None = None
+        self.reached = 0
         group = ReentrantCallbackGroup()
         self.publisher = self.create_publisher(Twist, '/cmd_vel', 10)
         self.create_subscription(Odometry, '/odom', self.locate, 10, callback_group=group)
+        self.create_service(Trigger, '/group7/reached', self.count, callback_group=group)
         self.server = ActionServer(
             self,
             Drive,
@@ -42,6 +45,12 @@ class DriveServer(Node):
         """Keep where the robot is."""
         point = odometry.pose.pose.position
         self.position = (point.x, point.y)
+
+    def count(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Say how many goals were reached."""
+        response.success = True
+        response.message = str(self.reached)
+        return response
 
     def decide(self, goal: Drive.Goal) -> GoalResponse:
         """Accept a distance of up to 2 m ahead."""
@@ -76,6 +85,7 @@ class DriveServer(Node):
             feedback.remaining = max(0.0, handle.request.distance - result.travelled)
             handle.publish_feedback(feedback)
         self.drive(0.0)
+        self.reached += 1
         handle.succeed()
         return result
 
