@@ -204,6 +204,8 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
         options = ["--no-deps", "--no-build-isolation", "--editable", str(root)]
         _pip(venv, options, "rosgrade itself could not be installed")
         _write_stamp(venv, wanted)
+        if chosen.ros == "wheels":
+            _add_ros2(venv, environ)
     _say(f"ready: {VENV}/bin/rosgrade --help")
 
 
@@ -247,11 +249,37 @@ def _install_lock(venv: Path, lock_text: str) -> None:
         _pip(venv, [*options, "-r", str(path)], problem)
 
 
-def _check_imports(venv: Path, environ: Mapping[str, str]) -> None:
+def _add_ros2(venv: Path, environ: Mapping[str, str]) -> None:
+    """Build the command `ros2`, which no wheel has, where its sources can be had; else say how."""
+    _say("building the command ros2 (a minute; not where github.com cannot be reached)")
+    command = [
+        str(venv / "bin" / "rosgrade"),
+        "underlay",
+        "add",
+        "--quiet",
+        "--wait",
+        "10",
+        "ros2cli",
+    ]
+    try:
+        done = _run(command, _clean(environ))
+        problem = "" if not done.returncode else (done.stdout.splitlines() or ["no reason"])[-1]
+    except OSError as error:
+        problem = str(error)
+    if problem:
+        _say(
+            f"there is no ros2 yet ({problem}); to get it: {VENV}/bin/rosgrade underlay add ros2cli"
+        )
+
+
+def _clean(environ: Mapping[str, str]) -> Dict[str, str]:
     # The wheels' start-up hook leaves this to its children, which may be of another environment.
-    clean = {k: v for k, v in environ.items() if k != "_ROS_WHEELS_BOOTSTRAP_COMPLETE"}
+    return {k: v for k, v in environ.items() if k != "_ROS_WHEELS_BOOTSTRAP_COMPLETE"}
+
+
+def _check_imports(venv: Path, environ: Mapping[str, str]) -> None:
     command = [str(venv / "bin" / "python"), "-c", "import geometry_msgs.msg, rclpy, scipy"]
-    _expect(command, "what was installed does not work together", clean)
+    _expect(command, "what was installed does not work together", _clean(environ))
 
 
 def _pip(venv: Path, arguments: List[str], problem: str) -> None:

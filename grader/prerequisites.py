@@ -48,6 +48,8 @@ def diagnose() -> Iterator[Part]:
     remedy = f"sudo apt install {headers_package()} (for packages with own interfaces)"
     yield Part("Python headers", has_headers(), sysconfig.get_path("include"), remedy)
     yield _sandbox()
+    if installation is not None:
+        yield from _underlays(installation)
     chosen = os.environ.get("ROS_DOMAIN_ID")
     shown = f"{chosen} in this shell" if chosen else "not set in this shell"
     yield Part("ROS_DOMAIN_ID", True, f"{shown}; every run gets a free one from 1 to 101")
@@ -92,6 +94,23 @@ def _sandbox() -> Part:
     trial = try_sandbox()
     found = f"bubblewrap works ({', '.join(LAYERS)})"
     return Part("sandbox", not trial.problem, found, f"{trial.problem}; {trial.remedy}")
+
+
+def _underlays(installation: ros.RosInstallation) -> Iterator[Part]:
+    from grader.resources import cache_folder
+    from grader.ros2_command import REMEDY, find_command
+    from grader.submission.underlay.definition import find_underlay, named_sets
+    from grader.submission.underlay.store import UnderlayStore
+
+    store = UnderlayStore(cache_folder(), installation)
+    missing = {name for name in named_sets() if store.missing([find_underlay(name)])}
+    there = [*sorted(set(named_sets()) - missing)]
+    there += [one.name for one, _ in store.installed() if one.name not in named_sets()]
+    remedy = "what an assignment may need besides; `rosgrade underlay add NAME`"
+    absent = f"; not here: {', '.join(sorted(missing))} ({remedy})" if missing else ""
+    yield Part("underlays", True, f"{', '.join(there) or 'none'}{absent}")
+    found = find_command(installation)
+    yield Part("ros2", found is not None, str(found), REMEDY)
 
 
 def _discovery(installation: ros.RosInstallation) -> Part:

@@ -29,7 +29,7 @@ class RosInstallation:
         source: ``wheels`` or ``sourced``.
         inherited: Variables that a sourced installation needs, taken from the environment.
         underlays: Install spaces of ours (merged layout) with packages that it lacks; see
-            :mod:`grader.submission.build.underlay`.
+            :mod:`grader.submission.underlay`.
     """
 
     source: str

@@ -246,6 +246,21 @@ def test_after_a_set_up_that_was_killed_the_next_one_makes_it_whole(
     assert made_for(tmp_path) == "one"
 
 
+def test_a_set_up_without_the_sources_of_ros2_says_in_one_line_how_to_get_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rosgrade = tmp_path / "bin/rosgrade"
+    rosgrade.parent.mkdir()
+    rosgrade.write_text("#!/bin/sh\necho fetching >&2\necho 'no network' >&2\nexit 3\n")
+    rosgrade.chmod(0o755)
+    bootstrap._add_ros2(tmp_path, os.environ)
+    told = capsys.readouterr().out.splitlines()
+    assert told[1:] == [
+        "rosgrade: there is no ros2 yet (no network); to get it: "
+        ".venv/bin/rosgrade underlay add ros2cli"
+    ]
+
+
 def test_a_set_up_that_fails_leaves_nothing_half_made(tmp_path: Path) -> None:
     assert set_up(tmp_path, "one", "bootstrap._install_lock = None") != 0
     assert not (tmp_path / ".venv").exists()

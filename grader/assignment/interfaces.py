@@ -29,6 +29,8 @@ from grader.submission.read.rosdistro import PACKAGES
 
 FOLDER = "interfaces"
 """Beside ``assignment.yaml``: our copy of the interface packages that the student writes."""
+FOLDERS = ("packages", FOLDER)
+"""Beside ``assignment.yaml``: packages that lie under the submissions."""
 
 _MANIFEST = "package.xml"
 
@@ -55,7 +57,7 @@ class Interfaces:
     def of(cls, folder: Path, values: Values) -> Interfaces:
         """Look around."""
         files = [*resources.carried_interfaces().glob(f"*/{_MANIFEST}")]
-        files += sorted((folder / FOLDER).rglob(_MANIFEST))
+        files += sorted(file for name in FOLDERS for file in (folder / name).rglob(_MANIFEST))
         try:
             prefixes: Sequence[Path] | None = ros.find().prefixes
         except GraderFault:

@@ -21,6 +21,7 @@ from grader.checks.check import Check, Subject
 from grader.errors import AssignmentError, Problem, UsageError
 from grader.spec.nearest_name import nearest_or_all
 from grader.spec.source import Source, in_order, read_source
+from grader.submission.underlay.definition import find_underlay
 
 ASSIGNMENT_FILE = "assignment.yaml"
 
@@ -114,6 +115,11 @@ def load_assignment(
     source = filled(written, values)
     assignment, tried, found = bound_checks(source, catalogue)
     found += rules.problems(source, assignment, tried)
+    for number, given in enumerate(assignment.underlays):
+        try:
+            find_underlay(given, file.parent)
+        except UsageError as error:
+            found.append(source.problem(("underlays", number), str(error)))
     folder = file.resolve().parent.name
     if file.name == ASSIGNMENT_FILE and assignment.id != folder:
         text = f"{assignment.id!r} is not the name of its folder, {folder!r}"

@@ -413,6 +413,14 @@ class Assignment(Model):
         "library, ROS and numpy, by their names for pip, such as `[scipy, pillow]`. They must be "
         "installed on the machine that grades. In a sandbox there are no others.",
     )
+    underlays: tuple[str, ...] = Field(
+        (),
+        description="What the assignment needs beyond rclpy and the common interfaces, such as "
+        "`[tf2]`: a named set (see `rosgrade underlay list`), a `.repos` file or a folder of "
+        "packages, relative to assignment.yaml. A set or file has to be built once on the machine "
+        "that grades, by `rosgrade underlay add`. Packages in a folder `packages` beside "
+        "assignment.yaml need no entry.",
+    )
     scenarios: tuple[Scenario, ...] = Field((), description="The runs.")
     checks: tuple[CheckSpec, ...] = Field(min_length=1, description="What is judged.")
     points: float | None = Field(

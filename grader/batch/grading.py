@@ -72,6 +72,7 @@ class Grading:
         check_installed(self._libraries)
         self._build_limits = _build_limits(loaded.assignment.build_limits)
         self._type_support = TypeSupport(loaded, runner.ros, cache)
+        self._type_support.check()
         self._scenarios = loaded.assignment.scenarios
         self._builds = threading.BoundedSemaphore(cpu_count())
         self._stop = threading.Event()
@@ -86,6 +87,7 @@ class Grading:
         given: Mapping[str, str] = MappingProxyType({}),
     ) -> Graded:
         """Grade one submission; ``given`` are the roster's values of variables."""
+        ros = self._type_support.student(on_build)
         if not self._loaded.values:
             self._type_support.prefixes(on_build)
         sandbox = self._runner.sandbox
@@ -95,7 +97,7 @@ class Grading:
         with self._builds:
             prepared = prepare(
                 path,
-                self._runner.ros,
+                ros,
                 cache=self._cache,
                 limits=self._build_limits,
                 on_progress=on_build,

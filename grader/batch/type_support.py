@@ -1,4 +1,4 @@
-"""The interface packages that an assignment needs beside those of ROS."""
+"""What lies under the submissions of an assignment: for the students, and for the probe."""
 
 from __future__ import annotations
 
@@ -7,18 +7,42 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from grader.assignment.interfaces import FOLDER, write_interfaces
+from grader.assignment.interfaces import FOLDER, FOLDERS, write_interfaces
 from grader.assignment.load import LoadedAssignment
-from grader.ros import RosInstallation
+from grader.errors import GraderFault
+from grader.resources import cache_folder
+from grader.ros import RosInstallation, find
 from grader.scratch import Scratch
-from grader.submission.build.build_cache import BuildCache
-from grader.submission.build.underlay import completed, install_prefix
+from grader.submission.underlay.definition import Underlay, find_underlay
+from grader.submission.underlay.store import UnderlayStore, on_top, packages_in
 
 _WORD = re.compile(r"\w+")
+_INTERFACES = "share/ament_index/resource_index/rosidl_interfaces"
+
+Say = Callable[[str], None]
+
+
+def _silent(_: str) -> None:
+    pass
+
+
+def underlays_of(loaded: LoadedAssignment) -> list[Underlay]:
+    """The underlays that an assignment names."""
+    return [find_underlay(given, loaded.folder) for given in loaded.assignment.underlays]
+
+
+def missing_underlays(loaded: LoadedAssignment) -> list[str]:
+    """What has to be built before an assignment can be graded here, and by which command."""
+    try:
+        store = UnderlayStore(cache_folder(), find())
+    except GraderFault:
+        # Without any ROS another message tells what to install first.
+        return []
+    return [str(missing) for missing in store.missing(underlays_of(loaded))]
 
 
 class TypeSupport:
-    """What the probe imports to hear and send messages of an assignment."""
+    """The underlays of an assignment; nothing is built before they are asked for."""
 
     def __init__(self, loaded: LoadedAssignment, ros: RosInstallation, cache: Path) -> None:
         """Set up; nothing is built yet."""
@@ -26,25 +50,51 @@ class TypeSupport:
         self._ros = ros
         self._cache = cache
         self._lock = threading.Lock()
-        self._found: tuple[Path, ...] | None = None
+        self._found: dict[bool, RosInstallation] = {}
 
-    def prefixes(self, on_build: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
-        """Install spaces of ours for the cell; built where they are not there yet, or any more."""
+    def check(self) -> None:
+        """See that all is there that has to be fetched.
+
+        Raises:
+            MissingUnderlay: It is not.
+        """
+        for missing in UnderlayStore(self._cache, self._ros).missing(underlays_of(self._loaded)):
+            raise missing
+
+    def student(self, on_build: Say = _silent) -> RosInstallation:
+        """The ROS installation that submissions are built and run with."""
+        return self._laid(for_probe=False, on_build=on_build)
+
+    def prefixes(self, on_build: Say = _silent) -> tuple[Path, ...]:
+        """Install spaces that the probe imports interfaces from, to hear and send messages."""
+        laid = self._laid(for_probe=True, on_build=on_build)
+        return tuple(path for path in laid.underlays if (path / _INTERFACES).is_dir())
+
+    def _laid(self, *, for_probe: bool, on_build: Say) -> RosInstallation:
         with self._lock:
+            found = self._found.get(for_probe)
             # The cache may be emptied while a class is graded, or rosgrade watches.
-            if self._found is None or not all(path.is_dir() for path in self._found):
-                self._found = self._built(on_build)
-            return self._found
+            if found is None or not all(path.is_dir() for path in found.underlays):
+                found = self._found[for_probe] = self._built(for_probe, on_build)
+            return found
 
-    def _built(self, on_build: Callable[[str], None]) -> tuple[Path, ...]:
-        cache = BuildCache(self._cache)
-        named = _WORD.findall(self._loaded.assignment.model_dump_json())
-        ros = completed(self._ros, named, cache, on_build)
-        own = self._loaded.folder / FOLDER
-        if not own.is_dir():
-            return ros.underlays
-        if not self._loaded.values:
-            return (install_prefix(own, ros, cache, on_build), *ros.underlays)
-        with Scratch(FOLDER) as copy:
-            write_interfaces(self._loaded.folder, self._loaded.values, copy)
-            return (install_prefix(copy, ros, cache, on_build), *ros.underlays)
+    def _built(self, for_probe: bool, on_build: Say) -> RosInstallation:
+        store = UnderlayStore(self._cache, self._ros, on_build)
+        assignment = self._loaded.assignment
+        ros = store.lay(underlays_of(self._loaded))
+        handed_in = {package.name for package in assignment.packages}
+        with Scratch(FOLDER) as copies:
+            for name in FOLDERS:
+                own = self._loaded.folder / name
+                if not own.is_dir():
+                    continue
+                if name == FOLDER and self._loaded.values:
+                    own = copies / FOLDER
+                    write_interfaces(self._loaded.folder, self._loaded.values, own)
+                # What students have to write is not given to them.
+                names = packages_in(own).keys() - (frozenset() if for_probe else handed_in)
+                if names:
+                    ros = on_top(ros, [store.folder_prefix(own, ros, names)])
+        if for_probe:
+            ros = store.completed(ros, _WORD.findall(assignment.model_dump_json()))
+        return ros

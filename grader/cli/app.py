@@ -28,6 +28,7 @@ from grader.cli import (
     selftest,
     sim,
     start,
+    underlay,
     watch,
 )
 from grader.cli.screen.console import print_error
@@ -82,6 +83,7 @@ app.command("validate")(catalogue.validate)
 app.command("schema")(catalogue.schema)
 app.command("checks")(catalogue.checks)
 app.command("sim")(sim.sim)
+app.add_typer(underlay.app, name="underlay")
 app.command("doctor")(doctor.doctor)
 
 

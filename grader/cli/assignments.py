@@ -45,6 +45,7 @@ def show(
     from grader.errors import UsageError
     from grader.report.files import refuse_inputs, write_whole
     from grader.report.html.handout import Handout, make_handout, render_handout
+    from grader.ros2_command import absence_note
 
     if out is not None and not html:
         raise UsageError("--out is for the page: add --html")
@@ -69,3 +70,6 @@ def show(
         table.add_row(bound.spec.id, bound.title, f"{bound.spec.points:g}")
     console.print(table)
     console.print(handout.total)
+    note = absence_note(handout.text)
+    if note:
+        say(f"\n{note}")

@@ -33,6 +33,7 @@ def validate(
     from grader.assignment.lint_warnings import lint_warnings
     from grader.assignment.load import load_assignment
     from grader.assignment.mutant import MUTANTS_FILE, load_mutants
+    from grader.batch.type_support import missing_underlays
     from grader.sandbox.python_tree import not_installed
 
     broken = 0
@@ -47,6 +48,7 @@ def validate(
             continue
         told = [*lint_warnings(loaded, mutants.mutants if mutants else None)]
         told += not_installed(loaded.assignment.libraries)
+        told += missing_underlays(loaded)
         for warning in told:
             print_warning(f"{loaded.file}: {warning}")
         tested = f", {counted(len(mutants.mutants), 'mutant')}" if mutants else ""

@@ -133,10 +133,15 @@ def check(
             raise
         finally:
             runner.close()
+        from grader.ros2_command import absence_note
+
         result = write_graded(graded, report, clock, json_file)
         console = output_console()
         print_grade(console, graded.grade.assignment.title, result)
         say(f"Report: {page}")
+        note = absence_note(" ".join(f"{one.hint} {one.author_hint}" for one in result.checks))
+        if note:
+            say(note)
         if keep:
             say(f"Installed: {keep_install(graded, report)}")
     formats.write(result, submission)

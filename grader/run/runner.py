@@ -77,7 +77,7 @@ def ros_arguments(
 
 def launch_file_program(ros: RosInstallation, package: str, file: str) -> tuple[str, ...]:
     """What starts a launch file, as `ros2 launch` does."""
-    for prefix in ros.prefixes:
+    for prefix in (*ros.underlays, *ros.prefixes):
         ros2 = prefix / "bin" / "ros2"
         if ros2.is_file() and "ros2launch" in ros.packages:
             return (str(ros.python), str(ros2), "launch", package, file)
@@ -375,7 +375,7 @@ class Runner:
         scratch.mkdir()
         values = draw_values(scenario, seed)
         commands = tuple(
-            process_command(self.ros, launch, assignment, install, values, remaps)
+            process_command(ros, launch, assignment, install, values, remaps)
             for launch in scenario.launch
         )
         imported = {item.module for package in submission.packages for item in package.ros_imports}
@@ -402,7 +402,7 @@ class Runner:
                 "rmw": RMW,
                 "python": ".".join(map(str, sys.version_info[:3])),
                 "sandbox": "none",
-                "ros_imports": " ".join(sorted(imported & set(self.ros.packages))),
+                "ros_imports": " ".join(sorted(imported & set(ros.packages))),
                 # As many threads as rclpy's MultiThreadedExecutor takes by itself.
                 "cpus": str(cpu_count()),
                 **({"remaps": " ".join(remaps)} if remaps else {}),

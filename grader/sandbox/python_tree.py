@@ -27,11 +27,14 @@ from grader.errors import GraderFault
 from grader.spec.nearest_name import did_you_mean
 from grader.tree import listing
 
-VERSION = 2
+VERSION = 3
 KEPT = 4
 """Trees that are not used at the moment; each holds up to 0.3 GB where ROS was updated since."""
 
-_ROOTS = re.compile(r"ros-.*|colcon-.*|setuptools|numpy|pyyaml|lark|empy")
+# With what `ros2` and launch files need, which a machine with ROS has as well.
+_ROOTS = re.compile(
+    r"ros-.*|colcon-.*|setuptools|numpy|pyyaml|lark|empy|argcomplete|psutil|packaging|osrf-pycommon"
+)
 _NAME = re.compile(r"[A-Za-z0-9._-]+")
 _LOCK = ".lock"
 _UNFINISHED = ".unfinished-"
@@ -103,7 +106,7 @@ def check_installed(libraries: Collection[str]) -> None:
         raise GraderFault(lack)
 
 
-def not_installed(libraries: Collection[str]) -> list[str]:
+def not_installed(libraries: Collection[str], who: str = "the assignment allows") -> list[str]:
     """Say of each library that is not there what it is, and how it gets there."""
     installed = set(_installed()) if libraries else set()
     found = []
@@ -111,7 +114,7 @@ def not_installed(libraries: Collection[str]) -> list[str]:
         if _normal(name) not in installed:
             near = did_you_mean(name, installed)
             found.append(
-                f"the assignment allows the library {name!r}, which is not installed here.{near} "
+                f"{who} the library {name!r}, which is not installed here.{near} "
                 f"{'Otherwise install it' if near else 'To install it'}: "
                 f"{sys.executable} -m pip install {name}"
             )

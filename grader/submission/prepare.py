@@ -18,7 +18,6 @@ from grader.submission.build.build_error_location import Sources
 from grader.submission.build.colcon import BuildLimits
 from grader.submission.build.installed import inspect
 from grader.submission.build.standalone_build import standalone
-from grader.submission.build.underlay import completed
 from grader.submission.intake.archive import SUFFIXES
 from grader.submission.intake.locate import Located, check_path, opened, submission_id
 from grader.submission.intake.members import MIB
@@ -28,6 +27,7 @@ from grader.submission.read.document import read_headings
 from grader.submission.read.package import Package, read_package, record_packages
 from grader.submission.read.source import Allowance
 from grader.submission.record import SubmissionRecord
+from grader.submission.underlay.store import UnderlayStore
 from grader.tree import listing
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ class Prepared:
     Attributes:
         install: Its install space (merged layout), read-only; also there when only some packages
             were built. None where nothing was.
+        underlays: Install spaces under it.
     """
 
     record: SubmissionRecord
@@ -74,6 +75,7 @@ def prepare(
     ``manifest_error``, or in ``build``.
 
     Args:
+        ros: With what underlays the assignment names.
         sandbox: What it is built in, or None.
         on_output: Called with each line of the build's log as it comes; an earlier build's log
             comes at once.
@@ -85,6 +87,7 @@ def prepare(
     """
     source = check_path(path)
     on_progress("reading the submission")
+    store = UnderlayStore(cache, replace(ros, underlays=()), on_progress)
     builder = Builder(
         ros=ros,
         cache=BuildCache(cache),
@@ -98,7 +101,7 @@ def prepare(
 
     def attempt(is_second: bool) -> Prepared:
         with opened(source) as located:
-            return _prepare(located, replace(builder, is_second=is_second))
+            return _prepare(located, replace(builder, is_second=is_second), store)
 
     try:
         return once_more(attempt)
@@ -137,7 +140,7 @@ def _hash(source: Path) -> str:
     return total.hexdigest()
 
 
-def _prepare(located: Located, builder: Builder) -> Prepared:
+def _prepare(located: Located, builder: Builder, store: UnderlayStore) -> Prepared:
     ros, allowance = builder.ros, Allowance()
     packages = [
         read_package(located, folder, ros, allowance) for folder in located.packages[:_MAX_PACKAGES]
@@ -156,7 +159,7 @@ def _prepare(located: Located, builder: Builder) -> Prepared:
         return Prepared(record, None)
     used = {name for package in packages for name in package.named}
     used -= {package.name for package in packages}
-    ros = completed(ros, used, builder.cache, builder.on_progress)
+    ros = store.completed(ros, used)
     sources = Sources(
         files={file.path for file in located.files},
         folders={package.name: package.folder for package in packages},

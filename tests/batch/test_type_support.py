@@ -1,17 +1,22 @@
-"""The interfaces that an assignment brings along, for the probe alone."""
+"""What lies under the submissions of an assignment: for the probe, and for students."""
 
 from __future__ import annotations
 
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from grader import resources, ros
 from grader.assignment.interfaces import FOLDER
-from grader.assignment.load import load_assignment
+from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.type_support import TypeSupport
+from grader.errors import AssignmentError
 from grader.recording.interface import sections_of
 from grader.ros import RosInstallation
+from grader.submission.underlay.store import MissingUnderlay
+from tests.submission.samples import PACKAGE
 
 
 def test_an_assignment_of_ros_messages_needs_nothing(tmp_path: Path) -> None:
@@ -32,17 +37,18 @@ def test_what_somebody_has_deleted_is_built_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     built: list[Path] = []
+    installation = RosInstallation("wheels", tmp_path / "python", (tmp_path,))
 
-    def build(_support: TypeSupport, _on_build: object) -> tuple[Path, ...]:
+    def build(_support: TypeSupport, for_probe: bool, _on_build: object) -> RosInstallation:
+        assert for_probe
         built.append(tmp_path / f"prefix{len(built)}")
-        built[-1].mkdir()
-        return (built[-1],)
+        (built[-1] / "share/ament_index/resource_index/rosidl_interfaces").mkdir(parents=True)
+        return replace(installation, underlays=(built[-1],))
 
     monkeypatch.setattr(TypeSupport, "_built", build)
-    installation = RosInstallation("wheels", tmp_path / "python", (tmp_path,))
     support = TypeSupport(load_assignment("timed_publisher"), installation, tmp_path / "cache")
     assert support.prefixes() == support.prefixes() == (built[0],)
-    built[0].rmdir()
+    shutil.rmtree(built[0])
     assert support.prefixes() == (built[1],)
 
 
@@ -63,3 +69,48 @@ def test_the_copy_of_the_assignment_is_built_and_has_the_definition_that_is_aske
     assert sections_of(asked["interface"], built)[0].fields == (
         sections_of(asked["interface"], asked["definition"])[0].fields
     )
+
+
+ASSIGNMENT = """\
+rosgrade: 1
+id: arms
+title: Arms
+packages: [{name: bot_publisher, executables: [bot_pub]}, {name: hand}]
+scenarios: [{id: run, launch: [{executable: bot_pub, package: bot_publisher}], timeout: 5 s}]
+checks: [{id: builds, uses: package.builds, with: {package: bot_publisher}, points: 1}]
+"""
+
+
+def arms(folder: Path, more: str = "") -> LoadedAssignment:
+    """An assignment that brings the packages arm and hand along; students write hand."""
+    for name in ("arm", "hand"):
+        for path, text in PACKAGE.items():
+            file = folder / "arms/packages" / name / path.replace("bot_publisher", name)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text.replace("bot_publisher", name))
+    (folder / "arms/assignment.yaml").write_text(ASSIGNMENT + more)
+    return load_assignment(folder / "arms")
+
+
+def test_an_underlay_that_is_not_there_ends_grading_before_it_begins(tmp_path: Path) -> None:
+    installation = RosInstallation("wheels", tmp_path / "python", (tmp_path,))
+    support = TypeSupport(arms(tmp_path, "underlays: [tf2]\n"), installation, tmp_path)
+    with pytest.raises(MissingUnderlay, match=r"'tf2' .* rosgrade underlay add tf2$"):
+        support.check()
+
+
+def test_an_underlay_that_does_not_exist_is_told_with_its_line(tmp_path: Path) -> None:
+    with pytest.raises(AssignmentError, match=r"yaml:7: underlays\[0\]: no underlay 'tf3'"):
+        arms(tmp_path, "underlays: [tf3]\n")
+
+
+@pytest.mark.ros
+@pytest.mark.slow
+def test_packages_beside_an_assignment_are_given_to_students_but_not_what_they_have_to_write(
+    tmp_path: Path,
+) -> None:
+    support = TypeSupport(arms(tmp_path), ros.find(), tmp_path / "cache")
+    student = support.student()
+    assert {"arm", "hand"} & student.packages == {"arm"}
+    # Neither has interfaces.
+    assert support.prefixes() == ()

@@ -30,7 +30,7 @@ def add_type_support(prefixes: Iterable[Path]) -> None:
     """Make the interfaces of install spaces of ours importable in this process."""
     for prefix in prefixes:
         sys.path[:0] = [str(path) for path in sorted(prefix.glob("lib/python3.*/site-packages"))]
-        _load(sorted(prefix.glob("lib/lib*.so")))
+        _load(sorted(prefix.glob("lib/lib*__rosidl_*.so")))
 
 
 def _load(libraries: list[Path]) -> None:

@@ -113,20 +113,23 @@ class Builder(BuildSetting):
         only_python: bool,
         standalone: Sequence[str] = (),
         is_standalone: bool = False,
+        key: str | None = None,
     ) -> CachedBuild:
         """Build all packages of a submission, unless just this was built before.
 
         Args:
             located: The submission; the build runs in its private copy and may change it.
             standalone: Packages that are built for themselves, as if handed in alone.
+            key: Name of the build in the cache; by default all that it depends on is in it.
 
         Raises:
             BuildKilled: It was ended by no limit of ours.
         """
         wall_s = self.limits.python_s if only_python else self.limits.other_s
-        key = build_key(
-            located.sha256, self.ros, self.limits, self.sandbox, is_standalone, self.tested
-        )
+        if key is None:
+            key = build_key(
+                located.sha256, self.ros, self.limits, self.sandbox, is_standalone, self.tested
+            )
         self.on_progress("looking for an earlier build")
         with self.cache.locked(key, wait_s=wall_s + COMPILE_S):
             found = self.cache.find(key)

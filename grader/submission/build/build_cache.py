@@ -73,9 +73,10 @@ class BuildCache:
     A folder that cannot be used is a :class:`GraderFault`.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, is_pruned: bool = True) -> None:
         """Name the folder; it is made when something is stored."""
         self._folder = folder / BUILDS
+        self._is_pruned = is_pruned
 
     @contextlib.contextmanager
     def locked(self, key: str, wait_s: float) -> Iterator[None]:
@@ -137,8 +138,13 @@ class BuildCache:
                 (self._folder / key).rename(unfinished / "damaged")
             unfinished.rename(self._folder / key)
         shutil.rmtree(self._folder / key / "damaged", ignore_errors=True)
-        self._prune_sometimes(key)
+        if self._is_pruned:
+            self._prune_sometimes(key)
         return CachedBuild(build, self._folder / key / INSTALL if installed else None)
+
+    def discard(self, key: str) -> None:
+        """Forget a build."""
+        remove_tree(self._folder / key)
 
     def _prune_sometimes(self, keep: str) -> None:
         """Look for old builds: in a batch not after every one, as that takes long."""

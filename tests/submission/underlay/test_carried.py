@@ -1,4 +1,4 @@
-"""Interface packages of ours under what students hand in."""
+"""The packages that rosgrade carries along, under what students hand in."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ from pathlib import Path
 import pytest
 
 from grader import ros as ros_module
-from grader.errors import GraderFault
 from grader.recording.interface import sections_of
 from grader.ros import RosInstallation
-from grader.submission.build.build_cache import BuildCache
-from grader.submission.build.underlay import CARRIED, completed, install_prefix
+from grader.submission.underlay.store import CARRIED, UnderlayStore
 
 EXAMPLE = CARRIED / "example_interfaces"
 
@@ -58,13 +56,13 @@ def test_what_std_msgs_and_std_srvs_have_is_the_same_here(path: Path) -> None:
 def test_a_ros_that_has_the_package_is_left_as_it_is(named_ros: RosInstallation) -> None:
     index = named_ros.prefixes[0] / "share/ament_index/resource_index/packages"
     (index / "example_interfaces").touch()
-    cache = BuildCache(Path("/nowhere"))
-    assert completed(named_ros, ["example_interfaces"], cache) is named_ros
+    store = UnderlayStore(Path("/nowhere"), named_ros)
+    assert store.completed(named_ros, ["example_interfaces"]) is named_ros
 
 
 def test_what_nobody_names_is_not_built(named_ros: RosInstallation) -> None:
-    cache = BuildCache(Path("/nowhere"))
-    assert completed(named_ros, ["rclpy", "turtlesim"], cache) is named_ros
+    store = UnderlayStore(Path("/nowhere"), named_ros)
+    assert store.completed(named_ros, ["rclpy", "turtlesim"]) is named_ros
 
 
 def test_underlays_are_seen_behind_the_submission(
@@ -88,16 +86,3 @@ def test_underlays_are_seen_behind_the_submission(
     ):
         paths = environment[name].split(":")
         assert paths[:2] == [f"{over}{below}", f"{under}{below}"]
-
-
-@pytest.mark.compiles
-@pytest.mark.ros
-@pytest.mark.slow
-def test_a_package_of_ours_that_does_not_build_is_our_fault(tmp_path: Path) -> None:
-    folder = tmp_path / "bot_msgs"
-    folder.mkdir()
-    manifest = (EXAMPLE / "package.xml").read_text(encoding="utf-8")
-    (folder / "package.xml").write_text(manifest.replace("example_interfaces", "bot_msgs"))
-    (folder / "CMakeLists.txt").write_text('message(FATAL_ERROR "no")\n')
-    with pytest.raises(GraderFault, match=r"interface packages in .*bot_msgs could not be built"):
-        install_prefix(folder, ros_module.find(), BuildCache(tmp_path / "cache"))
