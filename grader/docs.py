@@ -23,6 +23,7 @@ from grader import resources
 from grader.assignment import model, mutant, variable
 from grader.assignment.own_check import FOLDER, lesson_checks
 from grader.assignment.stimuli.stimulus import stimulus_models
+from grader.checks import window
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.checks.tolerance import TimeTolerance
@@ -62,6 +63,7 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "topics: clock": description.ClockTopic,
         "topics: tf": description.TransformTopic,
         "checks": model.CheckSpec,
+        "checks: after, before, while": window.Phase,
     },
     "mutants": {
         "The whole of mutants.yaml": mutant.MutantFile,

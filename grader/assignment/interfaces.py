@@ -164,17 +164,19 @@ def field_problems(
 ) -> Iterator[Problem]:
     """Find fields that the messages do not have; where a definition is not at hand, none."""
     for index, bound in enumerate(checks):
-        for named in bound.parameters.named_fields():
-            for interface in _types(assignment, bound, named.endpoint):
-                try:
-                    find = part_of(known.find, interface, named.part)
-                    message = _sample(interface, find, ())
-                except (KeyError, IndexError):
-                    continue
-                lack = _lack(named, message)
-                if lack:
-                    text = f"{named.endpoint} ({interface}): {lack}"
-                    yield source.problem(("checks", index, "with", *named.place), text)
+        phases = bound.spec.window.phases if bound.spec.window else {}
+        for key, parameters in {"with": bound.parameters, **phases}.items():
+            for named in parameters.named_fields():
+                place = ("checks", index, key, *named.place)
+                for interface in _types(assignment, bound, named.endpoint):
+                    try:
+                        find = part_of(known.find, interface, named.part)
+                        message = _sample(interface, find, ())
+                    except (KeyError, IndexError):
+                        continue
+                    lack = _lack(named, message)
+                    if lack:
+                        yield source.problem(place, f"{named.endpoint} ({interface}): {lack}")
 
 
 def _types(assignment: Assignment, bound: BoundCheck, endpoint: str) -> list[str]:

@@ -14,6 +14,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from grader.assignment.stimuli.stimulus import Stimulus
 from grader.assignment.variable import Variable
+from grader.checks.window import Phase, Window
 from grader.sandbox.limits import BUILD, BUILD_OUTPUT_BYTES, SandboxLimits
 from grader.spec.name import (
     Durability,
@@ -374,6 +375,26 @@ class CheckSpec(Model):
         description="Which of several scenarios or runs counts: the `worst`, the `best`, the "
         "`median`, or the `mean` of them, which gives points for each.",
     )
+    after: Phase | None = Field(
+        None, description="Judge only what is observed after this has happened first."
+    )
+    before: Phase | None = Field(
+        None, description="Judge only what is observed before this happens first."
+    )
+    while_: Phase | None = Field(
+        None,
+        alias="while",
+        description="Judge only what is observed while this is so: each time of it by itself.",
+    )
+    from_: DurationOrZero = Field(
+        0.0,
+        alias="from",
+        description="Judge only what is observed from then on, counted from the first match, or "
+        "from the beginning of what `after` or `while` names.",
+    )
+    to: Duration | None = Field(
+        None, description="Judge only what is observed until then, counted from the same."
+    )
     points: float = Field(ge=0, description="Points for passing.")
     requires: tuple[Id, ...] = Field(
         (), description="Checks that must pass; otherwise this check is skipped."
@@ -385,7 +406,15 @@ class CheckSpec(Model):
     def _one_check(self) -> CheckSpec:
         if (self.uses is None) == (self.python is None):
             raise ValueError("give either 'uses', a check of the catalogue, or 'python', your own")
+        if self.to is not None and self.to <= self.from_:
+            raise ValueError("'to' is not later than 'from'")
         return self
+
+    @property
+    def window(self) -> Window | None:
+        """When it looks at a run; None for the whole run."""
+        found = Window(self.after, self.before, self.while_, self.from_, self.to)
+        return found if found != Window() else None
 
 
 class Assignment(Model):

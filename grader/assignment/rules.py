@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import singledispatch
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
@@ -139,8 +139,9 @@ def _check(assignment: Assignment, bound: BoundCheck) -> Iterator[tuple[Place, s
     scenarios = {scenario.id: scenario for scenario in assignment.scenarios}
     judged = [scenarios[one] for one in spec.scenarios or scenarios if one in scenarios]
     if bound.check.subject is Subject.SUBMISSION:
-        if spec.scenarios:
-            text = f"{name!r} judges what was handed in, not a run: leave 'scenarios' out"
+        if spec.scenarios or spec.window is not None:
+            key = "scenarios" if spec.scenarios else "from, to, after, before and while"
+            text = f"{name!r} judges what was handed in, not a run: leave {key!r} out"
             yield ("scenarios",), text
     elif not scenarios:
         yield (), f"{name!r} judges a run, but the assignment has no scenarios"
@@ -152,6 +153,15 @@ def _check(assignment: Assignment, bound: BoundCheck) -> Iterator[tuple[Place, s
         if not spec.scenarios:
             yield from _other_programs(judged)
     yield from need_problems(assignment, bound, judged)
+    for key, phase in spec.window.phases.items() if spec.window else ():
+        for place, text in need_problems(assignment, replace(bound, parameters=phase), judged):
+            yield (key, *place[1:]), text
+    for one in judged:
+        if spec.from_ >= one.timeout:
+            text = (
+                f"the scenario {one.id!r} ends after {format_duration(one.timeout)} at the latest"
+            )
+            yield ("from",), text
 
 
 def _other_programs(scenarios: Sequence[Scenario]) -> Iterator[tuple[Place, str]]:
@@ -204,7 +214,7 @@ def _lacks(need: needs.Need, user: _User) -> Iterator[_Lack]:
 @_lacks.register
 def _(need: needs.SimulatedRobot, user: _User) -> Iterator[_Lack]:
     for scenario in user.scenarios:
-        if scenario.world is None:
+        if scenario.world is None and not (need.about and user.value(need.about) is None):
             text = f"the scenario {scenario.id!r} has no 'world', and so no simulated robot"
             yield ("uses",), text
 
@@ -212,10 +222,12 @@ def _(need: needs.SimulatedRobot, user: _User) -> Iterator[_Lack]:
 @_lacks.register
 def _(need: needs.Recorded, user: _User) -> Iterator[_Lack]:
     topic, interface = user.value(need.topic), user.value(need.type)
-    if user.value(need.kind) == "subscription":
+    if topic is None or user.value(need.kind) == "subscription":
         return
     for scenario in user.scenarios:
         recorded = scenario.recorded_types
+        if need.or_sent:
+            recorded.update(one.exchanged for one in scenario.stimuli if isinstance(one, Publish))
         if topic not in recorded:
             text = f"the scenario {scenario.id!r} does not record {topic!r}."
             yield ("with", need.topic), text + nearest_or_all(topic, recorded, "It records")
@@ -240,6 +252,8 @@ def _(need: needs.Joined, user: _User) -> Iterator[_Lack]:
 
 @_lacks.register
 def _(need: needs.Called, user: _User) -> Iterator[_Lack]:
+    if user.value(need.service) is None:
+        return
     service, key = user.value(need.service) + need.suffix, ("with", need.service)
     for scenario in user.scenarios:
         calls = [one for one in scenario.stimuli if isinstance(one, CallService)]

@@ -31,6 +31,8 @@ class SimulatedRobot(Need):
     """A ``world`` in each scenario."""
 
     words = "a `world` with the simulated robot"
+    about: str | None = None
+    """Parameter that is about the robot, if one is."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,8 @@ class Recorded(Need):
     """Parameter with its type, if the check expects one."""
     kind: str | None = None
     """Parameter with the student's end: messages to a subscription need not be recorded."""
+    or_sent: bool = False
+    """Whether a topic that a stimulus publishes on will do as well."""
 
 
 @dataclass(frozen=True)

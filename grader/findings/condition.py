@@ -23,20 +23,20 @@ _FORM = re.compile(r"(>=|<=|>|<|!=|)\s*(.*)", re.DOTALL)
 _BETWEEN = ".."
 
 
+def difference(wanted: float, observed: float, circle: float = 0.0) -> float:
+    """How far a number is off; of an angle, with a full turn as ``circle``, on the circle."""
+    found = observed - wanted
+    return math.remainder(found, circle) if circle and math.isfinite(found) else found
+
+
 def is_near(wanted: float, observed: float, tolerance: float, circle: float = 0.0) -> bool:
     """Whether a number is the wanted one; NaN is the same as NaN.
 
     A float32 field holds the float32 that is nearest to the wanted number: that is the same.
-
-    Args:
-        circle: Of an angle a full turn: then its difference is that on the circle.
     """
     if math.isnan(wanted) or math.isnan(observed):
         return math.isnan(wanted) and math.isnan(observed)
-    difference = observed - wanted
-    if circle and math.isfinite(difference):
-        difference = math.remainder(difference, circle)
-    if wanted == observed or abs(difference) <= tolerance:
+    if wanted == observed or abs(difference(wanted, observed, circle)) <= tolerance:
         return True
     in_range = abs(wanted) <= _FLOAT32_MAX
     return in_range and observed == struct.unpack("f", struct.pack("f", wanted))[0]

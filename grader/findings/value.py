@@ -13,7 +13,7 @@ from pydantic import AfterValidator
 
 from grader.findings import condition
 from grader.findings.condition import Condition, is_comparison, is_near
-from grader.spec.expression import Expression
+from grader.spec.expression import Expression, is_field
 from grader.spec.nearest_name import did_you_mean
 
 EXACT = condition.EXACT
@@ -162,10 +162,10 @@ def _expect(item: Any, message: Any, path: str, found: dict[str, Any]) -> None:
 def _named(message: Any, key: str, around: str) -> Any:
     """What a key of an expected value names, in the message that is at the path ``around``."""
     try:
-        expression = Expression.of(key)
+        Expression.of(key)
     except ValueError as error:
         raise NoSuchField(f"{around or 'the message'} has no field {key!r}: {error}") from None
-    if expression.is_field:
+    if is_field(key):
         return _part_of(message, key, around)
     if around:
         raise NoSuchField(f"write {key!r} outside of {around!r}, with the whole paths of fields")

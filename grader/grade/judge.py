@@ -22,6 +22,7 @@ from grader.findings.finding import Finding, Status
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
 from grader.grade.naming import named
 from grader.grade.runtime_imports import with_runtime_imports
+from grader.grade.windowed import judged_in
 from grader.recording.model import Ending, Recording
 from grader.submission.record import SubmissionRecord
 
@@ -220,7 +221,11 @@ def _judge(
     bound: BoundCheck, subject: SubmissionRecord | Recording, scenario: str | None
 ) -> ScenarioFinding:
     try:
-        finding = bound.check.judge(subject, bound.parameters)
+        judge, window = bound.check.judge, bound.spec.window
+        if window is not None and isinstance(subject, Recording):
+            finding = judged_in(window, judge, subject, bound.parameters)
+        else:
+            finding = judge(subject, bound.parameters)
         misuse = _misuse(finding)
         failed = not misuse and finding.status is Status.FAILED
         if failed and isinstance(subject, Recording):

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
+from grader.findings.condition import difference
 from grader.findings.value import number_at
 from grader.findings.wording import code
 from grader.recording.model import NS, LogLine, Message, Recording
@@ -111,8 +112,7 @@ def shows(number: float, value: float, decimals: int, circle: float = 0.0) -> bo
     """
     if not (math.isfinite(number) and math.isfinite(value)):
         return number == value or (math.isnan(number) and math.isnan(value))
-    difference = math.remainder(number - value, circle) if circle else number - value
-    return abs(difference) <= 10.0**-decimals + _FLOAT_NOISE
+    return abs(difference(value, number, circle)) <= 10.0**-decimals + _FLOAT_NOISE
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import ast
 import math
 import operator
 import re
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -64,27 +64,36 @@ _OPERATORS: dict[type, Callable[..., Any]] = {
     **{ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul},
     **{ast.Div: operator.truediv, ast.USub: operator.neg, ast.UAdd: operator.pos},
 }
+_LIKE_AN_ANGLE = {ast.Add, ast.Sub, ast.USub, ast.UAdd}
 
 
 @dataclass(frozen=True)
 class Expression:
     """A number (or another value) that follows from the fields of a message.
 
-    It may be one field, a quantity such as ``90 deg`` (in SI units), or made of these with
+    It is one field, a quantity such as ``90 deg`` (in SI units), or made of these with
     ``+ - * /``, ``pi`` and the functions of the table.
+
+    Attributes:
+        fields: Paths of the fields that it is made of.
+        circle: Of an angle that goes all around: a full turn in its unit; else 0.
+        value: Computes it; NaN where there is no result, as of a division by zero. A TypeError
+            says that a field has another kind of value than the expression needs.
     """
 
-    text: str
-    _tree: ast.expr = field(compare=False, repr=False)
+    fields: tuple[str, ...]
+    circle: float
+    value: Callable[[Find], Any]
 
     @classmethod
     @cache
     def of(cls, text: str) -> Expression:
         """Read one; a ValueError says what is wrong."""
         if _PATH.fullmatch(text):
-            return cls(text, ast.Name(text))
+            return _field(text)
         try:
-            return cls(text, ast.Constant(parse_any(text)[0]))
+            number, _ = parse_any(text)
+            return cls((), 0.0, lambda _: number)
         except ValueError as error:
             why = str(error) if "unknown unit" in str(error) else f"{text!r} cannot be read"
         try:
@@ -93,31 +102,16 @@ class Expression:
             unclosed = text.count("(") > text.count(")")
             why += ": inside {...} an expression with a comma needs quotes" if unclosed else ""
             raise ValueError(why) from None
-        _examine(tree, text.strip())
-        return cls(text, tree)
+        return _read(tree)
 
-    @property
-    def is_field(self) -> bool:
-        """Whether it is just one field."""
-        return isinstance(self._tree, ast.Name)
 
-    @property
-    def fields(self) -> tuple[str, ...]:
-        """Paths of the fields that it is made of."""
-        return tuple(dict.fromkeys(_fields(self._tree)))
+def is_field(text: str) -> bool:
+    """Whether an expression is just the path of a field."""
+    return _PATH.fullmatch(text) is not None
 
-    @property
-    def circle(self) -> float:
-        """Of an angle that goes all around: a full turn in its unit; else 0."""
-        return _circle(self._tree)
 
-    def value(self, find: Find) -> Any:
-        """Compute it; NaN where there is no result, as of a division by zero.
-
-        Raises:
-            TypeError: A field has another kind of value than the expression needs.
-        """
-        return _value(self._tree, find)
+def _field(path: str) -> Expression:
+    return Expression((path,), 0.0, lambda find: find(path))
 
 
 def _path(node: ast.AST) -> str:
@@ -128,76 +122,45 @@ def _path(node: ast.AST) -> str:
         case ast.Attribute(value=inner, attr=name):
             around = _path(inner)
             return around and f"{around}.{name}"
-        case ast.Subscript(value=inner, slice=ast.Constant(value=int(index))) if index >= 0:
+        case ast.Subscript(value=inner, slice=ast.Constant(value=int(index))):
             around = _path(inner)
             return around and f"{around}[{index}]"
     return ""
 
 
-def _parts(node: ast.AST) -> list[ast.expr]:
-    """What an expression is made of."""
+def _read(node: ast.expr) -> Expression:
+    path, name = _path(node), ""
+    sign: ast.AST = node
+    if path and path != "pi":
+        return _field(path)
+    parts: list[ast.expr] = []
     match node:
-        case ast.Call(args=arguments, keywords=[]):
-            return arguments
-        case ast.BinOp(left=left, right=right):
-            return [left, right]
-        case ast.UnaryOp(operand=operand):
-            return [operand]
-    return []
-
-
-def _examine(node: ast.expr, text: str) -> None:
-    """Refuse what is not in the table."""
-    match node:
-        case _ if _path(node):
-            return
+        case ast.Name():
+            return Expression((), 0.0, lambda _: math.pi)
         case ast.Constant(value=number) if type(number) in (int, float):
-            return
-        case ast.Call(func=ast.Name(id=name), keywords=[]):
+            return Expression((), 0.0, lambda _: number)
+        case ast.Call(func=ast.Name(id=name), args=parts, keywords=[]):
             if name not in _FUNCTIONS:
                 advice = nearest_or_all(name, _FUNCTIONS, "The functions are")
                 raise ValueError(f"there is no function {name!r}.{advice}")
-        case ast.BinOp(op=sign) | ast.UnaryOp(op=sign) if type(sign) in _OPERATORS:
-            pass
-        case _:
-            raise ValueError(f"{ast.get_source_segment(text, node)!r} is not allowed in it")
-    for part in _parts(node):
-        _examine(part, text)
+        case ast.BinOp(left=left, op=sign, right=right):
+            parts = [left, right]
+        case ast.UnaryOp(op=sign, operand=operand):
+            parts = [operand]
+    function = _FUNCTIONS.get(name) or _OPERATORS.get(type(sign))
+    if function is None:
+        raise ValueError(f"{ast.unparse(node)!r} is not allowed in it")
+    read = [_read(part) for part in parts]
 
+    def value(find: Find) -> Any:
+        values = [part.value(find) for part in read]
+        try:
+            return function(*values)
+        except (ArithmeticError, ValueError):
+            return math.nan
 
-def _fields(node: ast.AST) -> Iterator[str]:
-    path = _path(node)
-    if path and path != "pi":
-        yield path
-    for part in () if path else _parts(node):
-        yield from _fields(part)
-
-
-def _circle(node: ast.AST) -> float:
-    match node:
-        case ast.Call(func=ast.Name(id=name)) if name in _ALL_AROUND:
-            return math.tau
-        case ast.Call(func=ast.Name(id="degrees"), args=[inner]):
-            return math.degrees(_circle(inner))
-        case ast.Call(func=ast.Name(id="radians"), args=[inner]):
-            return math.radians(_circle(inner))
-        case ast.UnaryOp() | ast.BinOp(op=ast.Add() | ast.Sub()):
-            return max(map(_circle, _parts(node)))
-    return 0.0
-
-
-def _value(node: ast.AST, find: Find) -> Any:
-    path = _path(node)
-    if path:
-        return math.pi if path == "pi" else find(path)
-    if isinstance(node, ast.Constant):
-        return node.value
-    values = [_value(part, find) for part in _parts(node)]
-    if isinstance(node, ast.Call):
-        function = _FUNCTIONS[getattr(node.func, "id", "")]
-    else:
-        function = _OPERATORS[type(getattr(node, "op", None))]
-    try:
-        return function(*values)
-    except (ArithmeticError, ValueError):
-        return math.nan
+    circle = math.tau if name in _ALL_AROUND else 0.0
+    if name in ("degrees", "radians") or type(sign) in _LIKE_AN_ANGLE:
+        circle = max((part.circle for part in read), default=0.0)
+        circle = function(circle) if name else circle
+    return Expression(tuple(dict.fromkeys(f for part in read for f in part.fields)), circle, value)

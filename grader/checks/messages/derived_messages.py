@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from typing import Any
 
+from grader.findings.condition import difference
 from grader.findings.value import NoSuchItem, Tolerance, leaves, number_at, tolerance_of
 from grader.measure.numbering import lost
 from grader.recording.model import NS, Message, Recording
@@ -20,23 +21,15 @@ Row = tuple[float, ...]
 """A number for each field."""
 
 
-def error(value: Expression, observed: float, wanted: float) -> float:
-    """How far a number is off; of angles the difference on the circle."""
-    difference = observed - wanted
-    if value.circle and math.isfinite(difference):
-        return math.remainder(difference, value.circle)
-    return difference
-
-
-def mistakes(value: Expression, message: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+def mistakes(value: str, message: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
     """What students take instead: words that end the sentence "it is ...", and the number.
 
     The words of all messages of a type are the same, in the same order, as far as their arrays
     have the same length.
     """
-    right = number_at(message, value.text)
-    quaternion = "".join(value.fields)
-    if value.text.replace(" ", "") == f"yaw({quaternion})":
+    right = number_at(message, value)
+    quaternion = "".join(Expression.of(value).fields)
+    if value.replace(" ", "") == f"yaw({quaternion})":
         x, y, z, w = (number_at(message, f"{quaternion}.{part}") for part in _QUATERNION)
         for part, number in zip(_QUATERNION, (x, y, z, w), strict=True):
             yield f"`{part}` of the quaternion, which is no angle: convert the quaternion", number
@@ -50,10 +43,10 @@ def mistakes(value: Expression, message: Mapping[str, Any]) -> Iterator[tuple[st
         turn = math.atan(math.tan(right))
         yield "the yaw without its quadrant: math.atan2(a, b), not math.atan(a / b)", turn
     else:
-        yield f"`{value.text}` with the wrong sign", -right
-        yield f"`{value.text}` without its sign, as of math.hypot() or abs()", abs(right)
+        yield f"`{value}` with the wrong sign", -right
+        yield f"`{value}` without its sign, as of math.hypot() or abs()", abs(right)
     for path, number in leaves(message).items():
-        if path != value.text and isinstance(number, int | float):
+        if path != value and isinstance(number, int | float):
             yield f"`{path}`", float(number)
 
 
@@ -90,7 +83,7 @@ class DerivedMessages:
     """
 
     fields: tuple[str, ...]
-    values: tuple[Expression, ...]
+    values: tuple[str, ...]
     tolerances: Row
     sources: tuple[Message, ...]
     table: tuple[Row, ...]
@@ -100,11 +93,9 @@ class DerivedMessages:
         cls, sources: tuple[Message, ...], fields: Mapping[str, str], tolerance: Tolerance
     ) -> DerivedMessages:
         """Read the sources; raises NoSuchField where a field is not there, or holds no number."""
-        values = tuple(map(Expression.of, fields.values()))
+        values = tuple(fields.values())
         tolerances = tuple(tolerance_of(tolerance, field) for field in fields)
-        table = tuple(
-            tuple(number_at(item.value, text) for text in fields.values()) for item in sources
-        )
+        table = tuple(tuple(number_at(item.value, one) for one in values) for item in sources)
         return cls(tuple(fields), values, tolerances, sources, table)
 
     def samples(
@@ -135,8 +126,9 @@ class DerivedMessages:
 
     def errors(self, values: Row, window: range) -> tuple[Row, ...]:
         """How far values are off from those of some sources."""
+        circles = [Expression.of(value).circle for value in self.values]
         return tuple(
-            tuple(map(error, self.values, values, right))
+            tuple(map(difference, right, values, circles))
             for right in self.table[window.start : window.stop]
         )
 

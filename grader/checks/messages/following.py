@@ -164,7 +164,7 @@ def _failure(
             observed = listing(map("".join, zip(fields, clauses, strict=True)))
         hint = (
             f"Set {codes(derived.fields[index] for index in bad)} in the callback of {source}, "
-            f"from {codes(derived.values[index].text for index in bad)} of its message."
+            f"from {codes(derived.values[index] for index in bad)} of its message."
         )
     when_s = recording.since_launch_s(sample.message.stamp_ns)
     shown = bad or range(len(derived.fields))

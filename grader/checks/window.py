@@ -1,0 +1,194 @@
+"""When a check looks at a run: windows of time, after or before something, or while it is so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from grader.checks.check import NamedFields, Parameters
+from grader.checks.need import Called, Recorded, SimulatedRobot
+from grader.findings.fields import unlike, words
+from grader.findings.value import EXACT
+from grader.findings.wording import code
+from grader.recording.model import NS, Call, Recording
+from grader.recording.simulated import Truth
+from grader.spec.name import QualifiedNodeName, TopicName
+from grader.spec.unit import format_duration
+
+Interval = tuple[int, int]
+"""Beginning and end in ns; the end is not in it."""
+
+_STILL = 1e-3
+# What a transition leads to when it succeeds, by its label and by its id in lifecycle_msgs.
+_LEADS_TO = {
+    **dict.fromkeys(("configure", 1, "deactivate", 4), "inactive"),
+    **dict.fromkeys(("cleanup", 2), "unconfigured"),
+    **dict.fromkeys(("activate", 3), "active"),
+    **dict.fromkeys(("shutdown", "unconfigured_shutdown", "inactive_shutdown", 5, 6), "finalized"),
+    **dict.fromkeys(("active_shutdown", 7), "finalized"),
+}
+_ROBOT: dict[str, Callable[[Truth], bool]] = {
+    "touches": lambda step: step.contact is not None,
+    "moves": lambda step: max(abs(step.linear_m_s), abs(step.angular_rad_s)) > _STILL,
+    "rests": lambda step: max(abs(step.linear_m_s), abs(step.angular_rad_s)) <= _STILL,
+}
+
+
+class Phase(Parameters):
+    """What happens in a run, or is so for a while: `message`, `lifecycle`, `robot` or `log`."""
+
+    needs = (
+        Recorded("message", or_sent=True),
+        Called("node", suffix="/change_state"),
+        SimulatedRobot("robot"),
+    )
+
+    message: TopicName | None = Field(
+        None,
+        description="Topic that is recorded or that a stimulus publishes on: from a message with "
+        "these `fields` until one with others.",
+    )
+    fields: dict[str, Any] = Field(
+        default_factory=dict, description="Fields of the message; by default any message."
+    )
+    lifecycle: Literal["unconfigured", "inactive", "active", "finalized"] | None = Field(
+        None,
+        description="State of a lifecycle `node`, by the answers to the scenario's calls of "
+        "`change_state` and `get_state`.",
+    )
+    node: QualifiedNodeName | None = Field(None, description="The lifecycle node.")
+    robot: Literal["touches", "moves", "rests"] | None = Field(
+        None, description="What the simulated robot does; `touches` is a contact."
+    )
+    log: str | None = Field(None, min_length=1, description="From a line with this text on.")
+
+    @model_validator(mode="after")
+    def _one_thing(self) -> Phase:
+        given = [self.message, self.lifecycle, self.robot, self.log]
+        if len(given) - given.count(None) != 1:
+            raise ValueError("give one of: message, lifecycle, robot, log")
+        if (self.node is None) != (self.lifecycle is None):
+            raise ValueError("'lifecycle' and 'node' go together")
+        if self.fields and self.message is None:
+            raise ValueError("'fields' are those of a 'message'")
+        return self
+
+    def named_fields(self) -> Iterator[NamedFields]:
+        """The fields of the message."""
+        yield NamedFields(("fields",), self.message or "", self.fields)
+
+    def _asked(self) -> str:
+        if self.message is not None:
+            return f"{code(self.message)} has {words(self.fields) if self.fields else 'a message'}"
+        if self.log is not None:
+            return f"“{self.log}” is written"
+        if self.robot is not None:
+            return f"the robot {self.robot}" + " something" * (self.robot == "touches")
+        return f"{code(str(self.node))} is {self.lifecycle}"
+
+    def intervals(self, recording: Recording) -> list[Interval]:
+        """When it is so."""
+        found: list[Interval] = []
+        begin_ns = None
+        for time_ns, is_so in [*self._samples(recording), (recording.stop_ns + 1, False)]:
+            if begin_ns is not None and not is_so:
+                found.append((begin_ns, time_ns))
+            begin_ns = (time_ns if begin_ns is None else begin_ns) if is_so else None
+        return [one for one in found if one[0] < one[1]]
+
+    def _samples(self, recording: Recording) -> Iterator[tuple[int, bool]]:
+        """Times with whether it is so from then on, oldest first."""
+        if self.message is not None:
+            for message in recording.carried(self.message):
+                yield message.stamp_ns, not unlike(message.value, self.fields, EXACT)
+        elif self.robot is not None:
+            for step in recording.truth:
+                yield step.time_ns, _ROBOT[self.robot](step)
+        elif self.log is not None:
+            for line in sorted(recording.log, key=lambda one: one.time_ns):
+                if self.log.casefold() in line.text.casefold():
+                    yield line.time_ns, True
+        else:
+            yield from (
+                (at_ns, state == self.lifecycle) for at_ns, state in self._states(recording)
+            )
+
+    def _states(self, recording: Recording) -> list[tuple[int, str]]:
+        """The node's states, and since when; an empty one from the request of a transition on."""
+        get, change = f"{self.node}/get_state", f"{self.node}/change_state"
+        born = [one.appeared_ns for one in recording.services if one.name == get]
+        found = [(at_ns, "unconfigured") for at_ns in born[:1]]
+        for call in recording.calls:
+            if call.service == change:
+                found.append((call.requested_ns, ""))
+            if call.service == change and (call.response or {}).get("success") is True:
+                found.append((call.answered_ns or 0, _LEADS_TO.get(transition(call), "")))
+            elif call.service == get and call.answered_ns is not None:
+                state = (call.response or {}).get("current_state", {})
+                found.append((call.answered_ns, state.get("label", "")))
+        return sorted(found, key=lambda one: one[0])
+
+
+def transition(call: Call) -> str | int:
+    """The label, or else the id, of the transition that a call of ``change_state`` asks for."""
+    asked: Mapping[str, Any] = (call.request or {}).get("transition", {})
+    return str(asked.get("label", "")) or int(asked.get("id", 0))
+
+
+@dataclass(frozen=True)
+class Window:
+    """When a check looks at a run.
+
+    Attributes:
+        while_: Several windows, one for each time that it is so.
+        from_s: Seconds from the beginning of each window.
+        to_s: The same, or None for the end of the run.
+    """
+
+    after: Phase | None = None
+    before: Phase | None = None
+    while_: Phase | None = None
+    from_s: float = 0.0
+    to_s: float | None = None
+
+    @property
+    def phases(self) -> dict[str, Phase]:
+        """Its phases, by their keys in YAML."""
+        found = {"after": self.after, "before": self.before, "while": self.while_}
+        return {key: phase for key, phase in found.items() if phase is not None}
+
+    def __str__(self) -> str:
+        """Say it in words."""
+        times = [f"from {format_duration(self.from_s)}"] if self.from_s else []
+        times += [f"to {format_duration(self.to_s)}"] if self.to_s is not None else []
+        phases = [f"{key} {phase.asked_for}" for key, phase in self.phases.items()]
+        return ", ".join(filter(None, [" ".join(times), *phases]))
+
+    def intervals(self, recording: Recording) -> list[Interval]:
+        """Its times in a run, none of them empty."""
+        begin_ns, end_ns = recording.matched_ns or recording.launched_ns, recording.stop_ns + 1
+        found = [(begin_ns, end_ns)]
+        if self.after is not None:
+            found = [(begin, end_ns) for begin, _ in self.after.intervals(recording)[:1]]
+        if self.before is not None:
+            then = self.before.intervals(recording)
+            found = [
+                (begin, min([max(one[0], begin) for one in then if one[1] > begin] + [end]))
+                for begin, end in found
+            ]
+        if self.while_ is not None:
+            found = [
+                (max(begin, one[0]), min(end, one[1]))
+                for begin, end in found
+                for one in self.while_.intervals(recording)
+            ]
+        from_ns, to_ns = round(self.from_s * NS), round((self.to_s or 0.0) * NS)
+        found = [
+            (begin + from_ns, end if self.to_s is None else min(end, begin + to_ns))
+            for begin, end in found
+            if begin < end
+        ]
+        return [one for one in found if one[0] < one[1]]
