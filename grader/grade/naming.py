@@ -109,7 +109,10 @@ def _offered(
                 yield f"{package.name}/{file.suffix[1:]}/{file.stem}"
     runs = loaded.source.data["scenarios"] if loaded.source and variable.is_of_runs else ()
     using = {run["id"] for run in runs if f"{{{name}}}" in json.dumps(run)}
-    for recording in (run for run in recordings.values() if run.scenario in using):
+    for recording in recordings.values():
+        # A run of a scenario that is repeated has a number behind the name.
+        if using.isdisjoint((recording.scenario, recording.scenario.rpartition("_")[0])):
+            continue
         if variable.in_ == "nodes":
             yield from (node.name for node in recording.student_nodes)
         elif variable.in_ in _WORDS:

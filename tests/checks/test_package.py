@@ -84,7 +84,7 @@ class TestFound:
 
     def test_a_name_that_ros_does_not_allow_is_the_authors_mistake(self):
         with pytest.raises(ValueError, match="is not a package name"):
-            judge("package.found", submission(), package="Bot-Publisher")
+            judge("package.found", submission(), package="Bot Publisher")
 
 
 class TestBuilds:

@@ -107,7 +107,7 @@ rosgrade: 2
 id: lesson
 titel: A lesson
 packages:
-  - name: Bot
+  - name: Bot!
     build_type: ament_pyton
 scenarios:
   - id: run
@@ -128,7 +128,7 @@ checks: []
     assert mistakes(text) == [
         "assignment.yaml:1: rosgrade: expected 1, not 2",
         "assignment.yaml:3: titel: unknown key 'titel'. Did you mean 'title'?",
-        "assignment.yaml:5: packages[0].name: 'Bot' is not a package name: lower case letters, "
+        "assignment.yaml:5: packages[0].name: 'Bot!' is not a package name: lower case letters, "
         "digits and underscores, beginning with a letter (REP-144)",
         "assignment.yaml:6: packages[0].build_type: expected 'ament_python' or 'ament_cmake', "
         "not 'ament_pyton'. Did you mean 'ament_python'?",
