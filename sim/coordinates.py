@@ -28,6 +28,8 @@ from sim.motion import Pose
 MAX_COORDINATE_M = 10_000.0
 """Beyond it double precision no longer resolves a contact to a nanometre."""
 
+_ANGLES = ("roll", "pitch", "yaw")
+
 MIN_SIZE_M = 1e-6
 """What is smaller is a mistake, and its direction cannot be computed."""
 
@@ -61,7 +63,7 @@ def metres(value: Any, *, positive: bool = False) -> float:
 
 @dataclass(frozen=True)
 class Entries:
-    """Pydantic annotation: a list of lengths, and of an angle where its name is ``yaw``.
+    """Pydantic annotation: a list of lengths, and of angles where the name is that of one.
 
     Attributes:
         optional: So many entries at the end may be left out; they are then zero.
@@ -77,7 +79,7 @@ class Entries:
         self, source: type[Any], handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Validate entry by entry; written as it is read."""
-        return written_as_read(self._read, _write)
+        return written_as_read(self._read, self._write)
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -104,7 +106,7 @@ class Entries:
             needed = f"{least} to {len(self.names)}" if self.optional else f"{least}"
             raise refusal(f"expected {self._form}: {needed} entries, not {len(value)}")
         readers = [
-            _angle if name == "yaw" else partial(metres, positive=self.positive)
+            _angle if name in _ANGLES else partial(metres, positive=self.positive)
             for name in self.names
         ]
         numbers = [
@@ -113,6 +115,13 @@ class Entries:
         ]
         return self.make(*numbers, *[0.0] * (len(self.names) - len(numbers)))
 
+    def _write(self, value: Any) -> list[float | str]:
+        numbers = (value.x_m, value.y_m, value.yaw_rad) if isinstance(value, Pose) else value
+        return [
+            f"{number!r} rad" if name in _ANGLES else number
+            for name, number in zip(self.names, numbers, strict=True)
+        ]
+
 
 def _refused(read: Callable[[Any], float], value: Any, place: str = "") -> float:
     """Read a number; a mistake becomes the message for the author of the YAML."""
@@ -120,12 +129,6 @@ def _refused(read: Callable[[Any], float], value: Any, place: str = "") -> float
         return read(value)
     except ValueError as error:
         raise refusal(f"{place}{error}") from None
-
-
-def _write(value: Any) -> list[float | str]:
-    if isinstance(value, Pose):
-        return [value.x_m, value.y_m, f"{value.yaw_rad!r} rad"]
-    return list(value)
 
 
 def _angle(item: Any) -> float:
@@ -167,5 +170,7 @@ Ends = Annotated[tuple[float, float, float, float], Entries(("x1", "y1", "x2", "
 Rectangle = Annotated[
     tuple[float, float, float, float], Entries(("x_min", "y_min", "x_max", "y_max"), _rectangle)
 ]
+Position = Annotated[tuple[float, float, float], Entries(("x", "y", "z"))]
+RollPitchYaw = Annotated[tuple[float, float, float], Entries(("roll", "pitch", "yaw"))]
 PoseInPlane = Annotated[Pose, Entries(("x", "y", "yaw"), _pose)]
 PoseOrPoint = Annotated[Pose, Entries(("x", "y", "yaw"), _pose, optional=1)]

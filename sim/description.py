@@ -244,11 +244,17 @@ class ClockTopic(TopicOptions):
 
 
 class TransformTopic(TopicOptions):
-    """The topic of transforms; published where the package tf2_msgs is installed."""
+    """The topics of transforms: `odom` to `base_footprint`, and what is fixed to the robot.
 
-    enabled: bool = Field(True, description="Whether they are published.")
+    Published where the package tf2_msgs is installed. A scenario that names `tf` among its `topics`
+    has them everywhere, and records them.
+    """
+
+    enabled: bool = Field(
+        True, description="Whether they are published: not where students publish them."
+    )
     topic: TopicName = Field("/tf", description="Fully qualified name.")
-    static_topic: TopicName = Field("/tf_static", description="For the pose of the LiDAR.")
+    static_topic: TopicName = Field("/tf_static", description="For what is fixed to the robot.")
 
 
 class Topics(Model):
@@ -261,6 +267,12 @@ class Topics(Model):
     tf: TransformTopic = Field(default_factory=TransformTopic)
 
 
+# Heights above base_link in turtlebot3_description/urdf/turtlebot3_{burger,waffle}.urdf of
+# ROBOTIS-GIT/turtlebot3, where base_link is 1 cm above base_footprint.
+_BASE_Z_M = 0.010
+_SCAN_Z_M = {"burger": 0.172, "waffle": 0.122}
+
+
 class SimulatorOptions(Model):
     """Everything about the simulator but the world."""
 
@@ -268,6 +280,13 @@ class SimulatorOptions(Model):
     lidar: LidarOptions = Field(default_factory=LidarOptions)
     odometry: OdometryOptions = Field(default_factory=OdometryOptions)
     topics: Topics = Field(default_factory=Topics)
+
+    @property
+    def fixed_frames(self) -> list[tuple[str, str, Pose, float]]:
+        """What /tf_static says: parent, child, pose and height of the child, in metres."""
+        base, robot = self.odometry.child_frame, self.robot.model
+        scan = ("base_link", self.lidar.frame, self.lidar.pose, _SCAN_Z_M[robot])
+        return [(base, "base_link", ORIGIN, _BASE_Z_M), scan] if base != "base_link" else [scan]
 
     def start(self, world_start: Pose) -> Pose:
         """Where the robot starts in a world with this ``start``."""

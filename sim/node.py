@@ -78,7 +78,7 @@ class RosSimulator:
         self.scan = ScanPublisher(node, topics.scan, lidar)
         self.clock = ClockPublisher(node, topics.clock) if topics.clock.enabled else None
         tf = transform_type() if topics.tf.enabled else None
-        self.transforms = tf and TransformPublisher(node, topics.tf, options.odometry, lidar, tf)
+        self.transforms = tf and TransformPublisher(node, options, tf)
         package, _, name = topics.command.type.split("/")
         self.command: Any = node.create_subscription(
             getattr(importlib.import_module(f"{package}.msg"), name),

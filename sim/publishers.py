@@ -19,7 +19,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 
-from sim.description import OdometryOptions, TopicOptions, TransformTopic
+from sim.description import OdometryOptions, SimulatorOptions, TopicOptions
 from sim.lidar import Lidar, Scan
 from sim.motion import NS, Pose
 from sim.odometry import OdometrySample
@@ -116,17 +116,14 @@ class ClockPublisher:
 
 
 class TransformPublisher:
-    """Publishes odom -> base_footprint, and once base_footprint -> base_scan."""
+    """Publishes odom -> base_footprint, and once the frames that are fixed to the robot."""
 
-    def __init__(
-        self, node: Node, topic: TransformTopic, odometry: OdometryOptions, lidar: Lidar, tf: Any
-    ) -> None:
+    def __init__(self, node: Node, options: SimulatorOptions, tf: Any) -> None:
         """Create the publishers of ``tf``, the type tf2_msgs/msg/TFMessage."""
-        self._moving, self._fixed = TransformStamped(), TransformStamped()
-        self._moving.header.frame_id = odometry.frame
-        self._moving.child_frame_id = self._fixed.header.frame_id = odometry.child_frame
-        self._fixed.child_frame_id = lidar.options.frame
-        self._lidar_pose = lidar.options.pose
+        topic = options.topics.tf
+        self._moving = TransformStamped(child_frame_id=options.odometry.child_frame)
+        self._moving.header.frame_id = options.odometry.frame
+        self._fixed = options.fixed_frames
         self._type = tf
         self._message = tf(transforms=[self._moving])
         self.publisher = _publisher(node, tf, topic.topic, topic)
@@ -134,9 +131,15 @@ class TransformPublisher:
         self.static_publisher = _publisher(node, tf, topic.static_topic, latched)
 
     def publish_static(self, stamp_ns: int) -> None:
-        """Publish where the LiDAR sits; late joiners get it too."""
-        _set_transform(self._fixed, self._lidar_pose, stamp_ns)
-        self.static_publisher.publish(self._type(transforms=[self._fixed]))
+        """Publish what is fixed to the robot, all in one message; late joiners get it too."""
+        message = self._type()
+        for parent, child, pose, z_m in self._fixed:
+            transform = TransformStamped(child_frame_id=child)
+            transform.header.frame_id = parent
+            transform.transform.translation.z = z_m
+            _set_transform(transform, pose, stamp_ns)
+            message.transforms.append(transform)
+        self.static_publisher.publish(message)
 
     def publish(self, sample: OdometrySample, stamp_ns: int) -> None:
         """Publish where odometry believes the robot to be."""

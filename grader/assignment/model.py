@@ -139,6 +139,7 @@ class RandomRange(Model):
 
 ODOMETRY = "nav_msgs/msg/Odometry"
 LASER_SCAN = "sensor_msgs/msg/LaserScan"
+TRANSFORMS = "tf2_msgs/msg/TFMessage"
 
 
 class Visibility(str, Enum):
@@ -330,6 +331,13 @@ class Scenario(Model):
     )
 
     @property
+    def transform_topics(self) -> dict[str, Durability]:
+        """The robot's topics of transforms, if the scenario names them; with their durability."""
+        tf = self.topics.tf
+        named = self.world is not None and "tf" in self.topics.model_fields_set and tf.enabled
+        return {tf.topic: tf.durability, tf.static_topic: "transient_local"} if named else {}
+
+    @property
     def recorded_types(self) -> dict[str, str]:
         """Topic -> type of all that is recorded: `record`, and the simulated robot's topics."""
         found = {one.topic: one.type for one in self.record}
@@ -339,7 +347,7 @@ class Scenario(Model):
                 found[self.topics.odometry.topic] = ODOMETRY
             if self.lidar.enabled:
                 found[self.topics.scan.topic] = LASER_SCAN
-        return found
+        return {**dict.fromkeys(self.transform_topics, TRANSFORMS), **found}
 
 
 class Counts(str, Enum):

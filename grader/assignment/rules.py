@@ -214,7 +214,8 @@ def _lacks(need: needs.Need, user: _User) -> Iterator[_Lack]:
 @_lacks.register
 def _(need: needs.SimulatedRobot, user: _User) -> Iterator[_Lack]:
     for scenario in user.scenarios:
-        if scenario.world is None and not (need.about and user.value(need.about) is None):
+        needless = need.about and user.value(need.about) is None
+        if scenario.world is None and not needless and user.value(need.unless) is None:
             text = f"the scenario {scenario.id!r} has no 'world', and so no simulated robot"
             yield ("uses",), text
 

@@ -96,5 +96,7 @@ class TypeSupport:
                 if names:
                     ros = on_top(ros, [store.folder_prefix(own, ros, names)])
         if for_probe:
-            ros = store.completed(ros, _WORD.findall(assignment.model_dump_json()))
+            types = [type for one in assignment.scenarios for type in one.recorded_types.values()]
+            named = _WORD.findall(" ".join([assignment.model_dump_json(), *types]))
+            ros = store.completed(ros, named)
         return ros

@@ -33,6 +33,8 @@ class SimulatedRobot(Need):
     words = "a `world` with the simulated robot"
     about: str | None = None
     """Parameter that is about the robot, if one is."""
+    unless: str | None = None
+    """Parameter that stands for the robot where it is given."""
 
 
 @dataclass(frozen=True)

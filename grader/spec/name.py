@@ -17,6 +17,7 @@ ID = r"[a-z][a-z0-9_]*"
 TOPIC = r"(/[A-Za-z_][A-Za-z0-9_]*)+"
 NODE = r"[A-Za-z_][A-Za-z0-9_]*"
 LIBRARY = r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?"
+FRAME = r"[A-Za-z0-9_][A-Za-z0-9_./-]*"
 INTERFACE = r"[a-z][a-z0-9_]*/(msg|srv|action)/[A-Z][A-Za-z0-9]*"
 
 
@@ -92,6 +93,11 @@ InterfaceName = Annotated[
     str,
     AfterValidator(interface_name),
     _form(INTERFACE, "interface, such as `geometry_msgs/msg/Twist`"),
+]
+FrameName = Annotated[
+    str,
+    AfterValidator(_rule(FRAME, "the name of a frame: no slash in front (REP-105)")),
+    _form(FRAME, "frame, such as `base_link`"),
 ]
 LibraryName = Annotated[
     str, AfterValidator(library_name), _form(LIBRARY, "Python library, such as `scipy`")

@@ -13,6 +13,7 @@ from grader.recording.event import Breach
 from grader.recording.model import Recording
 from grader.report.drawing.callbacks import draw_callbacks
 from grader.report.drawing.cases import draw_cases
+from grader.report.drawing.frames import draw_frames
 from grader.report.drawing.motion import draw_motion
 from grader.report.drawing.path import draw_path
 from grader.report.drawing.plot import draw_plot
@@ -72,6 +73,7 @@ def render_report(
         build_lines=build_lines,
         draw_callbacks=draw_callbacks,
         draw_cases=draw_cases,
+        draw_frames=draw_frames,
         draw_motion=draw_motion,
         draw_path=draw_path,
         draw_timeline=draw_timeline,

@@ -1,0 +1,1 @@
+"""Checks of transforms between frames, and of the tree that they make."""

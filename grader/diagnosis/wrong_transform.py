@@ -1,0 +1,179 @@
+"""Why a transform is not there, or is not as it should be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.explanation import Symptom, explanation
+from grader.diagnosis.no_messages import why_silent
+from grader.findings.finding import Evidence, Moment
+from grader.findings.first_seen import endpoints_seen
+from grader.findings.wording import code, codes
+from grader.measure.transforms import Sent, sent
+from grader.recording.model import NS, Kind, Recording
+from grader.spec.nearest_name import nearest
+from grader.spec.unit import format_duration
+
+_STATIC = (
+    "Use StaticTransformBroadcaster, or a publisher on /tf_static with QoSProfile(depth=1, "
+    "durability=DurabilityPolicy.TRANSIENT_LOCAL)."
+)
+# A stamp may be that of the data that a transform is made of, or of the near future.
+_STAMP_S = 1.0
+_NAMES = "Set header.frame_id = '{0.parent}' and child_frame_id = '{0.child}', without slashes."
+
+
+@dataclass(frozen=True)
+class NoTransform(Symptom[Cause]):
+    """A transform between two frames is not on its topic."""
+
+    recording: Recording
+    topic: str
+    parent: str
+    child: str
+    is_static: bool = False
+
+    @cached_property
+    def there(self) -> list[Sent]:
+        """Every transform of the run."""
+        return list(sent(self.recording, self.recording.messages))
+
+    @property
+    def wanted(self) -> list[Sent]:
+        """Those between the two frames, on the topic."""
+        names = (self.topic, self.parent, self.child)
+        return [it for it in self.there if (it.message.topic, it.parent, it.child) == names]
+
+    @cached_property
+    def edges(self) -> dict[tuple[str, str], Sent]:
+        """Parent and child -> the first transform between them."""
+        return {(one.parent, one.child): one for one in reversed(self.there)}
+
+    def instead(self, one: Sent | None, why: str, hint: str = _NAMES) -> Cause | None:
+        """Another transform is there, if it is."""
+        if one is None:
+            return None
+        seen = f"{edge(one.parent, one.child)} on {code(one.message.topic)} {why}"
+        return Cause(seen, hint.format(self), moment(self.recording, one, "sent"))
+
+
+@dataclass(frozen=True)
+class BadTransform(Symptom[Cause]):
+    """A transform that may be of no use to tf2.
+
+    Attributes:
+        is_timed: Its stamp is as it should be, or does not count.
+    """
+
+    recording: Recording
+    one: Sent
+    is_timed: bool
+
+
+def edge(parent: str, child: str) -> str:
+    """A transform by its frames."""
+    return f"{code(parent)} → {code(child)}"
+
+
+def moment(recording: Recording, one: Sent, what: str) -> Evidence:
+    """When a transform was published."""
+    when_s = recording.since_launch_s(one.message.stamp_ns)
+    return Evidence(moments=(Moment(f"{one.parent} → {one.child} {what}", when_s),))
+
+
+@explanation(NoTransform)
+def volatile_static(symptom: NoTransform) -> Cause | None:
+    """The publisher on /tf_static is volatile, so a node that starts later gets nothing."""
+    own = symptom.recording.student_endpoints(Kind.PUBLISHER, symptom.topic)
+    if not symptom.is_static or not any(one.qos.durability == "volatile" for one in own):
+        return None
+    return Cause(
+        f"the publisher on {code(symptom.topic)} is volatile: tf2 asks for transient_local and "
+        "gets nothing from it, and a node that starts later misses what was sent",
+        _STATIC,
+        Evidence(moments=endpoints_seen(symptom.recording, own)),
+    )
+
+
+@explanation(NoTransform)
+def other_topic(symptom: NoTransform) -> Cause | None:
+    """It is on /tf instead of /tf_static, or the other way round."""
+    found = symptom.edges.get((symptom.parent, symptom.child))
+    hint = _STATIC if symptom.is_static else "What moves is sent with TransformBroadcaster."
+    return symptom.instead(found, f"instead of {code(symptom.topic)}", hint)
+
+
+@explanation(NoTransform)
+def exchanged_frames(symptom: NoTransform) -> Cause | None:
+    """Parent and child are exchanged."""
+    found = symptom.edges.get((symptom.child, symptom.parent))
+    return symptom.instead(found, "is the other way round: parent and child are exchanged")
+
+
+@explanation(NoTransform)
+def leading_slash(symptom: NoTransform) -> Cause | None:
+    """The name of a frame has a leading slash, which tf2 does not allow."""
+    names = {(one.lstrip("/"), two.lstrip("/")): it for (one, two), it in symptom.edges.items()}
+    found = names.get((symptom.parent, symptom.child))
+    return symptom.instead(found, "has a slash in front of a name: frames are no topics")
+
+
+@explanation(NoTransform)
+def no_transform_at_all(symptom: NoTransform) -> Cause | None:
+    """Nothing is published on the topic."""
+    silent = not symptom.recording.on(symptom.topic)
+    return why_silent(symptom.recording, symptom.topic) if silent else None
+
+
+@explanation(NoTransform)
+def other_frame(symptom: NoTransform) -> Cause | None:
+    """The frame has another parent, or a name is misspelt."""
+    names = {" ".join(names): one for names, one in symptom.edges.items()}
+    likely = names.get(nearest(f"{symptom.parent} {symptom.child}", names) or "")
+    found = next((one for one in symptom.there if one.child == symptom.child), likely)
+    return symptom.instead(found, "is there instead")
+
+
+@explanation(NoTransform, general=True)
+def other_transforms_only(symptom: NoTransform) -> Cause | None:
+    """Only transforms of other frames are published."""
+    first = next(iter(symptom.there), None)
+    others = codes(child for _, child in symptom.edges)
+    return symptom.instead(first, f"and no other than those of {others} are published")
+
+
+@explanation(BadTransform)
+def no_quaternion(symptom: BadTransform) -> Cause | None:
+    """The quaternion does not have the length 1: w is not set, or all four are 0."""
+    if symptom.one.is_valid:
+        return None
+    *axis, w = symptom.one.pose[1]
+    numbers = ", ".join(f"{part:.4g}" for part in (*axis, w))
+    clause = ": w is not set" if w in (0.0, 1.0) and any(axis) else ""
+    return Cause(
+        f"tf2 ignores the transform, for its quaternion (x, y, z, w) = ({numbers}) does not have "
+        f"the length 1{clause}",
+        "Set all four: without a rotation w is 1; about the z axis z = sin(yaw / 2) and "
+        "w = cos(yaw / 2).",
+        moment(symptom.recording, symptom.one, "ignored"),
+    )
+
+
+@explanation(BadTransform)
+def wrong_stamp(symptom: BadTransform) -> Cause | None:
+    """The stamp is 0, always the same, or of another clock."""
+    sent_ns, stamp_ns = symptom.one.message.stamp_ns, symptom.one.stamp_ns
+    stolen_s = symptom.recording.stolen_s(min(stamp_ns, sent_ns), sent_ns)
+    late_s = (sent_ns - stamp_ns) / NS
+    if symptom.is_timed or abs(late_s) <= _STAMP_S + stolen_s:
+        return None
+    off = f"{format_duration(abs(late_s))} {'before' if late_s > 0.0 else 'after'}"
+    seen = f"the stamp is {off} the moment of publishing: always the same, or of another clock"
+    return Cause(
+        seen if stamp_ns else "the stamp is 0: it is not set",
+        "Set header.stamp = self.get_clock().now().to_msg() for each transform, or copy the stamp "
+        "of the message that it is made of: tf2 looks transforms up by their time.",
+        moment(symptom.recording, symptom.one, "has a wrong stamp"),
+    )
