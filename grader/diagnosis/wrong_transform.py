@@ -40,7 +40,7 @@ class NoTransform(Symptom[Cause]):
         """Every transform of the run."""
         return list(sent(self.recording, self.recording.messages))
 
-    @property
+    @cached_property
     def wanted(self) -> list[Sent]:
         """Those between the two frames, on the topic."""
         names = (self.topic, self.parent, self.child)
@@ -149,7 +149,7 @@ def no_quaternion(symptom: BadTransform) -> Cause | None:
     """The quaternion does not have the length 1: w is not set, or all four are 0."""
     if symptom.one.is_valid:
         return None
-    *axis, w = symptom.one.pose[1]
+    *axis, w = (symptom.one.value["rotation"][part] for part in "xyzw")
     numbers = ", ".join(f"{part:.4g}" for part in (*axis, w))
     clause = ": w is not set" if w in (0.0, 1.0) and any(axis) else ""
     return Cause(

@@ -10,15 +10,9 @@ from typing import Any
 from grader.recording.model import NS, Message, Recording
 
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
-Numbers = tuple[float, ...]
-"""x, y, z; roll, pitch, yaw; or a quaternion x, y, z, w."""
-Pose = tuple[Numbers, Numbers]
-"""A place in metres, and a quaternion."""
-
 # What tf2 takes for a quaternion of length 1 (tf2/src/buffer_core.cpp).
 _UNIT = 1e-2
 _LONGEST_NAME = 100
-_PARTS = (("translation", "rotation"), ("position", "orientation"))
 
 
 @dataclass(frozen=True)
@@ -26,22 +20,22 @@ class Sent:
     """A transform as it was published.
 
     Attributes:
-        pose: Where the child is in its parent, as :func:`pose_of` says it.
+        value: A geometry_msgs/msg/Transform.
         stamp_ns: Of its header.
     """
 
     parent: str
     child: str
-    pose: Pose
+    value: Mapping[str, Any]
     stamp_ns: int
     message: Message
 
     @property
     def is_valid(self) -> bool:
         """Whether tf2 takes it: finite, and its quaternion has the length 1."""
-        place, turn = self.pose
-        length = math.fsum(part * part for part in turn)
-        return abs(length - 1.0) <= _UNIT and all(map(math.isfinite, place))
+        length = math.fsum(part * part for part in self.value["rotation"].values())
+        finite = all(map(math.isfinite, self.value["translation"].values()))
+        return finite and abs(length - 1.0) <= _UNIT
 
 
 def sent(recording: Recording, topics: Iterable[str]) -> Iterator[Sent]:
@@ -50,23 +44,7 @@ def sent(recording: Recording, topics: Iterable[str]) -> Iterator[Sent]:
         for one in message.value["transforms"] if message.type == TRANSFORMS else ():
             names = (one["header"]["frame_id"], one["child_frame_id"])
             parent, child = (name[:_LONGEST_NAME] for name in names)
-            pose, stamp_ns = pose_of(one), stamp_of(one)
-            assert pose is not None and stamp_ns is not None, one
-            yield Sent(parent, child, pose, stamp_ns, message)
-
-
-def pose_of(message: Mapping[str, Any]) -> Pose | None:
-    """The first pose or transform in a message."""
-    for place, turn in _PARTS:
-        if place in message and turn in message:
-            return (
-                tuple(message[place][axis] for axis in "xyz"),
-                tuple(message[turn][axis] for axis in "xyzw"),
-            )
-    if {"x", "y", "theta"} <= message.keys():
-        return (message["x"], message["y"], 0.0), quaternion(0.0, 0.0, message["theta"])
-    inner = (pose_of(item) for item in message.values() if isinstance(item, Mapping))
-    return next((one for one in inner if one is not None), None)
+            yield Sent(parent, child, one["transform"], stamp_of(one) or 0, message)
 
 
 def stamp_of(message: Mapping[str, Any]) -> int | None:
@@ -76,32 +54,12 @@ def stamp_of(message: Mapping[str, Any]) -> int | None:
     return stamp["sec"] * NS + stamp["nanosec"] if isinstance(stamp, Mapping) else None
 
 
-def quaternion(roll: float, pitch: float, yaw: float) -> Numbers:
+def quaternion(roll: float, pitch: float, yaw: float) -> dict[str, float]:
     """Of a rotation about the parent's x, then y, then z axis."""
     a, b, c = (math.sin(angle / 2.0) for angle in (roll, pitch, yaw))
     i, j, k = (math.cos(angle / 2.0) for angle in (roll, pitch, yaw))
-    return (
-        a * j * k - i * b * c,
-        i * b * k + a * j * c,
-        i * j * c - a * b * k,
-        i * j * k + a * b * c,
-    )
-
-
-def roll_pitch_yaw(rotation: Numbers) -> Numbers:
-    """The angles of a quaternion of length 1."""
-    x, y, z, w = rotation
-    return (
-        math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-        math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x)))),
-        math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
-    )
-
-
-def angle_between(one: Numbers, other: Numbers) -> float:
-    """By how much two rotations differ; a quaternion and its negative are the same."""
-    cosine = math.fsum(a * b for a, b in zip(one, other, strict=True))
-    return 2.0 * math.acos(min(1.0, abs(cosine)))
+    x, y = a * j * k - i * b * c, i * b * k + a * j * c
+    return {"x": x, "y": y, "z": i * j * c - a * b * k, "w": i * j * k + a * b * c}
 
 
 def roots(transforms: Sequence[Sent]) -> list[str]:

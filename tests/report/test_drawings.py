@@ -11,11 +11,15 @@ from grader.findings.finding import Plot
 from grader.recording.model import Call, Declaration, Ending, Message, Process
 from grader.report.drawing.axes import Scale, ticks
 from grader.report.drawing.flags import Flag, place
+from grader.report.drawing.frames import draw_frames
 from grader.report.drawing.plot import draw_plot
 from grader.report.drawing.svg import NARROW, WIDE
 from grader.report.drawing.timeline import draw_timeline
+from tests.checks.test_tf import TF, TF_STATIC, TIMES, on, run, transform
 from tests.report.page import description, is_finite, marks, of_class, words
 from tests.report.sample import PROCESS, at, make_run
+
+MOVING = on(TF, *((time_s, [transform(stamp_s=time_s)]) for time_s in TIMES))
 
 
 def make_plot(y, band=(285.0, 315.0), x=None):
@@ -168,3 +172,29 @@ class TestTimeline:
         svg = draw_timeline(make_run(messages={"/cmd_vel": messages}), (), "t").wide
         assert marks(svg, "tick") < 3 * WIDE
         assert "100000 messages" in words(svg)
+
+
+class TestFrames:
+    def drawn(self, *edges):
+        static = [transform(*edge) for edge in edges]
+        return draw_frames(run(moving=MOVING, static=on(TF_STATIC, (0.7, static))), "f")
+
+    def test_each_frame_is_below_its_parent_with_its_rate_or_that_it_is_static(self):
+        figure = self.drawn(("base_footprint", "base_link"), ("base_link", "laser"))
+        shown = words(figure.wide)
+        names = ["odom", "root", "base_footprint", "20 Hz", "base_link", "static", "laser"]
+        assert [shown.index(name) for name in names] == sorted(shown.index(name) for name in names)
+        assert "laser, static" in description(figure.wide)
+
+    def test_a_second_parent_and_a_second_root_are_seen(self):
+        shown = words(self.drawn(("map", "base_footprint")).narrow)
+        assert shown.count("two parents") == 2 and shown.count("root") == 2
+
+    def test_circles_long_chains_and_long_names_are_drawn(self):
+        chain = [(f"f{n}", f"f{n + 1}") for n in range(5000)]
+        for edges in ([("a", "b"), ("b", "a")], [("a", "a")], chain, [("x" * 500, "<svg>")]):
+            figure = self.drawn(*edges)
+            assert is_finite(figure.wide) and len(figure.wide) < 60_000
+
+    def test_a_run_without_transforms_has_no_tree(self):
+        assert draw_frames(make_run(), "f") is None

@@ -1,4 +1,4 @@
-"""/tf and /tf_static, with a tf2_msgs that colcon generated: the package index has none."""
+"""/tf and /tf_static, with the tf2_msgs that rosgrade carries: the package index has none."""
 
 from __future__ import annotations
 
@@ -16,37 +16,13 @@ pytest.importorskip("rclpy")
 
 from grader import ros
 from grader.run.cell.domain import lock_domain
-from grader.submission.prepare import prepare
+from grader.submission.build.build_cache import BuildCache
+from grader.submission.build.underlay import CARRIED, install_prefix
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.compiles]
 
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 60.0
-MANIFEST = """\
-<?xml version="1.0"?>
-<package format="3">
-  <name>tf2_msgs</name>
-  <version>0.36.0</version>
-  <description>Transforms.</description>
-  <maintainer email="nobody@example.com">Nobody</maintainer>
-  <license>BSD-3-Clause</license>
-  <buildtool_depend>ament_cmake</buildtool_depend>
-  <buildtool_depend>rosidl_default_generators</buildtool_depend>
-  <depend>geometry_msgs</depend>
-  <exec_depend>rosidl_default_runtime</exec_depend>
-  <member_of_group>rosidl_interface_packages</member_of_group>
-  <export><build_type>ament_cmake</build_type></export>
-</package>
-"""
-CMAKE = """\
-cmake_minimum_required(VERSION 3.8)
-project(tf2_msgs)
-find_package(ament_cmake REQUIRED)
-find_package(geometry_msgs REQUIRED)
-find_package(rosidl_default_generators REQUIRED)
-rosidl_generate_interfaces(${PROJECT_NAME} "msg/TFMessage.msg" DEPENDENCIES geometry_msgs)
-ament_package()
-"""
 WORLD = "bounds: [-1, -2, 3, 4]\nstart: [1, 2, 90 deg]\n"
 OPTIONS = "lidar: {pose: [-0.032, 0, 180 deg]}\n"
 LISTENER = """\
@@ -64,13 +40,13 @@ def stamp(header):
 def plain(one):
     move, turn = one.transform.translation, one.transform.rotation
     frames = [one.header.frame_id, one.child_frame_id]
-    return {'frames': frames, 'place': [move.x, move.y], 'turn': [turn.z, turn.w]}
+    return {'frames': frames, 'place': [move.x, move.y, move.z], 'turn': [turn.z, turn.w]}
 
 def on_odometry(message):
     pose = message.pose.pose
     heard['/odom'][stamp(message.header)] = {
         'frames': [message.header.frame_id, message.child_frame_id],
-        'place': [pose.position.x, pose.position.y],
+        'place': [pose.position.x, pose.position.y, pose.position.z],
         'turn': [pose.orientation.z, pose.orientation.w],
     }
 
@@ -100,16 +76,10 @@ print(json.dumps([heard['/tf'][at], heard['/odom'][at], heard['/tf_static']]))
 def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Variables of a shell with tf2_msgs in it."""
     folder = tmp_path_factory.mktemp("tf2")
-    package = folder / "tf2_msgs"
-    (package / "msg").mkdir(parents=True)
-    (package / "package.xml").write_text(MANIFEST)
-    (package / "CMakeLists.txt").write_text(CMAKE)
-    (package / "msg/TFMessage.msg").write_text("geometry_msgs/TransformStamped[] transforms\n")
     found = ros.find()
-    prepared = prepare(package, found, cache=folder / "cache")
-    assert prepared.install is not None, prepared.record.build
+    install = install_prefix(CARRIED / "tf2_msgs", found, BuildCache(folder / "cache"))
     return {
-        **found.environment(os.environ, (prepared.install,)),
+        **found.environment(os.environ, (install,)),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
     }
 
@@ -149,12 +119,14 @@ def heard(environment: dict[str, str], tmp_path_factory: pytest.TempPathFactory)
     return found
 
 
-def test_transforms_say_what_odometry_says_and_late_joiners_get_where_the_lidar_sits(
+def test_transforms_say_what_odometry_says_and_late_joiners_get_what_is_fixed_to_the_robot(
     heard: list[Any],
 ) -> None:
-    moving, odometry, [fixed] = heard
+    moving, odometry, [base, scan] = heard
     assert moving == odometry
     assert moving["frames"] == ["odom", "base_footprint"]
-    assert fixed["frames"] == ["base_footprint", "base_scan"]
-    assert fixed["place"] == [-0.032, 0.0]
-    assert abs(2.0 * math.acos(fixed["turn"][1])) == pytest.approx(math.pi)
+    assert base["frames"] == ["base_footprint", "base_link"]
+    assert base["place"] == [0.0, 0.0, 0.010]
+    assert scan["frames"] == ["base_link", "base_scan"]
+    assert scan["place"] == [-0.032, 0.0, 0.172]
+    assert abs(2.0 * math.acos(scan["turn"][1])) == pytest.approx(math.pi)

@@ -5,56 +5,67 @@ The transforms between two frames are judged as the messages of a topic of their
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.messages.following import Follows as FieldsFollow
-from grader.checks.messages.following import follows as fields_follow
-from grader.checks.messages.messages import Equal, equal
+from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
+from grader.checks.messages import following, messages
 from grader.checks.need import Need, Recorded, SimulatedRobot
-from grader.checks.timing.timing import Rate, rate
+from grader.checks.timing import timing
 from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.explanation import cause_of, explain
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.wrong_transform import BadTransform, NoTransform, edge, volatile_static
-from grader.findings.fields import words
 from grader.findings.finding import Finding
+from grader.findings.value import FieldPath
 from grader.findings.wording import code
-from grader.measure import transforms
-from grader.measure.motion.quantities import degrees, metres
-from grader.measure.transforms import Pose, Sent
+from grader.measure.transforms import quaternion, stamp_of
 from grader.recording.model import Message, Recording
+from grader.recording.simulated import Truth
 from grader.spec.name import FrameName, TopicName
 from grader.spec.quantity import Angle, Duration, Frequency, PositiveLength
 from sim.coordinates import Position, RollPitchYaw
 
 _RATE_TOLERANCE = 0.2
-_NUMBERS = ("x", "y", "z", "roll", "pitch", "yaw")
+_Number = Literal["x", "y", "z", "roll", "pitch", "yaw"]
+_ANGLES = ("roll", "pitch", "yaw")
+_POSE: dict[_Number, str] = {
+    "x": "pose.pose.position.x",
+    "y": "pose.pose.position.y",
+    "yaw": "yaw(pose.pose.orientation)",
+}
 
 
 class EdgeParameters(Parameters):
     """Base of the parameters of a check of one transform."""
 
     needs: ClassVar[tuple[Need, ...]] = (Recorded(),)
+    asks = "{self.words}"
 
     parent: FrameName = Field(description="The parent frame, `header.frame_id`.")
     child: FrameName = Field(description="The child frame, `child_frame_id`.")
     topic: TopicName = Field("/tf", description="Topic of the transforms.")
 
-    def found(self, recording: Recording, *, is_static: bool = False) -> list[Sent]:
-        """The transforms; the check ends here if there is none, or tf2 cannot use one."""
+    def alone(self, recording: Recording, *, is_static: bool = False) -> Recording:
+        """The run with these transforms as the only messages on their topic.
+
+        The check ends here if there is none, or tf2 cannot use one.
+        """
         symptom = NoTransform(recording, self.topic, self.parent, self.child, is_static)
-        mine = symptom.wanted
-        stop_if(volatile_static(symptom) if mine else cause_of(symptom))
+        stop_if(volatile_static(symptom) if symptom.wanted else cause_of(symptom))
         heard = (*recording.messages.values(), *recording.sent.values())
-        known = {transforms.stamp_of(one.value) for messages in heard for one in messages}
-        for one in mine:
+        known = {stamp_of(one.value) for items in heard for one in items}
+        for one in symptom.wanted:
             stop_if(explain(BadTransform(recording, one, is_static or one.stamp_ns in known)))
-        return mine
+        # Others may have come between: these are numbered anew.
+        own = (
+            replace(one.message, value=one.value, sequence=number)
+            for number, one in enumerate(symptom.wanted, start=1)
+        )
+        return replace(recording, messages={**recording.messages, self.topic: tuple(own)})
 
     @property
     def words(self) -> str:
@@ -62,14 +73,7 @@ class EdgeParameters(Parameters):
         return f"{edge(self.parent, self.child)} on {code(self.topic)}"
 
 
-class PlacedParameters(EdgeParameters):
-    """Base of the parameters of a check of where a frame is."""
-
-    tolerance: PositiveLength = Field(0.01, description="Largest error of x, y and z.")
-    angle: Angle = Field(0.02, description="Largest error of the rotation.")
-
-
-class Static(PlacedParameters):
+class Static(EdgeParameters):
     """Parameters of tf.static."""
 
     topic: TopicName = Field("/tf_static", description="Topic of the static transforms.")
@@ -77,11 +81,8 @@ class Static(PlacedParameters):
     rpy: RollPitchYaw = Field(
         (0.0, 0.0, 0.0), description="How it is turned about the parent's axes x, y, z (REP-103)."
     )
-
-    def _asked(self) -> str:
-        numbers = zip(_NUMBERS, (*self.position, *self.rpy), strict=True)
-        pose = words({name: round(number, 4) for name, number in numbers if number})
-        return f"{self.words}: {pose}"
+    tolerance: PositiveLength = Field(0.01, description="Largest error of x, y and z.")
+    angle: Angle = Field(0.02, description="Largest error of the rotation.")
 
 
 @check("tf.static", Subject.RECORDING, Static)
@@ -91,29 +92,18 @@ def static(recording: Recording, parameters: Static) -> Finding:
     The publisher must be transient_local and stay until the end. A quaternion and its negative are
     the same rotation. The stamp does not count.
     """
-    mine = parameters.found(recording, is_static=True)
+    alone = parameters.alone(recording, is_static=True)
     gone = f"{parameters.words} was sent, but its publisher is gone"
     stop_if(why_unpublished(recording, parameters.topic, gone) or why_ended(recording, gone))
-    turn, values = transforms.quaternion(*parameters.rpy), []
-    for one in mine:
-        # The same rotation has other angles too, such as those with a full turn more.
-        off = transforms.angle_between(one.pose[1], turn)
-        angles = transforms.roll_pitch_yaw(one.pose[1])
-        angles = parameters.rpy if off <= parameters.angle else angles
-        values.append(dict(zip(_NUMBERS, (*one.pose[0], *angles), strict=True)))
-    wanted = dict(zip(_NUMBERS, (*parameters.position, *parameters.rpy), strict=True))
-    amounts = dict(zip(_NUMBERS, [parameters.tolerance] * 3 + [parameters.angle] * 3, strict=True))
-    found = equal.judge(
-        replace(recording, messages={parameters.topic: _alone(mine, values)}),
-        Equal(topic=parameters.topic, value=wanted, tolerance=amounts),
+    place, turn = dict(zip("xyz", parameters.position, strict=True)), quaternion(*parameters.rpy)
+    amounts = {f"translation.{axis}": parameters.tolerance for axis in place}
+    # A part of a quaternion changes by at most half of the angle.
+    amounts |= {f"rotation.{part}": parameters.angle / 2.0 for part in turn}
+    wanted = {"translation": place, "rotation": turn}
+    found = messages.equal.judge(
+        alone, messages.Equal(topic=parameters.topic, value=wanted, tolerance=amounts)
     )
-    return replace(found, expected=parameters.asked_for)
-
-
-def _alone(mine: Sequence[Sent], values: Iterable[Mapping[str, Any]]) -> tuple[Message, ...]:
-    """Transforms as messages that hold nothing else; others may have come between."""
-    pairs = enumerate(zip(mine, values, strict=False), start=1)
-    return tuple(replace(one.message, value=value, sequence=n) for n, (one, value) in pairs)
+    return replace(found, expected=f"{parameters.words}: {found.expected.partition(' (')[0]}")
 
 
 class Broadcast(EdgeParameters):
@@ -133,71 +123,72 @@ def broadcast(recording: Recording, parameters: Broadcast) -> Finding:
     A stamp must be within 1 s of the moment of publishing, or be that of a message that the node
     may have made the transform of. The rate is judged as by timing.rate.
     """
-    mine = parameters.found(recording)
+    alone = parameters.alone(recording)
     low, high = (parameters.rate * (1.0 + part) for part in (-_RATE_TOLERANCE, _RATE_TOLERANCE))
-    found = rate.judge(
-        replace(recording, messages={parameters.topic: tuple(_alone(mine, [{}] * len(mine)))}),
-        Rate.model_construct(topic=parameters.topic, at_least=low, at_most=high),
-    )
-    if found.credit and parameters.moving and len({one.pose for one in mine}) == 1:
+    wanted = timing.Rate.model_construct(topic=parameters.topic, at_least=low, at_most=high)
+    found = timing.rate.judge(alone, wanted)
+    first, *others = alone.on(parameters.topic)
+    if found.credit and parameters.moving and all(one.value == first.value for one in others):
         seen = f"{found.observed}, but the transform is always the same"
         hint = "Compute translation and rotation again in each call of the callback."
         return Finding.failed(parameters.asked_for, seen, hint, found.evidence)
     return replace(found, expected=parameters.asked_for)
 
 
-class Follows(PlacedParameters):
+class Follows(EdgeParameters):
     """Parameters of tf.follows."""
 
     needs = (Recorded(), Recorded("source"), SimulatedRobot(unless="source"))
 
     source: TopicName | None = Field(
         None,
-        description="Recorded topic with the pose, such as an Odometry or a PoseStamped, or x, y "
-        "and theta; by default the true pose of the simulated robot.",
+        description="Recorded topic with the pose; by default the true pose of the simulated "
+        "robot, as an Odometry.",
     )
+    fields: dict[_Number, FieldPath] = Field(
+        _POSE, min_length=1, description="What is judged, and where in the source it comes from."
+    )
+    tolerance: PositiveLength = Field(0.01, description="Largest error of x, y and z.")
+    angle: Angle = Field(0.02, description="Largest error of each angle.")
     within: Duration = Field(0.2, description="Largest age of the pose.", validate_default=False)
 
-    def _asked(self) -> str:
-        source = f"the pose on {code(self.source)}" if self.source else "the robot's true pose"
-        return f"{self.words} is {source} (within {metres(self.tolerance)}, {degrees(self.angle)})"
+    def named_fields(self) -> Iterator[NamedFields]:
+        """Those of the source."""
+        for field, text in self.fields.items():
+            yield NamedFields(("fields", field), self.source or "", text)
 
 
 @check("tf.follows", Subject.RECORDING, Follows)
 def follows(recording: Recording, parameters: Follows) -> Finding:
-    """A transform follows a pose in the plane: that of a topic, or the robot's true one.
+    """A transform follows a pose: that of a topic, or the true one of the simulated robot.
 
-    x, y and yaw are judged as by messages.follows, so the pose must change in each of them.
+    It is judged as by messages.follows, so the pose must change in each of the fields.
     """
-    mine = parameters.found(recording)
-    topic, source = parameters.topic, parameters.source or "/pose"
-    poses: list[tuple[int, Pose]] = [
-        (one.time_ns, ((one.x_m, one.y_m), transforms.quaternion(0.0, 0.0, one.yaw_rad)))
-        for one in (recording.truth if parameters.source is None else ())
-    ]
-    for message in recording.on(source):
-        pose = transforms.pose_of(message.value)
-        poses += [(message.stamp_ns, pose)] if pose is not None else []
-    numbered = enumerate(poses, start=1)
-    known = [Message(source, "", _value(pose), at_ns, at_ns, n) for n, (at_ns, pose) in numbered]
-    own = _alone(mine, [_value(one.pose) for one in mine])
-    alone = replace(recording, messages={topic: own, source: tuple(known)})
-    fields = {"x": "x", "y": "y"}, {"yaw": "yaw(rotation)"}
-    for part, tolerance in zip(fields, (parameters.tolerance, parameters.angle), strict=True):
-        wanted = FieldsFollow.model_construct(
-            topic=topic, source=source, fields=part, tolerance=tolerance, within=parameters.within
-        )
-        found = fields_follow.judge(alone, wanted)
-        if not found.credit:
-            break
-    hint = found.hint and (
-        "Copy the newest pose, position and orientation, into transform.translation and "
-        "transform.rotation, in the callback that gets it."
+    alone, source = parameters.alone(recording), parameters.source or "/truth"
+    truth = tuple(
+        Message(source, "", _odometry(one), one.time_ns, one.time_ns, number)
+        for number, one in enumerate(recording.truth, start=1)
     )
-    return replace(found, expected=parameters.asked_for, hint=hint)
+    if parameters.source is None:
+        alone = replace(alone, messages={**alone.messages, source: truth})
+    names = {
+        name: f"{name}(rotation)" if name in _ANGLES else f"translation.{name}"
+        for name in parameters.fields
+    }
+    wanted = following.Follows.model_construct(
+        topic=parameters.topic,
+        source=source,
+        fields={names[name]: text for name, text in parameters.fields.items()},
+        tolerance={
+            field: parameters.angle if name in _ANGLES else parameters.tolerance
+            for name, field in names.items()
+        },
+        within=parameters.within,
+    )
+    found = following.follows.judge(alone, wanted)
+    return replace(found, expected=f"{parameters.words}: {found.expected}")
 
 
-def _value(pose: Pose) -> dict[str, Any]:
-    (x, y, *_), turn = pose
-    rotation = dict(zip("xyzw", turn, strict=True))
-    return {"x": x, "y": y, "yaw": transforms.roll_pitch_yaw(turn)[2], "rotation": rotation}
+def _odometry(one: Truth) -> dict[str, Any]:
+    pose = {"position": {"x": one.x_m, "y": one.y_m}, "orientation": quaternion(0, 0, one.yaw_rad)}
+    return {"pose": {"pose": pose}}

@@ -8,6 +8,7 @@ from itertools import accumulate
 
 from grader.checks.topic.topic import PROBE, Untouched
 from grader.findings.wording import code, codes, counted
+from grader.measure.transforms import TRANSFORMS
 from grader.recording.model import NS, Kind, Owner, Recording
 
 _FLOOD = 1000
@@ -38,8 +39,9 @@ def _posing(recording: Recording) -> Iterator[str]:
                 f"a node of the submission is called {code(node.name)}, as the node that watches "
                 "the run"
             )
-    heard = {e.topic for e in recording.endpoints if e.owner is Owner.PROBE}
-    wanted = heard if recording.scene is None else set()
+    heard = [e for e in recording.endpoints if e.owner is Owner.PROBE]
+    # A robot is not the only one to publish transforms.
+    wanted = {e.topic for e in heard if recording.scene is None or e.type == TRANSFORMS}
     taken: dict[str, set[str]] = {}
     for endpoint in recording.student_endpoints(Kind.PUBLISHER):
         if endpoint.topic in set(Untouched().topics) - wanted:

@@ -16,13 +16,15 @@ from grader.submission.underlay.store import CARRIED, UnderlayStore
 EXAMPLE = CARRIED / "example_interfaces"
 
 
-def definitions() -> list[Path]:
-    return sorted(path for kind in ("msg", "srv", "action") for path in EXAMPLE.glob(f"{kind}/*"))
+def definitions(package: Path = EXAMPLE) -> list[Path]:
+    return sorted(path for kind in ("msg", "srv", "action") for path in package.glob(f"{kind}/*"))
 
 
-def test_every_definition_is_listed_for_cmake_and_every_listed_one_is_there() -> None:
-    listed = re.findall(r'"(\S+\.(?:msg|srv|action))"', (EXAMPLE / "CMakeLists.txt").read_text())
-    assert sorted(listed) == sorted(path.relative_to(EXAMPLE).as_posix() for path in definitions())
+@pytest.mark.parametrize("package", sorted(CARRIED.iterdir()), ids=lambda path: path.name)
+def test_every_definition_is_listed_for_cmake_and_every_listed_one_is_there(package: Path) -> None:
+    listed = re.findall(r'"(\S+\.(?:msg|srv|action))"', (package / "CMakeLists.txt").read_text())
+    found = (path.relative_to(package).as_posix() for path in definitions(package))
+    assert sorted(listed) == sorted(found)
 
 
 @pytest.mark.parametrize("path", definitions(), ids=lambda path: path.name)
