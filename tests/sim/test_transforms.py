@@ -16,8 +16,7 @@ pytest.importorskip("rclpy")
 
 from grader import ros
 from grader.run.cell.domain import lock_domain
-from grader.submission.build.build_cache import BuildCache
-from grader.submission.build.underlay import CARRIED, install_prefix
+from grader.submission.underlay.store import UnderlayStore
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.compiles]
 
@@ -75,11 +74,10 @@ print(json.dumps([heard['/tf'][at], heard['/odom'][at], heard['/tf_static']]))
 @pytest.fixture(scope="module")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Variables of a shell with tf2_msgs in it."""
-    folder = tmp_path_factory.mktemp("tf2")
     found = ros.find()
-    install = install_prefix(CARRIED / "tf2_msgs", found, BuildCache(folder / "cache"))
+    store = UnderlayStore(tmp_path_factory.mktemp("tf2"), found)
     return {
-        **found.environment(os.environ, (install,)),
+        **store.completed(found, ["tf2_msgs"]).environment(os.environ),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
     }
 
