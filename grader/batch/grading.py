@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -30,6 +30,7 @@ from grader.submission.build.bounded import OutputLimits
 from grader.submission.build.colcon import BuildLimits
 from grader.submission.build.own_tests import LIBRARY
 from grader.submission.prepare import Prepared, prepare
+from grader.submission.record import SubmissionRecord
 
 RECORDINGS_FOLDER = "recordings"
 SUBMISSION_FILE = "submission.json"
@@ -67,8 +68,7 @@ class Grading:
         self._runner = runner
         self._cache = cache
         self._seed = seed
-        self._tested = frozenset(_tested(loaded))
-        self._libraries = (*loaded.assignment.libraries, *([LIBRARY] if self._tested else ()))
+        self._libraries = (*loaded.assignment.libraries, *([LIBRARY] if _tested(loaded) else ()))
         check_installed(self._libraries)
         self._build_limits = _build_limits(loaded.assignment.build_limits)
         self._type_support = TypeSupport(loaded, runner.ros, cache)
@@ -93,6 +93,11 @@ class Grading:
         sandbox = self._runner.sandbox
         if sandbox is not None:
             sandbox = sandbox.allowing(self._libraries)
+        outside = tuple(sorted({**self._loaded.given, **given}.items()))
+
+        def tested(record: SubmissionRecord) -> frozenset[str]:
+            return _tested(named(self._loaded, replace(record, given=outside))[0])
+
         # Each of them takes a CPU or more; beyond that they would only hold up each other.
         with self._builds:
             prepared = prepare(
@@ -104,11 +109,10 @@ class Grading:
                 sandbox=sandbox,
                 stop=self._stop,
                 on_output=on_output,
-                tested=self._tested,
+                tested=tested,
             )
         if name is not None:
             prepared = prepared.named(name)
-        outside = tuple(sorted({**self._loaded.given, **given}.items()))
         prepared = replace(prepared, record=replace(prepared.record, given=outside))
         return self.grade_prepared(prepared, folder)
 
@@ -242,12 +246,14 @@ class Grading:
             raise machine_fault(error) or told from error
 
 
-def _tested(loaded: LoadedAssignment) -> Iterator[str]:
+def _tested(loaded: LoadedAssignment) -> frozenset[str]:
     """The packages whose own tests a check judges."""
-    for bound in loaded.checks:
-        for need in bound.parameters.needs:
-            if isinstance(need, StudentTests):
-                yield getattr(bound.parameters, need.package)
+    return frozenset(
+        getattr(bound.parameters, need.package)
+        for bound in loaded.checks
+        for need in bound.parameters.needs
+        if isinstance(need, StudentTests)
+    )
 
 
 def _build_limits(options: BuildLimitOptions) -> BuildLimits:

@@ -67,7 +67,7 @@ def prepare(
     sandbox: Sandbox | None = None,
     stop: threading.Event | None = None,
     on_output: Callable[[str], None] = lambda _: None,
-    tested: frozenset[str] = frozenset(),
+    tested: Callable[[SubmissionRecord], frozenset[str]] = lambda _: frozenset(),
 ) -> Prepared:
     """Find the packages of a submission, read them, build them.
 
@@ -79,7 +79,7 @@ def prepare(
         sandbox: What it is built in, or None.
         on_output: Called with each line of the build's log as it comes; an earlier build's log
             comes at once.
-        tested: Packages whose own tests are run after the build.
+        tested: Packages whose own tests are run after the build, by what was read before it.
 
     Raises:
         UsageError: Nothing is at ``path``, or it is a URL.
@@ -96,12 +96,11 @@ def prepare(
         stop=stop,
         on_progress=on_progress,
         on_output=on_output,
-        tested=tested,
     )
 
     def attempt(is_second: bool) -> Prepared:
         with opened(source) as located:
-            return _prepare(located, replace(builder, is_second=is_second), store)
+            return _prepare(located, replace(builder, is_second=is_second), store, tested)
 
     try:
         return once_more(attempt)
@@ -140,7 +139,12 @@ def _hash(source: Path) -> str:
     return total.hexdigest()
 
 
-def _prepare(located: Located, builder: Builder, store: UnderlayStore) -> Prepared:
+def _prepare(
+    located: Located,
+    builder: Builder,
+    store: UnderlayStore,
+    tested: Callable[[SubmissionRecord], frozenset[str]],
+) -> Prepared:
     ros, allowance = builder.ros, Allowance()
     packages = [
         read_package(located, folder, ros, allowance) for folder in located.packages[:_MAX_PACKAGES]
@@ -166,7 +170,7 @@ def _prepare(located: Located, builder: Builder, store: UnderlayStore) -> Prepar
         texts={path: lines for package in packages for path, lines in package.texts.items()},
         malformed={package.name: package.setup.malformed for package in packages},
     )
-    built = replace(builder, ros=ros).build(
+    built = replace(builder, ros=ros, tested=tested(record)).build(
         located,
         sources,
         only_python=all(package.build_type == "ament_python" for package in packages),
