@@ -191,4 +191,7 @@ class Window:
             for begin, end in found
             if begin < end
         ]
+        if self.after is None and self.while_ is None and not self.from_s:
+            # What was published before the first match belongs to the beginning.
+            found = [(0, end) for _, end in found]
         return [one for one in found if one[0] < one[1]]

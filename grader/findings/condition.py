@@ -7,7 +7,6 @@ import operator
 import re
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 
 from grader.spec.expression import Expression, Find
@@ -17,7 +16,6 @@ _FLOAT32_MAX = 3.4028234663852886e38
 
 _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     **{">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt},
-    **{"!=": operator.ne, "": operator.eq},
 }
 _FORM = re.compile(r"(>=|<=|>|<|!=|)\s*(.*)", re.DOTALL)
 _BETWEEN = ".."
@@ -42,59 +40,53 @@ def is_near(wanted: float, observed: float, tolerance: float, circle: float = 0.
     return in_range and observed == struct.unpack("f", struct.pack("f", wanted))[0]
 
 
-@dataclass(frozen=True)
-class Condition:
-    """What a text asks of a number.
-
-    Attributes:
-        sign: ``>``, ``>=``, ``<``, ``<=``, ``!=``, ``..`` for a range with both its ends, or
-            nothing for a number that is the same.
-    """
-
-    sign: str
-    bounds: tuple[Expression, ...]
-
-    @classmethod
-    @cache
-    def of(cls, text: str) -> Condition:
-        """Read one; a ValueError says what is wrong."""
-        low, between, high = text.partition(_BETWEEN)
-        if between:
-            ends = Expression.of(low.strip()), Expression.of(high.strip())
-            fixed = [end.value(str) for end in ends if not end.fields]
-            if fixed != sorted(fixed):
-                raise ValueError(f"the lowest value of {text!r} is above the highest")
-            return cls(_BETWEEN, ends)
+@cache
+def _read(text: str) -> tuple[str, tuple[Expression, ...]]:
+    """A sign, perhaps none, and one bound; or two bounds of a range."""
+    low, between, high = text.partition(_BETWEEN)
+    if not between:
         match = _FORM.fullmatch(text.strip())
         assert match is not None
-        return cls(match[1], (Expression.of(match[2]),))
-
-    def holds(self, observed: float, tolerance: float, find: Find, circle: float = 0.0) -> bool:
-        """Whether an observed number is as asked for; NaN only if NaN is asked for.
-
-        Args:
-            tolerance: For a number that is, or is not, the same: other bounds are exact.
-            circle: Of an angle a full turn.
-        """
-        numbers = [bound.value(find) for bound in self.bounds]
-        if not all(isinstance(number, int | float) for number in numbers):
-            raise TypeError("not a number")
-        first, last = numbers[0], numbers[-1]
-        if self.sign == _BETWEEN:
-            ends = any(is_near(end, observed, EXACT, circle) for end in numbers)
-            turned = first + (observed - first) % circle if circle else observed
-            return ends or first <= turned <= last
-        if self.sign in ("", "!="):
-            same = is_near(first, observed, tolerance, circle)
-            return same if not self.sign else not same and not math.isnan(observed)
-        # The float32 that is nearest to a bound is the bound.
-        on_the_bound = is_near(first, observed, EXACT if "=" in self.sign else 0.0)
-        return "=" in self.sign if on_the_bound else _COMPARISONS[self.sign](observed, first)
+        return match[1], (Expression.of(match[2]),)
+    ends = Expression.of(low.strip()), Expression.of(high.strip())
+    fixed = [end.value(str) for end in ends if not end.fields]
+    if fixed != sorted(fixed):
+        raise ValueError(f"the lowest value of {text!r} is above the highest")
+    return _BETWEEN, ends
 
 
 def is_comparison(text: str) -> bool:
     """Whether a text is a comparison or a range, and so not just another way to write a value."""
     try:
-        return bool(Condition.of(text).sign)
+        return bool(_read(text)[0])
     except ValueError:
         return False
+
+
+def meets(text: str, observed: float, tolerance: float, find: Find, circle: float = 0.0) -> bool:
+    """Whether a number is as a text asks; NaN only if NaN is asked for.
+
+    Args:
+        tolerance: For a number that is, or is not, the same: other bounds are exact.
+        circle: Of an angle a full turn.
+
+    Raises:
+        ValueError: The text asks nothing of a number.
+        TypeError: It asks for something that is no number.
+    """
+    sign, bounds = _read(text)
+    numbers = [bound.value(find) for bound in bounds]
+    if not all(isinstance(number, int | float) for number in numbers):
+        raise TypeError("not a number")
+    first, last = numbers[0], numbers[-1]
+    if sign == _BETWEEN:
+        turned = first + (observed - first) % circle if circle else observed
+        ends = any(is_near(end, observed, EXACT, circle) for end in numbers)
+        return ends or first <= turned <= last
+    if sign in ("", "!="):
+        same = is_near(first, observed, tolerance, circle)
+        return same if not sign else not same and not math.isnan(observed)
+    # The float32 that is nearest to a bound is the bound.
+    if is_near(first, observed, EXACT if "=" in sign else 0.0):
+        return "=" in sign
+    return _COMPARISONS[sign](observed, first)

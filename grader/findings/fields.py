@@ -56,10 +56,14 @@ def within_words(tolerance: Tolerance) -> str:
     return f" ({', '.join(parts)})" if tolerance else ""
 
 
+def wanted_text(value: Any) -> str:
+    """Write what is asked for: a comparison or a range as it is, without quotes."""
+    return value if isinstance(value, str) and is_comparison(value) else value_text(value)
+
+
 def _wanted(value: Any) -> str:
-    if not isinstance(value, str) or not is_comparison(value):
-        return f"= {value_text(value)}"
-    return f"= {value}" if ".." in value else value
+    text = wanted_text(value)
+    return text if text[0] in "<>!" else f"= {text}"
 
 
 def instead(item: Difference) -> str:

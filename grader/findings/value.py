@@ -6,13 +6,14 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 from typing import Annotated, Any
 
 from pydantic import AfterValidator
 
 from grader.findings import condition
-from grader.findings.condition import Condition, is_comparison, is_near
+from grader.findings.condition import is_comparison, is_near, meets
 from grader.spec.expression import Expression, is_field
 from grader.spec.nearest_name import did_you_mean
 
@@ -104,7 +105,7 @@ def value_at(message: Mapping[str, Any], path: str) -> Any:
         NoSuchField: There is none.
     """
     try:
-        found = Expression.of(path).value(lambda name: _part_of(message, name))
+        found = Expression.of(path).value(partial(_part_of, message))
     except TypeError as error:
         raise NoSuchField(f"{path} cannot be computed: {error}") from None
     if isinstance(found, Mapping):
@@ -280,8 +281,8 @@ def same(
         )
     if _is_asked(wanted, observed):
         try:
-            asked = Condition.of(wanted)
-            return asked.holds(observed, tolerance, lambda name: _part_of(message, name), circle)
+            find = partial(_part_of, message)
+            return meets(wanted, observed, tolerance, find, circle)
         except NoSuchItem:
             return False
         except NoSuchField as error:

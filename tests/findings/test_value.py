@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from grader.findings.condition import Condition, is_comparison
+from grader.findings.condition import is_comparison
 from grader.findings.fields import difference_words, unlike, words
 from grader.findings.value import EXACT, NoSuchField, same_value
 
@@ -138,5 +138,5 @@ def test_what_is_expected_is_written_as_the_assignment_has_it() -> None:
 
 def test_a_range_from_high_to_low_is_refused() -> None:
     with pytest.raises(ValueError, match="is above the highest"):
-        Condition.of("5 .. 1")
+        unlike(message(), {"x": "5 .. 1"}, EXACT)
     assert not is_comparison("5 .. 1")

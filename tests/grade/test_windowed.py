@@ -172,6 +172,12 @@ class TestTimes:
         run = recording(messages=numbered)
         assert judged(counting, run, from_s=0.7, to_s=1.4).status is Status.PASSED
 
+    def test_what_was_latched_before_the_first_match_belongs_to_the_beginning(self):
+        one = ("messages.count", {"topic": "/cmd_vel", "exactly": 1})
+        run = recording(messages=messages([0.2]), matched_s=0.4)
+        assert judged(one, run, to_s=1.0).status is Status.PASSED
+        assert judged(SILENT, run, from_s=0.1).status is Status.PASSED
+
     def test_of_several_writers_the_numbers_tell_nothing(self):
         one, other = messages([1.0, 1.2])["/cmd_vel"], messages([1.1, 1.3])["/cmd_vel"]
         both = (one[0], replace(other[0], sequence=500), one[1], replace(other[1], sequence=501))

@@ -15,7 +15,6 @@ from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.blocked_executor import left_s, why_not_called
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.wrong_rhythm import why_paused
-from grader.findings.condition import Condition
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import until_the_end
 from grader.findings.value import EXACT, same
@@ -82,11 +81,10 @@ def _pattern(text: str) -> str:
 
 def _number(text: str) -> str:
     try:
-        named = [bound.fields for bound in Condition.of(text).bounds]
-    except ValueError as error:
-        raise ValueError(f"write a number, '> 0' or '0.1 .. 0.5': {error}") from None
-    if any(named):
-        raise ValueError(f"{text!r} names a field, but a line of the log has none")
+        same(text, 0.0, EXACT)
+    except ValueError:
+        text = f"{text!r} asks nothing of a number: write 1.5, '> 0' or '0.1 .. 0.5'"
+        raise ValueError(text) from None
     return text
 
 

@@ -17,6 +17,7 @@ from grader.findings.fields import (
     FieldTolerance,
     difference_table,
     instead,
+    wanted_text,
     within_words,
     words,
 )
@@ -34,7 +35,7 @@ from grader.findings.value import (
     same,
     tolerance_of,
 )
-from grader.findings.wording import code, codes, counted, value_text
+from grader.findings.wording import code, codes, counted
 from grader.measure.numbering import is_numbered, published
 from grader.recording.model import Kind, Recording
 from grader.spec.expression import Expression
@@ -403,4 +404,4 @@ def _explain_order(parameters: Series, found: Sequence[Any]) -> tuple[str, str]:
 def _text(value: Any) -> str:
     """A value as people write it, whole numbers without a decimal point."""
     is_whole = isinstance(value, float) and value.is_integer()
-    return value_text(int(value) if is_whole else value)
+    return wanted_text(int(value) if is_whole else value)

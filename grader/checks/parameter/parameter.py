@@ -15,6 +15,7 @@ from grader.diagnosis.no_parameter import (
     why_not_declared,
     why_services_silent,
 )
+from grader.findings.fields import wanted_text
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.value import same, same_value
 from grader.findings.wording import code, value_text
@@ -72,7 +73,7 @@ class Declared(OfParameter):
     def _asked(self) -> str:
         parts = [_article(self.type)] if self.type else []
         if self.default is not None:
-            parts.append(f"{value_text(self.default)} at first")
+            parts.append(f"{wanted_text(self.default)} at first")
         if self.range is not None:
             parts.append(f"from {_range_words((*self.range, self.step or 0.0))}")
         if self.read_only is not None:
@@ -106,7 +107,7 @@ def declared(recording: Recording, parameters: Declared) -> Finding:
                 parameters.asked_for,
                 f"it is {value_text(values[0].value)} at first",
                 "Its default is the second argument: self.declare_parameter("
-                f"'{parameters.name}', {value_text(parameters.default)}).",
+                f"'{parameters.name}', {wanted_text(parameters.default)}).",
                 shown,
             )
     value = f", {value_text(values[0].value)}" if values else ""
