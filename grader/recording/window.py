@@ -27,7 +27,11 @@ def cut(recording: Recording, begin_ns: int, end_ns: int) -> Recording:
 
     def streams(found: Mapping[str, tuple[Message, ...]]) -> dict[str, tuple[Message, ...]]:
         stamp = attrgetter("stamp_ns")
-        return {name: _renumbered(inside(items, stamp)) for name, items in found.items()}
+        # Static transforms are published once, and hold in every window.
+        return {
+            name: items if name.endswith("/tf_static") else _renumbered(inside(items, stamp))
+            for name, items in found.items()
+        }
 
     return replace(
         recording,

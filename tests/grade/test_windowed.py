@@ -178,6 +178,11 @@ class TestTimes:
         assert judged(one, run, to_s=1.0).status is Status.PASSED
         assert judged(SILENT, run, from_s=0.1).status is Status.PASSED
 
+    def test_static_transforms_hold_in_every_window(self):
+        one = ("messages.count", {"topic": "/tf_static", "exactly": 1})
+        run = recording(messages=messages([0.5], topic="/tf_static"))
+        assert judged(one, run, from_s=1.0).status is Status.PASSED
+
     def test_of_several_writers_the_numbers_tell_nothing(self):
         one, other = messages([1.0, 1.2])["/cmd_vel"], messages([1.1, 1.3])["/cmd_vel"]
         both = (one[0], replace(other[0], sequence=500), one[1], replace(other[1], sequence=501))
