@@ -46,7 +46,11 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "scenarios": model.Scenario,
         "launch": model.Launch,
         "record": model.RecordedTopic,
-        **{f"stimuli: {one.heading or one.key}": one for one in stimulus_models()},
+        **{
+            f"stimuli: {heading}": found
+            for one in stimulus_models()
+            for heading, found in {one.heading or one.key: one, **one.inner}.items()
+        },
         "until": model.Until,
         "limits": model.LimitOptions,
         "build_limits": model.BuildLimitOptions,
@@ -107,6 +111,7 @@ _RECORDED = (
     recording.LogLine,
     recording.Call,
     interaction.Goal,
+    interaction.Asked,
     interaction.Feedback,
     interaction.Service,
     recording.Join,

@@ -140,6 +140,11 @@ class RosSimulator:
                     raise
                 return  # the context was shut down within the step
 
+    def drive(self, twist: Twist) -> None:
+        """Command the robot from this process, like a message that arrives now; any thread may."""
+        if self._pacer is not None:
+            self._pending.append((self._steady_ns() - self._pacer.begin_ns, twist))
+
     @property
     def unheard(self) -> tuple[str, ...]:
         """Other types that are published on the topic of the commands."""

@@ -20,7 +20,7 @@ from grader.assignment.variable import Values, fill_text
 from grader.checks.check import NamedFields
 from grader.errors import GraderFault, Problem
 from grader.findings.value import NoSuchField, expected_leaves, tolerance_of, unreachable, value_at
-from grader.recording.interface import FLOATS, TEXTS, fields_of
+from grader.recording.interface import FEEDBACK, FLOATS, TEXTS, feedback_definition, fields_of
 from grader.spec.document import Place
 from grader.spec.name import INTERFACE
 from grader.spec.nearest_name import did_you_mean, nearest_or_all
@@ -72,7 +72,7 @@ class Interfaces:
             if stem == name:
                 text = file.read_text(encoding="utf-8", errors="replace")
                 return fill_text(text, self.values)
-        raise KeyError(interface)
+        return feedback_definition(interface, self.find)
 
     def names(self, package: str, kind: str) -> list[str]:
         """Names of the interfaces of one kind in a package."""
@@ -143,7 +143,7 @@ def _named(
 def _unknown(
     source: Source, place: Place, interface: str, elsewhere: set[str], known: Interfaces
 ) -> Iterator[Problem]:
-    package, kind, name = interface.split("/")
+    package, kind, name = interface.removesuffix(FEEDBACK).split("/")
     names = known.names(package, kind)
     if name in names:
         return

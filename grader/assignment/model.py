@@ -241,7 +241,8 @@ class RecordedTopic(Model):
     type: InterfaceName = Field(
         description="Interface, such as geometry_msgs/msg/Twist. If students write its package, "
         "put your own copy of the package into the folder `interfaces` beside "
-        "assignment.yaml."
+        "assignment.yaml. The feedback of an action is on its topic `/fibonacci/_action/feedback` "
+        "with the type example_interfaces/action/Fibonacci_FeedbackMessage."
     )
     reliability: Reliability = Field(
         "reliable",

@@ -24,6 +24,7 @@ from grader.assignment.stimuli.kinds.request import (
     SendGoal,
     SetParameters,
 )
+from grader.assignment.stimuli.kinds.serve import Serve
 from grader.checks import need as needs
 from grader.checks.check import Subject
 from grader.errors import GraderFault, Problem
@@ -283,6 +284,13 @@ def _(need: needs.GoalSent, user: _User) -> Iterator[_Lack]:
         fields = user.value(need.goal)
         waits_s = [one.within for one in mine if _has_fields(fields, [one.goal])]
         yield from _impatient(user, scenario, need.within, waits_s)
+
+
+@_lacks.register
+def _(need: needs.Served, user: _User) -> Iterator[_Lack]:
+    for scenario in user.scenarios:
+        names = [one.serve for one in scenario.stimuli if isinstance(one, Serve)]
+        yield from _unnamed(user, need.server, scenario, names, "serves")
 
 
 @_lacks.register

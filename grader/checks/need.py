@@ -98,6 +98,14 @@ class GoalSent(Need):
 
 
 @dataclass(frozen=True)
+class Served(Need):
+    """A service or an action that the scenario offers."""
+
+    words = "a stimulus that serves `{server}`"
+    server: str = "server"
+
+
+@dataclass(frozen=True)
 class ParametersRead(Need):
     """A node whose parameters a stimulus reads or sets."""
 

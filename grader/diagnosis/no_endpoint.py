@@ -34,7 +34,7 @@ _NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 @dataclass(frozen=True)
 class Word:
-    """How a publisher, a subscription, a service or an action is called, and made.
+    """How an endpoint, a server or a client is called, and made.
 
     Attributes:
         does: What a node does that has one, before its name.
@@ -58,13 +58,24 @@ SERVICE = Word(
 ACTION = Word(
     "action", "offers the action", "ActionServer(self, {type}, '{name}', self.execute_callback)"
 )
-_WORDS = (PUBLISHER, SUBSCRIPTION, SERVICE, ACTION)
-_OTHER = {PUBLISHER: SUBSCRIPTION, SUBSCRIPTION: PUBLISHER, SERVICE: ACTION, ACTION: SERVICE}
+CLIENT = Word("client", "has a client of", "self.create_client({type}, '{name}')")
+ACTION_CLIENT = Word(
+    "action client", "has an action client of", "ActionClient(self, {type}, '{name}')"
+)
+_WORDS = (PUBLISHER, SUBSCRIPTION, SERVICE, ACTION, CLIENT, ACTION_CLIENT)
+_OTHER = {
+    PUBLISHER: SUBSCRIPTION,
+    SUBSCRIPTION: PUBLISHER,
+    SERVICE: ACTION,
+    ACTION: SERVICE,
+    CLIENT: SERVICE,
+    ACTION_CLIENT: ACTION,
+}
 
 
 @dataclass(frozen=True)
 class NoEndpoint(Symptom[Cause]):
-    """A publisher, a subscription, a service or an action is missing.
+    """A publisher, a subscription, a service, an action, or a client of one is missing.
 
     Attributes:
         types: Any of which it may have; empty where any will do.
@@ -283,10 +294,12 @@ def others_only(symptom: NoEndpoint) -> Cause:
 
 
 def _of_students(recording: Recording, word: Word) -> tuple[Service, ...]:
-    if word is SERVICE:
-        return tuple(item for item in recording.services if not _is_own(item))
-    if word is ACTION:
-        goals = (item for item in recording.services if item.name.endswith(_SEND_GOAL))
+    of_clients = word in (CLIENT, ACTION_CLIENT)
+    services = recording.clients if of_clients else recording.services
+    if word in (SERVICE, CLIENT):
+        return tuple(item for item in services if not _is_own(item))
+    if word in (ACTION, ACTION_CLIENT):
+        goals = (item for item in services if item.name.endswith(_SEND_GOAL))
         return tuple(_action(item) for item in goals)
     return tuple(
         Service(item.topic, item.type, item.node, item.appeared_ns, item.vanished_ns)

@@ -1,4 +1,4 @@
-"""Facts of services and actions: who offers them, and goals that the probe sent.
+"""Facts of services and actions: who offers and who uses them, and what was asked.
 
 Times are integer nanoseconds since the Unix epoch, as everywhere in a recording.
 """
@@ -29,7 +29,7 @@ def executor_services(node: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Service:
-    """A service that a node of the student offers; an action is five topics and services.
+    """A service that a node of the student offers or uses; an action is five topics and services.
 
     Attributes:
         name: Fully qualified, such as ``/add`` or ``/fibonacci/_action/send_goal``.
@@ -102,3 +102,34 @@ class Goal:
     preempts: bool = False
     preempted: bool = False
     error: str = ""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A request or a goal of the student's to a service or an action that the scenario serves.
+
+    Attributes:
+        server: Fully qualified name of the service or action.
+        type: Interface name.
+        fields: Of the request or goal.
+        asked_ns: When the probe received it.
+        status: ``answered`` for a request; for a goal ``accepted``, ``rejected``, or as it ended:
+            ``succeeded``, ``aborted``, ``canceled``; empty before, ``unanswered`` if the scenario
+            never answers it.
+        accepted_ns: When a goal was accepted, or None.
+        feedback: Of a goal, as it was given.
+        canceled_ns: When the client first asked to cancel a goal, or None.
+        ended_ns: When it got its response, its rejection or its result, or None.
+        answer: Fields of the response or the result, or None.
+    """
+
+    server: str
+    type: str
+    fields: Mapping[str, Any]
+    asked_ns: int
+    status: str = ""
+    accepted_ns: int | None = None
+    feedback: tuple[Feedback, ...] = ()
+    canceled_ns: int | None = None
+    ended_ns: int | None = None
+    answer: Mapping[str, Any] | None = None

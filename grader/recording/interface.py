@@ -27,6 +27,8 @@ _LINE = re.compile(
     r"(?P<array>\[(?P<upto><=)?(?P<count>\d*)\])?\s+(?P<name>[A-Za-z]\w*)\s*(?P<rest>.*)"
 )
 _SEPARATOR = "---"
+FEEDBACK = "_FeedbackMessage"
+"""What ROS appends to the name of an action for the type of its topic of feedback."""
 
 
 class DefinitionError(ValueError):
@@ -178,9 +180,24 @@ def definition_finder(prefixes: Iterable[Path]) -> Callable[[str], str]:
             file = prefix / "share" / f"{interface}.{interface.split('/')[1]}"
             if file.is_file():
                 return file.read_text(encoding="utf-8")
-        raise KeyError(interface)
+        return feedback_definition(interface, find)
 
     return find
+
+
+def feedback_definition(interface: str, find: Callable[[str], str]) -> str:
+    """What an action publishes as feedback, of which there is no file; KeyError for all else."""
+    package, _, name = interface.split("/")
+    action = name.removesuffix(FEEDBACK)
+    if action != name:
+        find(f"{package}/action/{action}")
+        return f"unique_identifier_msgs/UUID goal_id\n{package}/{action}_Feedback feedback\n"
+    action = name.removesuffix("_Feedback")
+    if action == name:
+        raise KeyError(interface)
+    lines = find(f"{package}/action/{action}").splitlines()
+    starts = [number for number, line in enumerate(lines) if line.strip() == _SEPARATOR]
+    return "\n".join(lines[starts[1] + 1 :])
 
 
 def concatenated_definition(interface: str, find: Callable[[str], str]) -> str:

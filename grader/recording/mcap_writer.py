@@ -32,6 +32,8 @@ CHANNELS: dict[str, str] = {
     "declarations": "time_ns",
     "calls": "requested_ns",
     "services": "appeared_ns",
+    "clients": "appeared_ns",
+    "asked": "asked_ns",
     "goals": "sent_ns",
     "waits": "began_ns",
     "joins": "joined_ns",

@@ -16,7 +16,7 @@ from functools import cached_property
 from typing import Any
 
 from grader.recording.event import Breach, Disturbance, Intervention, Wait
-from grader.recording.interaction import Goal, Service
+from grader.recording.interaction import Asked, Goal, Service
 from grader.recording.simulated import Incident, Scene, Truth
 from grader.submission.record import SubmissionRecord
 
@@ -298,6 +298,8 @@ class Recording:
         declarations: Reports of the tracer in the student's processes.
         calls: Calls of services by the probe, in order.
         services: Services that the student's nodes offer.
+        clients: Services that the student's nodes have clients of.
+        asked: What the student's clients asked of servers of the scenario, in order.
         goals: Goals that the probe sent.
         waits: Waits of the probe with their limits.
         joins: Late joiners.
@@ -333,6 +335,8 @@ class Recording:
     declarations: tuple[Declaration, ...] = ()
     calls: tuple[Call, ...] = ()
     services: tuple[Service, ...] = ()
+    clients: tuple[Service, ...] = ()
+    asked: tuple[Asked, ...] = ()
     goals: tuple[Goal, ...] = ()
     waits: tuple[Wait, ...] = ()
     joins: tuple[Join, ...] = ()
@@ -358,6 +362,10 @@ class Recording:
     def carried(self, topic: str) -> tuple[Message, ...]:
         """Messages that a subscription to the topic could get: recorded, or sent by the probe."""
         return self.on(topic) or self.sent.get(topic, ())
+
+    def asked_of(self, server: str) -> tuple[Asked, ...]:
+        """What the student's clients asked of a server of the scenario, in order."""
+        return tuple(one for one in self.asked if one.server == server)
 
     @cached_property
     def student_nodes(self) -> tuple[Node, ...]:

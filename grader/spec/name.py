@@ -18,7 +18,7 @@ TOPIC = r"(/[A-Za-z_][A-Za-z0-9_]*)+"
 NODE = r"[A-Za-z_][A-Za-z0-9_]*"
 LIBRARY = r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?"
 FRAME = r"[A-Za-z0-9_][A-Za-z0-9_./-]*"
-INTERFACE = r"[a-z][a-z0-9_]*/(msg|srv|action)/[A-Z][A-Za-z0-9]*"
+INTERFACE = r"[a-z][a-z0-9_]*/(msg|srv|action)/[A-Z][A-Za-z0-9]*(_FeedbackMessage)?"
 
 
 def _rule(pattern: str, words: str) -> Callable[[str], str]:

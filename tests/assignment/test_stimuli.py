@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +12,7 @@ from mcap_ros2.writer import Writer
 
 from grader.assignment.stimuli.kinds.publish import Publish
 from grader.assignment.stimuli.kinds.request import CallService, SetParameters
+from grader.assignment.stimuli.kinds.serve import ServeAction
 from grader.assignment.stimuli.stimulus_model import Making
 
 HEAD = """\
@@ -29,6 +31,7 @@ scenarios:
     stimuli:
 """
 TAIL = "checks: [{id: alive, uses: node.alive, points: 1}]\n"
+SET_BOOL = "std_srvs/srv/SetBool"
 DEFINITIONS = {
     "std_msgs/msg/String": "string data\n",
     "std_msgs/msg/UInt8": "uint8 data\n",
@@ -42,6 +45,7 @@ DEFINITIONS = {
     "std_srvs/srv/SetBool": "bool data # switch\n---\nbool success\nstring message\n",
     "x/action/Fibonacci": "int32 order\n---\nint32[] sequence\n---\nint32[] sequence\n",
     "x/srv/Go": "geometry_msgs/Vector3 to\n---\n",
+    "x/action/Drive": "geometry_msgs/Vector3 to\n---\n---\nfloat32 distance\n",
     "bot_msgs/msg/Three": "uint8 ONE=1\nfloat64[3] values\nint8[<=2] few\nstring<=4 name\n",
 }
 
@@ -349,3 +353,47 @@ def test_the_type_of_a_parameter_is_that_of_the_yaml() -> None:
     found = item.order(MAKING)["values"]
     assert found == {"a": 1, "b": 1.0, "c": 2.0, "d": True, "e": "text", "f": [1, 2.5], "g": 1.5}
     assert [type(found[name]) for name in "abcd"] == [int, float, float, bool]
+
+
+def serve(rest: str, name: str = "/go", type: str = "x/action/Drive") -> str:
+    head = f"      - serve: {name}\n        type: {type}\n"
+    return head + "".join(f"        {line}\n" for line in rest.splitlines())
+
+
+@pytest.mark.parametrize(
+    "stimulus",
+    [
+        serve(""),
+        serve("answers: [{when: {to.x: 1}, accept: false}, {takes: forever, cancel: reject}]"),
+        serve("answers: [{feedback: [{distance: 30 cm}], every: 100 ms, status: aborted}]"),
+        serve("answers: [{delay: forever}, {response: {success: true}}]", "/e", SET_BOOL),
+        serve("after: 1 s", "/e", SET_BOOL),
+    ],
+)
+def test_servers_that_fit_are_read(found: Found, stimulus: str) -> None:
+    assert found(stimulus) == []
+
+
+@pytest.mark.parametrize(
+    ("stimulus", "expected"),
+    [
+        (serve("answers: [{when: {by: 1}}]"), r"16: .*has no field 'by'. It has: to"),
+        (serve("answers: [{feedback: [{to: 1}]}]"), r"16: .*has no field 'to'. It has: distance"),
+        (serve("answers: [{response: {}}]"), r"16: .*unknown key 'response'"),
+        (serve("answers: [{takes: ever}]"), r"16: .*takes: .*forever"),
+        (serve("answers: [{drive: {to: to, distance: to}}]"), r"16: .*no field 'to'. It has: dist"),
+        (serve("answers: [{drive: {to: to}}]"), r"16: .*only in a 'world', which is missing"),
+        (serve("") + serve(""), r"'/go' stands twice: give one server several 'answers'"),
+        (serve("", type="std_msgs/msg/String"), r"an interface in srv or action"),
+    ],
+)
+def test_a_server_that_does_not_fit_is_named(found: Found, stimulus: str, expected: str) -> None:
+    mistakes = found(stimulus)
+    assert re.search(expected, mistakes[-1]), mistakes
+
+
+def test_a_goal_takes_as_long_as_its_feedback() -> None:
+    values = {"serve": "/go", "type": "x/action/Drive"}
+    answers = ({"feedback": [{}, {}], "every": "250 ms"}, {"takes": "forever"})
+    order = ServeAction.model_validate({**values, "answers": answers}).order(MAKING)
+    assert [one["takes"] for one in order["answers"]] == [0.5, math.inf]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from grader.recording.interaction import Feedback, Goal, Service
-from grader.recording.model import Call, LogLine, Recording
-from tests.checks.builder import BOT, NODE, at, recording
+from grader.recording.interaction import Asked, Feedback, Goal, Service
+from grader.recording.model import Call, LogLine, Owner, Recording
+from tests.checks.builder import BOT, NODE, at, endpoint, recording
 
 SET_BOOL = "std_srvs/srv/SetBool"
 FIBONACCI = "example_interfaces/action/Fibonacci"
@@ -99,6 +99,33 @@ def canceled(**changes: Any) -> Goal:
 def acting(*goals: Goal, **changes: Any) -> Recording:
     """A run of a node that offers /fibonacci, with these goals."""
     return recording(**{"services": (action(),), "goals": goals, **changes})
+
+
+def to_service(time_s: float = 1.0, took_s: float | None = 0.5, **changes: Any) -> Asked:
+    """A request of a client of the student to /enable, answered so many seconds later."""
+    values: dict[str, Any] = {"server": "/enable", "type": SET_BOOL, "fields": {"data": True}}
+    if took_s is not None:
+        answer = {"success": True, "message": ""}
+        values |= {"status": "answered", "ended_ns": at(time_s + took_s), "answer": answer}
+    return Asked(**{**values, "asked_ns": at(time_s), **changes})
+
+
+def to_action(order: int = 4, time_s: float = 1.0, status: str = "succeeded", **more: Any) -> Asked:
+    """A goal of a client of the student to /fibonacci, ended 0.5 s later."""
+    values: dict[str, Any] = {
+        **{"server": "/fibonacci", "type": FIBONACCI, "fields": {"order": order}},
+        **{"asked_ns": at(time_s), "status": status},
+    }
+    if status != "unanswered":
+        values |= {"accepted_ns": at(time_s), "ended_ns": at(time_s + 0.5)}
+    return Asked(**{**values, **more})
+
+
+def asking(*requests: Asked, **changes: Any) -> Recording:
+    """A run of a node with clients of /enable and /fibonacci, which asked for these."""
+    served = endpoint("/fibonacci/_action/status", type="x/msg/X", owner=Owner.PROBE)
+    found = {"clients": (service(), action()), "endpoints": (served,), "messages": {}}
+    return recording(**{**found, "asked": requests, **changes})
 
 
 def value_message(value: Any) -> dict[str, Any]:

@@ -49,10 +49,12 @@ from tests.checks.requests import (
     acting,
     action,
     asked,
+    asking,
     canceled,
     parameters_read,
     service,
     serving,
+    to_service,
 )
 from tests.checks.test_interface import CMAKE, INTERFACE, handed_in, unbuilt
 from tests.checks.test_package import NEEDS_NAV2
@@ -298,6 +300,17 @@ CASES: list[Group] = [
             "NoAnswer.never_spun": serving(asked(1.0, None), declarations=declarations(spin=False)),
             "NoAnswer.blocked_executor": serving(asked(1.0, None), *HANGS),
             "NoAnswer.callback_does_not_answer": serving(asked(1.0, None)),
+        },
+    ),
+    (
+        "client.asks",
+        {"server": "/enable", "sequence": [{}, {}]},
+        {
+            "NotAsked.no_client NoEndpoint.misspelt_name": asking(clients=(service("/enabel"),)),
+            "NotAsked.process_failed ProcessExit.raised": asking(to_service(), **CRASH),
+            "NotAsked.waits_in_a_callback": asking(to_service(0.7), calls=HANGS),
+            "NotAsked.stops_after_a_failure": asking(to_service(1.0, None, status="unanswered")),
+            "NotAsked.too_few": asking(to_service()),
         },
     ),
     (

@@ -23,6 +23,10 @@ class ScenarioOfStimuli(Protocol):
         """All stimuli, itself among them."""
 
     @property
+    def world(self) -> str | None:
+        """The world file, if there is a simulated robot."""
+
+    @property
     def recorded_types(self) -> Mapping[str, str]:
         """Types of the recorded topics, by topic."""
 
@@ -55,6 +59,10 @@ class Making:
         raise StimulusError(text, (key,))
 
 
+Models = dict[str, type[Model]]
+"""Heading in the documentation -> model."""
+
+
 class StimulusModel(Model):
     """Base of the models of stimuli, which lie in ``kinds/`` and are marked with :func:`kind`."""
 
@@ -62,6 +70,8 @@ class StimulusModel(Model):
     """The key of the YAML that tells it."""
     heading: ClassVar[str] = ""
     """Its heading in the documentation; by default the key."""
+    inner: ClassVar[Models] = {}
+    """What stands below one of its keys."""
 
     @classmethod
     def accepts(cls, value: Mapping[str, Any]) -> bool:

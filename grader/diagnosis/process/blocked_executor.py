@@ -21,8 +21,8 @@ _SLOW_S = 0.5
 
 HINT = (
     "A callback must return soon. Look for `while True`, time.sleep() or input() in a callback, in "
-    "the constructor or in main(), for rclpy.spin() or rate.sleep() in a callback, and for a node "
-    "that is not given to rclpy.spin()."
+    "the constructor or in main(), for rclpy.spin() or rate.sleep() in a callback, for a client's "
+    "call() in a callback, and for a node that is not given to rclpy.spin()."
 )
 
 

@@ -126,17 +126,19 @@ def interrupted_place(
 ) -> SourceError | None:
     """Where in the student's files a process was when SIGINT came, as its traceback tells.
 
-    A process that was in ``rclpy.spin`` was where it should be: that place is not returned.
+    A process that was in ``rclpy.spin`` was where it should be: that place is not returned,
+    unless a callback spins.
 
     Args:
         in_callback: Only if rclpy had called it: a loop in main() is no callback.
     """
     found = [item for item in failures(recording, process) if item.type == "KeyboardInterrupt"]
     frame = _student_frame(found[-1], recording.submission) if found else None
-    if frame is None or "spin" in frame.source:
+    if frame is None:
         return None
     callers = found[-1].frames[: found[-1].frames.index(frame)]
-    if in_callback and not any("/rclpy/" in caller.file for caller in callers):
+    is_called = any("/rclpy/" in caller.file for caller in callers)
+    if not is_called and (in_callback or "spin" in frame.source):
         return None
     path = submission_path(frame.file, recording.submission) or frame.file
     source = f": {frame.source}" if frame.source else ""

@@ -99,6 +99,7 @@ class Cell:
             order.limits,
             self._start_again,
             self._waits,
+            self._robot,
         )
         self._player = Player(order.stimuli, self._context)
         self._ending = EndingConditions(probe, self._output, self._robot, self._player)
@@ -152,6 +153,8 @@ class Cell:
             declarations=self._output.declarations,
             calls=tuple(sorted(calls, key=lambda call: call.requested_ns)),
             services=self._graph.services,
+            clients=self._graph.clients,
+            asked=tuple(self._context.asked),
             goals=tuple(self._context.goals),
             waits=tuple(self._waits),
             joins=tuple(self._context.joins.values()),
@@ -260,6 +263,8 @@ class Cell:
         expected = [f"a publisher on {names}"] if names else []
         if self._player.topics:
             expected.append(f"a subscription on {', '.join(self._player.topics)}")
+        if self._player.servers:
+            expected.append(f"a client of {', '.join(self._player.servers)}")
         if not expected:
             self._matched_ns = time.time_ns()
             return None
@@ -285,9 +290,10 @@ class Cell:
         return None
 
     def _match(self) -> bool:
-        matching = [e for e in self._graph.endpoints if self._probe.matches(e)]
+        matching: list[Any] = [e for e in self._graph.endpoints if self._probe.matches(e)]
         for endpoint in matching:
             self._probe.subscribe_leniently(endpoint)
+        matching += [one for one in self._graph.clients if one.name in self._player.servers]
         for topic in self._player.topics:
             matching += self._context.endpoints(Kind.SUBSCRIPTION, topic)
         if matching and self._matched_ns is None:

@@ -24,6 +24,7 @@ _INFRASTRUCTURE = ("/rosout", "/parameter_events")
 _UNKNOWN_NAME = "_NODE_NAME_UNKNOWN_"
 _INFINITE_NS = 2**63 - 1
 _Found = TypeVar("_Found")
+_OfNode = Callable[[str, str], list[tuple[str, list[str]]]]
 
 
 def full_name(namespace: str, name: str) -> str:
@@ -95,6 +96,7 @@ class GraphObserver:
         self._endpoints: dict[str, Endpoint] = {}
         self._owners: dict[str, Owner] = {}
         self._services: dict[tuple[str, str, str], Service] = {}
+        self._clients: dict[tuple[str, str, str], Service] = {}
         self._private = private
         self.forbidden_names = False
         self.changed_ns = 0
@@ -117,6 +119,11 @@ class GraphObserver:
         """Every service that a node of the student's has offered so far."""
         return tuple(self._services.values())
 
+    @property
+    def clients(self) -> tuple[Service, ...]:
+        """Every service that a node of the student's has had a client of so far."""
+        return tuple(self._clients.values())
+
     def poll(self) -> None:
         """Look at the graph once."""
         now_ns = time.time_ns()
@@ -132,7 +139,10 @@ class GraphObserver:
                         gids.add(self._see_endpoint(kind, topic, info, now_ns))
         _note_vanished(self._nodes, nodes, now_ns)
         _note_vanished(self._endpoints, gids, now_ns)
-        self._see_services(now_ns)
+        of_node = self._node.get_service_names_and_types_by_node
+        self._see_services(self._services, of_node, now_ns)
+        of_node = self._node.get_client_names_and_types_by_node
+        self._see_services(self._clients, of_node, now_ns)
 
     def _found(self, ask: Callable[[], Iterable[_Found]]) -> Iterable[_Found]:
         """What a question about the graph finds: nothing where ROS does not allow a name in it."""
@@ -148,11 +158,11 @@ class GraphObserver:
             return self._node.get_publishers_info_by_topic(topic)
         return self._node.get_subscriptions_info_by_topic(topic)
 
-    def _services_of(self, base: str, namespace: str) -> list[tuple[str, list[str]]]:
+    def _services_of(self, ask: _OfNode, base: str, namespace: str) -> list[tuple[str, list[str]]]:
         validate_node_name(base)
         validate_namespace(namespace)
         try:
-            return self._node.get_service_names_and_types_by_node(base, namespace)
+            return ask(base, namespace)
         except NodeNameNonExistentError:
             return []
 
@@ -187,20 +197,22 @@ class GraphObserver:
             self.changed_ns = now_ns
         return key
 
-    def _see_services(self, now_ns: int) -> None:
+    def _see_services(
+        self, services: dict[tuple[str, str, str], Service], of_node: _OfNode, now_ns: int
+    ) -> None:
         seen: set[tuple[str, str, str]] = set()
         there = [one for one in self._nodes.values() if one.vanished_ns is None]
         for name in {one.name for one in there if one.owner is Owner.STUDENT}:
             namespace, _, base = name.rpartition("/")
-            found = self._found(partial(self._services_of, base, namespace or "/"))
+            found = self._found(partial(self._services_of, of_node, base, namespace or "/"))
             seen |= {(service, kind, name) for service, kinds in found for kind in kinds}
         for key in seen:
-            known = self._services.get(key)
+            known = services.get(key)
             if known is None or known.vanished_ns is not None:
                 first_ns = known.appeared_ns if known is not None else now_ns
-                self._services[key] = Service(*key, appeared_ns=first_ns)
+                services[key] = Service(*key, appeared_ns=first_ns)
                 self.changed_ns = now_ns
-        _note_vanished(self._services, seen, now_ns)
+        _note_vanished(services, seen, now_ns)
 
     def _owner(self, gid: bytes) -> Owner:
         participant = gid[:12].hex()

@@ -23,6 +23,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
+from grader.recording.interface import FEEDBACK
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import NS, Call, Endpoint, Kind, LogLine, Owner
 from grader.run.order import RunLimits, Topic
@@ -42,9 +43,10 @@ _LEVELS = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "FATAL"}
 
 def import_interface(name: str) -> Any:
     """Import a message class by its interface name."""
-    package, kind, short = name.split("/")
+    package, kind, short = name.removesuffix(FEEDBACK).split("/")
     try:
-        return getattr(importlib.import_module(f"{package}.{kind}"), short)
+        found = getattr(importlib.import_module(f"{package}.{kind}"), short)
+        return found.Impl.FeedbackMessage if name.endswith(FEEDBACK) else found
     except AttributeError as error:
         raise ImportError(f"no interface {name}") from error
 

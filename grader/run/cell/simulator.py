@@ -16,6 +16,7 @@ from grader.recording.model import NS
 from grader.recording.simulated import Incident, Scene, Truth
 from grader.run.order import SimulatorOrder
 from sim.description import SimulatorOptions
+from sim.motion import Pose, Twist
 from sim.node import RosSimulator
 from sim.pacing import Lateness
 from sim.simulation import Simulation, Step, make_simulation
@@ -56,6 +57,16 @@ class SimulatedRobot:
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()
+
+    @property
+    def pose(self) -> Pose:
+        """Where it is."""
+        now = self.truth[-1] if self.truth else None
+        return Pose(now.x_m, now.y_m, now.yaw_rad) if now else self._start
+
+    def drive(self, twist: Twist) -> None:
+        """Command it from here, and not by a topic that the student publishes on too."""
+        self._ros.drive(twist)
 
     @property
     def at_rest_s(self) -> float:

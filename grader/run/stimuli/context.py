@@ -6,10 +6,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from grader.recording.event import Intervention, Wait
-from grader.recording.interaction import EXECUTOR_SERVICES, Goal
+from grader.recording.interaction import EXECUTOR_SERVICES, Asked, Goal
 from grader.recording.model import NS, Endpoint, Join, Kind, Owner
 from grader.run.cell.graph import GraphObserver
 from grader.run.cell.probe import Probe
@@ -17,6 +17,9 @@ from grader.run.host.disturbance import DisturbanceMeter, Stopwatch
 from grader.run.order import RunLimits
 from grader.run.process.student import StudentProcesses
 from grader.run.stimuli.service_calls import ServiceCalls
+
+if TYPE_CHECKING:
+    from grader.run.cell.simulator import SimulatedRobot
 
 # A node that has added nothing to the graph for so long has left its constructor, or hangs in it.
 _SET_UP_S = 0.5
@@ -44,6 +47,8 @@ class StimulusContext:
     limits: RunLimits
     start: Callable[[str], None]
     waits: list[Wait]
+    robot: SimulatedRobot | None = None
+    asked: list[Asked] = field(default_factory=list)
     joins: dict[str, Join] = field(default_factory=dict)
     interventions: list[Intervention] = field(default_factory=list)
     goals: list[Goal] = field(default_factory=list)
@@ -136,6 +141,9 @@ class Playing:
 
     topic: str | None = None
     """Topic on which a subscription of the student's counts as the first match."""
+
+    server: str | None = None
+    """Service of the probe of which a client of the student's counts as the first match."""
 
     last_ns: int | None = None
     """When it last published something, if there is an end to that."""

@@ -43,6 +43,11 @@ class Player:
         return tuple(sorted({item.topic for item in self._playing if item.topic}))
 
     @property
+    def servers(self) -> tuple[str, ...]:
+        """Services of which a client of the student's is expected."""
+        return tuple(sorted({item.server for item in self._playing if item.server}))
+
+    @property
     def answers(self) -> dict[str, str]:
         """Topic that is published on -> topic on which its answers are expected."""
         return {one.topic: one.answer for one in self._playing if one.topic and one.answer}

@@ -1,0 +1,216 @@
+"""The stimuli that offer a service or an action to clients of the student."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field
+
+from grader.assignment.stimuli.message import StimulusError, part_of, read_message
+from grader.assignment.stimuli.stimulus_model import (
+    Making,
+    Models,
+    ScenarioOfStimuli,
+    StimulusModel,
+    kind,
+)
+from grader.spec.document import Place
+from grader.spec.name import InterfaceName, TopicName
+from grader.spec.quantity import Duration, DurationOrZero, Speed
+from grader.spec.source import Model
+
+_Lasting = DurationOrZero | Literal["forever"]
+_After = Annotated[
+    DurationOrZero,
+    Field(
+        description="When the server appears, counted from the first match; by default before the "
+        "launch. A client that does not wait for it loses its request."
+    ),
+]
+
+
+class Answer(Model):
+    """What an answer to a request, and one to a goal, have in common."""
+
+    parts: ClassVar[dict[str, int]] = {"when": 0}
+    """Keys with fields of the interface -> which part of its definition has them."""
+
+    when: dict[str, Any] = Field(
+        default_factory=dict,
+        description="Fields of the request or goal that this answer is for; by default any.",
+    )
+    delay: _Lasting = Field(
+        0.0, description="Time until it is given; `forever` for a request that gets no answer."
+    )
+
+
+class ServiceAnswer(Answer):
+    """One answer of a served service."""
+
+    parts: ClassVar[dict[str, int]] = {"when": 0, "response": 1}
+
+    response: dict[str, Any] = Field(
+        default_factory=dict, description="The fields of the response; an omitted field is zero."
+    )
+
+
+class DriveTo(Model):
+    """How a served action drives the simulated robot."""
+
+    to: str = Field(
+        description="Field of the goal with the pose, such as `pose`: a Pose, a PoseStamped, a "
+        "Point or a Pose2D, in the frame of the world. A quaternion of zeros: any heading."
+    )
+    distance: str | None = Field(
+        None, description="Field of the feedback that gets the distance that remains."
+    )
+    speed: Speed = Field(0.2, description="How fast it drives.")
+
+
+class GoalAnswer(Answer):
+    """One answer of a served action: what becomes of a goal."""
+
+    parts: ClassVar[dict[str, int]] = {"when": 0, "result": 1, "feedback": 2}
+
+    accept: bool = Field(True, description="Whether the goal is accepted.")
+    takes: _Lasting = Field(
+        0.0,
+        description="Time from the acceptance to the end of the goal, by default as long as its "
+        "feedback lasts; `forever` if only a cancel request ends it. With `drive` the longest "
+        "time: the goal is aborted then.",
+    )
+    feedback: tuple[dict[str, Any], ...] = Field(
+        (), description="Feedback messages, one after another; the last one is repeated."
+    )
+    every: Duration = Field(0.1, description="Time between two feedback messages.")
+    status: Literal["succeeded", "aborted"] = Field("succeeded", description="How the goal ends.")
+    result: dict[str, Any] = Field(
+        default_factory=dict, description="The fields of the result, whatever the status."
+    )
+    cancel: Literal["accept", "reject"] = Field(
+        "accept", description="Answer to a cancel request; an accepted one ends the goal at once."
+    )
+    drive: DriveTo | None = Field(
+        None, description="Drive the simulated robot to the pose of the goal, which then succeeds."
+    )
+
+
+class Serve(StimulusModel):
+    """Part of both: a server with its name, its type and its answers."""
+
+    key = "serve"
+    folder: ClassVar[str]
+    usual: ClassVar[Answer]
+    """The answer where none is given."""
+
+    serve: TopicName = Field(description="Fully qualified name.")
+    after: _After = 0.0
+    type: InterfaceName
+    answers: tuple[Any, ...] = ()
+
+    @classmethod
+    def accepts(cls, value: Mapping[str, Any]) -> bool:
+        """Whether its type is a service; the first kind, and else an action."""
+        return cls.folder == "action" or "/srv/" in str(value.get("type"))
+
+    @property
+    def exchanged(self) -> tuple[str, str]:
+        """The service or action, and its type."""
+        return self.serve, self.type
+
+    def order(self, making: Making) -> dict[str, Any]:
+        """The server and what it answers."""
+        if f"/{self.folder}/" not in self.type:
+            raise StimulusError("expected an interface in srv or action", ("type",))
+        answers = self.answers or (self.usual,)
+        return {
+            "kind": f"{type(self).__name__}Order",
+            "name": self.serve,
+            "type": self.type,
+            "after_s": self.after,
+            "answers": [self._read(one, n, making) for n, one in enumerate(answers)],
+        }
+
+    def _read(self, answer: Answer, number: int, making: Making) -> dict[str, Any]:
+        def read(value: Mapping[str, Any], part: int, *place: str | int) -> dict[str, Any]:
+            find = part_of(making.find, self.type, part)
+            inside = ("answers", number, *place)
+            return read_message(value, self.type, find, making.drawn, inside)
+
+        found = answer.model_dump()
+        for key in ("delay", "takes"):
+            if found.get(key) == "forever":
+                found[key] = math.inf
+        if isinstance(answer, GoalAnswer):
+            if "takes" not in answer.model_fields_set:
+                found["takes"] = len(answer.feedback) * answer.every
+            if answer.drive is not None:
+                read({answer.drive.to: {}}, 0, "drive", "to")
+            if answer.drive is not None and answer.drive.distance is not None:
+                read({answer.drive.distance: 0.0}, 2, "drive", "distance")
+        for key, part in answer.parts.items():
+            value = getattr(answer, key)
+            if isinstance(value, tuple):
+                found[key] = [read(one, part, key, index) for index, one in enumerate(value)]
+            else:
+                found[key] = read(value, part, key)
+        return found
+
+    def mistakes(self, making: Making, scenario: ScenarioOfStimuli) -> Iterator[tuple[Place, str]]:
+        """It stands twice, or drives a robot that is not there, or its answers do not fit."""
+        alike = [one for one in scenario.stimuli if isinstance(one, Serve)]
+        if next(one for one in alike if one.serve == self.serve) is not self:
+            yield ("serve",), f"{self.serve!r} stands twice: give one server several 'answers'"
+        for number, answer in enumerate(self.answers):
+            if getattr(answer, "drive", None) is not None and scenario.world is None:
+                text = "there is a simulated robot only in a 'world', which is missing"
+                yield ("answers", number, "drive"), text
+        yield from super().mistakes(making, scenario)
+
+
+@kind
+class ServeService(Serve):
+    """Offer a service that the student's node calls.
+
+    Each answer of the list is given once, in order, to a request with its `when`. The last one that
+    fits is given again and again. A request that none fits gets a response of zeros. Requests and
+    responses are in the recording's `served_calls`. Values may use `$name` of `random` and
+    quantities such as `30 deg`. The stimulus is `done` 1 s after every answer was given.
+    """
+
+    heading = "serve a service"
+    inner: ClassVar[Models] = {"answers of a service": ServiceAnswer}
+    folder = "srv"
+    usual = ServiceAnswer()
+
+    type: InterfaceName = Field(description="Interface, such as std_srvs/srv/SetBool.")
+    answers: tuple[ServiceAnswer, ...] = Field(
+        (), description="What it answers, one after another; by default zeros."
+    )
+
+
+@kind
+class ServeAction(Serve):
+    """Offer an action that the student's node sends goals to.
+
+    Answers are chosen as those of a served service are. A goal that none fits is rejected. Goals,
+    cancel requests and what became of them are in the recording's `served_goals`. The stimulus is
+    `done` 1 s after every answer was given and its goal has ended.
+    """
+
+    heading = "serve an action"
+    inner: ClassVar[Models] = {
+        "answers of an action": GoalAnswer,
+        "answers of an action: drive": DriveTo,
+    }
+    folder = "action"
+    usual = GoalAnswer()
+
+    type: InterfaceName = Field(
+        description="Interface, such as example_interfaces/action/Fibonacci."
+    )
+    answers: tuple[GoalAnswer, ...] = Field(
+        (), description="What becomes of goals, one after another; by default they succeed at once."
+    )

@@ -1,0 +1,1 @@
+"""Checks of what clients of the student ask of the scenario's servers."""

@@ -1,0 +1,144 @@
+"""Why a client of the student asked less of a server than it should: one cause, the deepest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.no_answer import why_raised, why_taken
+from grader.diagnosis.no_endpoint import ACTION_CLIENT, CLIENT, why_not_offered
+from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spun
+from grader.diagnosis.process.process_exit import why_crashed
+from grader.findings.fields import brief, words
+from grader.findings.finding import Evidence, Moment, Table
+from grader.findings.first_seen import until_the_end
+from grader.findings.wording import code
+from grader.recording.interaction import Asked
+from grader.recording.model import Recording
+
+_NO_DEADLOCK = (
+    "A callback must not wait for an answer: the executor that called it has to take the answer "
+    "in. Instead of call() or spin_until_future_complete() use call_async() or send_goal_async(), "
+    "return, and go on in the callback of future.add_done_callback()."
+)
+_WAIT = (
+    "Before the first request wait for the server, client.wait_for_service(timeout_sec=1.0) or "
+    "wait_for_server(timeout_sec=1.0) of an action client: what is sent before is lost. Then look "
+    "whether the line that sends is reached."
+)
+_AFTER = {
+    "unanswered": "Give up after some time: spin_until_future_complete() takes timeout_sec, and a "
+    "timer can look at future.done().",
+    "rejected": "Look at goal_handle.accepted first: a rejected goal has no result to wait for.",
+    "aborted": "Look at the status that get_result_async() gives, and go on whatever it is.",
+    "canceled": "Look at the status that get_result_async() gives, and go on whatever it is.",
+}
+"""What to try where nothing follows something that ended so."""
+_MOST_ROWS = 50
+
+
+@dataclass(frozen=True)
+class NotAsked(Symptom[Cause]):
+    """Fewer requests or goals came to a server of the scenario than expected."""
+
+    recording: Recording
+    server: str
+    needed: int
+
+    @property
+    def asked(self) -> tuple[Asked, ...]:
+        """What came."""
+        return self.recording.asked_of(self.server)
+
+    @property
+    def is_action(self) -> bool:
+        """Whether the server is an action, by its topics."""
+        return any(end.topic == f"{self.server}/_action/status" for end in self.recording.endpoints)
+
+    @property
+    def seen(self) -> str:
+        """The symptom in words."""
+        number = f"only {len(self.asked)} of {self.needed}" if self.asked else "none"
+        noun = "goals" if self.is_action else "requests"
+        return f"of the {noun} to {code(self.server)} {number} came"
+
+    @property
+    def nodes(self) -> set[str]:
+        """The nodes that have a client of it."""
+        clients = self.recording.clients
+        names = (self.server, f"{self.server}/_action/send_goal")
+        return {one.node for one in clients if one.name in names}
+
+    @property
+    def since_ns(self) -> int:
+        """When the last one came, or the launch."""
+        return self.asked[-1].asked_ns if self.asked else self.recording.launched_ns
+
+
+def why_not_asked(recording: Recording, server: str, needed: int) -> Cause:
+    """Why fewer requests or goals came than needed."""
+    return cause_of(NotAsked(recording, server, needed))
+
+
+@explanation(NotAsked)
+def no_client(symptom: NotAsked) -> Cause | None:
+    """There is no client: it is missing, or its name is misspelt."""
+    word = ACTION_CLIENT if symptom.is_action else CLIENT
+    there = symptom.asked or symptom.nodes
+    return None if there else why_not_offered(symptom.recording, word, symptom.server)
+
+
+@explanation(NotAsked)
+def process_failed(symptom: NotAsked) -> Cause | None:
+    """The process ended with a failure, or a callback raised an exception."""
+    crashed = why_crashed(symptom.recording)
+    raised = why_raised(symptom.recording, symptom.seen, symptom.since_ns)
+    return crashed.after(symptom.seen) if crashed is not None else raised
+
+
+@explanation(NotAsked)
+def waits_in_a_callback(symptom: NotAsked) -> Cause | None:
+    """call() or spin_until_future_complete() in a callback waits for an answer, and blocks it."""
+    recording, seen = symptom.recording, symptom.seen
+    blocked = why_blocked(recording, seen, symptom.nodes, symptom.since_ns)
+    if blocked is not None and symptom.asked:
+        return replace(blocked, hint=_NO_DEADLOCK)
+    return blocked or why_never_spun(recording, seen, symptom.nodes)
+
+
+@explanation(NotAsked)
+def stops_after_a_failure(symptom: NotAsked) -> Cause | None:
+    """Nothing follows a goal that was rejected or aborted, or a request without an answer."""
+    status = symptom.asked[-1].status if symptom.asked else ""
+    if status not in _AFTER:
+        return None
+    seen = f"{symptom.seen}; nothing follows the last one, {status}"
+    return Cause(seen, _AFTER[status], evidence(symptom.recording, symptom.asked))
+
+
+@explanation(NotAsked, general=True)
+def too_few(symptom: NotAsked) -> Cause:
+    """The request was sent before the server was found, or never."""
+    recording, seen = symptom.recording, symptom.seen
+    if symptom.asked:
+        hint = "Send the next one in the callback that takes the answer to the one before."
+        taken = why_taken(recording, seen, symptom.since_ns, recording.stop_ns, 0.0)
+        return taken or Cause(seen, hint, evidence(recording, symptom.asked))
+    moment = until_the_end(recording, "still nothing was asked")
+    return Cause(f"{seen}, although the client was there", _WAIT, Evidence(moments=(moment,)))
+
+
+def evidence(recording: Recording, asked: tuple[Asked, ...]) -> Evidence:
+    """What was asked, and what became of it."""
+    header = ("asked at", "fields", "status", "answer", "ended at")
+    moments, rows = [], []
+    for one in asked[:_MOST_ROWS]:
+        at_s, fields = recording.since_launch_s(one.asked_ns), brief(one.fields)
+        moments.append(Moment(f"asked: {fields}", at_s))
+        answer = words(one.answer) if one.answer is not None else ""
+        end_ns = one.ended_ns
+        end = f"{recording.since_launch_s(end_ns):.2f} s" if end_ns is not None else ""
+        rows.append((f"{at_s:.2f} s", fields, one.status or "open", answer, end))
+    table = Table("What was asked", header, tuple(rows))
+    return Evidence(moments=tuple(moments[:8]), tables=(table,) if rows else ())
