@@ -19,11 +19,13 @@ class BoundCheck:
 
     Attributes:
         parameters: Its ``with``, validated by the check's own model.
+        partial: Share of the points -> parameters that give it; the largest share first.
     """
 
     spec: CheckSpec
     check: Check
     parameters: Parameters
+    partial: tuple[tuple[float, Parameters], ...] = ()
 
     @property
     def title(self) -> str:
@@ -50,4 +52,12 @@ def bind(
     parameters, problems = source.examine(found.parameters, (*place, "with"))
     if parameters is None:
         return None, problems
-    return BoundCheck(spec, found, parameters), []
+    looser: list[tuple[float, Parameters]] = []
+    for number, partial in enumerate(spec.partial):
+        where = (*place, "partial", number, "with")
+        other, mistaken = source.examine(found.parameters, where, base=(*place, "with"))
+        problems += mistaken
+        if other is not None:
+            looser.append((partial.share, other))
+    looser.sort(key=lambda item: -item[0])
+    return BoundCheck(spec, found, parameters, tuple(looser)), problems

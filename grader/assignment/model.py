@@ -27,7 +27,7 @@ from grader.spec.name import (
     Reliability,
     TopicName,
 )
-from grader.spec.quantity import Duration, DurationOrZero, PositiveLength, Size
+from grader.spec.quantity import Duration, DurationOrZero, PositiveLength, Ratio, Size
 from grader.spec.source import Model
 from grader.spec.unit import parse_any
 from sim.description import LidarOptions, OdometryOptions, RobotOptions, Topics
@@ -360,6 +360,22 @@ class Counts(str, Enum):
     MEAN = "mean"
 
 
+class Partial(Model):
+    """Parameters with which a check that fails gives a share of its points."""
+
+    share: Ratio = Field(description="Share of the points, such as `75 %`.")
+    with_: dict[str, Any] = Field(
+        alias="with",
+        description="Parameters that differ from those of the check, such as `{position: 10 cm}`.",
+    )
+
+    @model_validator(mode="after")
+    def _below_all(self) -> Partial:
+        if self.share >= 1.0:
+            raise ValueError("the share is below 100 %: all points need the check's own parameters")
+        return self
+
+
 class CheckSpec(Model):
     """A check with its points."""
 
@@ -405,6 +421,9 @@ class CheckSpec(Model):
         None, description="Judge only what is observed until then, counted from the same."
     )
     points: float = Field(ge=0, description="Points for passing.")
+    partial: tuple[Partial, ...] = Field(
+        (), description="Looser parameters that give a share of the points if the check fails."
+    )
     requires: tuple[Id, ...] = Field(
         (), description="Checks that must pass; otherwise this check is skipped."
     )

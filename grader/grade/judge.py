@@ -19,6 +19,7 @@ from grader.checks.check import Subject
 from grader.checks.doubt import is_doubtful
 from grader.diagnosis.not_built import why_lacking, why_not_built
 from grader.findings.finding import Finding, Status
+from grader.findings.wording import percent
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
 from grader.grade.naming import named
 from grader.grade.runtime_imports import with_runtime_imports
@@ -228,6 +229,8 @@ def _judge(
             finding = judge(subject, bound.parameters)
         misuse = _misuse(finding)
         failed = not misuse and finding.status is Status.FAILED
+        if failed:
+            finding = _with_partial_credit(bound, subject, finding)
         if failed and isinstance(subject, Recording):
             doubtful = is_doubtful(subject, bound.parameters.doubt)
             finding = replace(finding, disturbed=doubtful or finding.disturbed)
@@ -239,6 +242,20 @@ def _judge(
     if misuse:
         return ScenarioFinding(scenario, _fault(f"the check {bound.check.name!r} {misuse}"))
     return ScenarioFinding(scenario, finding)
+
+
+def _with_partial_credit(
+    bound: BoundCheck, subject: SubmissionRecord | Recording, finding: Finding
+) -> Finding:
+    """The finding of a check that failed, with the credit that looser parameters give."""
+    for share, parameters in bound.partial:
+        looser = bound.check.judge(subject, parameters)
+        if looser.status is Status.ERROR:
+            return looser
+        if looser.status is Status.PASSED and share > finding.credit:
+            seen = f"{finding.observed}; this gives {percent(share)} of the points"
+            return replace(finding, observed=seen, credit=share)
+    return finding
 
 
 def _misuse(finding: Any) -> str:

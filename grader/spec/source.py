@@ -73,15 +73,21 @@ class Source:
             raise AssignmentError(self.file, problems)
         return result
 
-    def examine(self, model: type[M], place: Place = ()) -> tuple[M | None, list[Problem]]:
+    def examine(
+        self, model: type[M], place: Place = (), base: Place | None = None
+    ) -> tuple[M | None, list[Problem]]:
         """Validate a part; one that was not written down reads as empty.
+
+        Args:
+            base: A part whose keys hold where the other part has none of that name.
 
         Returns:
             The model and no problem, or None and at least one.
         """
         # Strict in the way of JSON: a list is a tuple and a word is an enum's member, but true
         # is no number and '3' neither. By alias only: the name in Python is no key of the YAML.
-        text = json.dumps(self._part(place))
+        part = self._part(place)
+        text = json.dumps(part if base is None else {**self._part(base), **part})
         try:
             return model.model_validate_json(text, strict=True, by_alias=True, by_name=False), []
         except ValidationError as error:
