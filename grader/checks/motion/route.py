@@ -1,0 +1,228 @@
+"""Checks of the way that a robot takes: places that it visits, the distance that it keeps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from grader.checks.check import Subject, check, stop_if
+from grader.checks.motion.robot_check import RobotParameters
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.motion.no_motion import why_not_moved
+from grader.diagnosis.motion.off_course import why_off_course
+from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.wording import counted, listing, percent
+from grader.measure.motion.ground import nearest
+from grader.measure.motion.quantities import metres, point
+from grader.measure.motion.track import evidence_at, is_at_rest, over_time, speed_plot, way_m
+from grader.recording.model import NS, Recording
+from grader.recording.simulated import Scene, Truth
+from grader.spec.quantity import Duration, Length, PositiveLength, Ratio
+from grader.spec.unit import format_duration
+from sim.coordinates import Metres
+
+# A step lasts for 10 ms.
+_STRIDE = 5
+
+
+def _point_or_zone(numbers: tuple[float, ...]) -> tuple[float, ...]:
+    if len(numbers) not in (2, 4):
+        raise ValueError("write a point as [x, y], a zone as [x_min, y_min, x_max, y_max]")
+    return numbers
+
+
+Place = Annotated[tuple[Metres, ...], AfterValidator(_point_or_zone)]
+
+
+class Visits(RobotParameters):
+    """Parameters of motion.visits."""
+
+    places: tuple[Place, ...] = Field(
+        min_length=1,
+        description="Points `[x, y]` or zones `[x_min, y_min, x_max, y_max]` in the world's frame.",
+    )
+    position: PositiveLength = Field(0.1, description="How near a point counts as visited.")
+    ordered: bool = Field(True, description="Whether the order of the places matters.")
+    pause: Duration | None = Field(
+        None, description="Least time at rest at each place; by default it may drive through."
+    )
+
+    def _asked(self) -> str:
+        rest = f", at rest for {format_duration(self.pause)} at each" if self.pause else ""
+        order = " in this order" if self.ordered and len(self.places) > 1 else ""
+        return f"visits {listing(map(_words, self.places))}{order}{rest}"
+
+    def is_at(self, place: Sequence[float], step: Truth) -> bool:
+        """Whether the robot is at a place."""
+        if len(place) == 2:
+            return math.hypot(step.x_m - place[0], step.y_m - place[1]) <= self.position
+        x_min, y_min, x_max, y_max = place
+        return x_min <= step.x_m <= x_max and y_min <= step.y_m <= y_max
+
+
+def _words(place: Sequence[float]) -> str:
+    if len(place) == 2:
+        return point(*place)
+    x_min, y_min, x_max, y_max = place
+    return f"the zone from {point(x_min, y_min)} to {point(x_max, y_max)}"
+
+
+@check("motion.visits", Subject.RECORDING, Visits)
+def visits(recording: Recording, parameters: Visits) -> Finding:
+    """The robot visits the places.
+
+    Judged by the true position of its middle. With `ordered`, a place counts once those before it
+    have been visited. Each place gives an equal share of the points.
+    """
+    stop_if(why_not_moved(recording))
+    moments = _visits(recording.truth, parameters)
+    plots = (speed_plot(recording),)
+    evidence = Evidence(
+        moments=tuple(
+            Moment(f"at {_words(parameters.places[number])}", recording.since_launch_s(time_ns))
+            for number, time_ns in moments.items()
+        ),
+        plots=plots,
+    )
+    missed = [place for number, place in enumerate(parameters.places) if number not in moments]
+    if not missed:
+        return Finding.passed(
+            parameters.asked_for, f"all of them on {metres(way_m(recording.truth))}", evidence
+        )
+    seen = f"{len(moments)} of {counted(len(parameters.places), 'place')}"
+    nearest_m, step = _nearest(recording.truth, missed[0], parameters)
+    moment = Moment(f"nearest to {_words(missed[0])}", recording.since_launch_s(step.time_ns))
+    near = f"; it came within {metres(nearest_m)} of {_words(missed[0])}"
+    if parameters.is_at(missed[0], step):
+        short = f"at rest for less than {format_duration(parameters.pause or 0.0)}"
+        how = short if parameters.pause else "only before the places before it"
+        near = f"; it was at {_words(missed[0])}, {how}"
+    cause = why_off_course(recording) or Cause(
+        f"{seen}{near}",
+        "Go on to the next place once the distance to this one is below your tolerance"
+        + (", and publish zeros for the time of the pause." if parameters.pause else "."),
+        Evidence((*evidence.moments, moment), plots=plots),
+    )
+    credit = len(moments) / len(parameters.places)
+    return Finding.failed(
+        parameters.asked_for, cause.observed, cause.hint, cause.evidence, credit=credit
+    )
+
+
+def _visits(truth: Sequence[Truth], parameters: Visits) -> dict[int, int]:
+    """Number of each visited place -> when the visit was complete."""
+    found: dict[int, int] = {}
+    since: dict[int, int] = {}
+    pause_ns = round((parameters.pause or 0.0) * NS)
+    for step in truth:
+        for number, place in enumerate(parameters.places):
+            if number in found:
+                continue
+            counts = parameters.is_at(place, step) and (not pause_ns or is_at_rest(step))
+            if not counts:
+                since.pop(number, None)
+            elif step.time_ns - since.setdefault(number, step.time_ns) >= pause_ns:
+                found[number] = step.time_ns
+            if parameters.ordered and number not in found:
+                break
+    return found
+
+
+def _nearest(
+    truth: Sequence[Truth], place: Sequence[float], parameters: Visits
+) -> tuple[float, Truth]:
+    """How near the robot came to a place, and when."""
+    middle = place if len(place) == 2 else ((place[0] + place[2]) / 2, (place[1] + place[3]) / 2)
+
+    def distance_m(step: Truth) -> float:
+        return math.hypot(step.x_m - middle[0], step.y_m - middle[1])
+
+    inside = [step for step in truth if parameters.is_at(place, step)]
+    step = min(inside or truth, key=distance_m)
+    return distance_m(step), step
+
+
+class KeepsDistance(RobotParameters):
+    """Parameters of motion.keeps_distance."""
+
+    distance: PositiveLength = Field(
+        description="Distance from the LiDAR to the nearest obstacle, such as the wall."
+    )
+    tolerance: Length = Field(0.1, description="How far the distance may be off.")
+    side: Literal["left", "right", "any"] = Field(
+        "any", description="On which side of the robot the obstacle is."
+    )
+    way: PositiveLength = Field(1.0, description="Least way that it drives at this distance.")
+    share: Ratio = Field(
+        0.9, description="Share of the way that must be at this distance, from when it first is."
+    )
+
+    def _asked(self) -> str:
+        where = "" if self.side == "any" else f" on its {self.side}"
+        return (
+            f"drives {metres(self.way)} or more with the obstacle{where} at "
+            f"{metres(self.distance)} ± {metres(self.tolerance)}"
+        )
+
+
+@check("motion.keeps_distance", Subject.RECORDING, KeepsDistance)
+def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding:
+    """The robot keeps its distance from a wall.
+
+    Judged by the true distance to the nearest obstacle, from the moment at which it is right for
+    the first time. Way counts, not time: standing still neither helps nor costs.
+    """
+    stop_if(why_not_moved(recording))
+    scene = recording.scene
+    assert scene is not None
+    truth = recording.truth[::_STRIDE]
+    kept = [_is_right(scene, step, parameters) for step in truth]
+    band = (
+        parameters.distance - parameters.tolerance,
+        parameters.distance + parameters.tolerance,
+    )
+    plot = over_time(
+        recording, "Distance to the nearest obstacle", "distance (m)", _distance(scene), band
+    )
+    begin = next((index for index, is_right in enumerate(kept) if is_right), None)
+    if begin is None:
+        cause = why_off_course(recording) or Cause(
+            "it never was at this distance",
+            "Look at the plot of the distance: which range does the node compare?",
+            evidence_at(recording, "the run began", truth[0].time_ns, plot),
+        )
+        return cause.finding(parameters.asked_for)
+    steps = list(zip(truth[begin:], truth[begin + 1 :], kept[begin + 1 :], strict=False))
+    whole_m = sum(way_m((a, b)) for a, b, _ in steps)
+    right_m = sum(way_m((a, b)) for a, b, is_right in steps if is_right)
+    ratio = right_m / whole_m if whole_m else 0.0
+    seen = f"{metres(right_m)} of {metres(whole_m)} at this distance ({percent(round(ratio, 2))})"
+    evidence = evidence_at(recording, "first at this distance", truth[begin].time_ns, plot)
+    if right_m >= parameters.way and ratio >= parameters.share:
+        return Finding.passed(parameters.asked_for, seen, evidence)
+    cause = why_off_course(recording) or Cause(
+        seen,
+        "Turn towards the wall where it is too far, and away where it is too near: angular.z is a "
+        "gain times the error, with the sign of REP-103 (positive is left).",
+        evidence,
+    )
+    return cause.finding(parameters.asked_for)
+
+
+def _distance(scene: Scene) -> Callable[[Truth], float | None]:
+    def distance_m(step: Truth) -> float | None:
+        sight = nearest(scene, step)
+        return None if sight is None else sight.distance_m
+
+    return distance_m
+
+
+def _is_right(scene: Scene, step: Truth, parameters: KeepsDistance) -> bool:
+    sight = nearest(scene, step)
+    if sight is None or abs(sight.distance_m - parameters.distance) > parameters.tolerance:
+        return False
+    side = "left" if sight.bearing_rad > 0.0 else "right"
+    return parameters.side in ("any", side)

@@ -1,0 +1,85 @@
+"""motion.visits and motion.keeps_distance, on runs of the real simulator core."""
+
+import math
+
+import pytest
+
+from grader.findings.finding import Status
+from tests.checks.builder import drive, failing, judge, on_timer
+
+PLACES = [[0.4, 0], [0.8, 0]]
+
+
+def route(*stops):
+    """Drives straight ahead, and rests for a second at each of some abscissas."""
+    left = list(stops)
+    rested = [0]
+
+    def law(pose):
+        if left and pose.x_m >= left[0] - 0.01:
+            rested[0] += 1
+            if rested[0] > 12:
+                left.pop(0)
+                rested[0] = 0
+            return 0.0, 0.0
+        return (0.2 if left else 0.0), 0.0
+
+    return drive(on_timer(0.1, law), seconds=12.0, rest_s=2.0)
+
+
+def test_places_in_order_with_a_pause_at_each():
+    finding = judge("motion.visits", route(0.4, 0.8), places=PLACES, pause="1 s")
+    assert finding.status is Status.PASSED
+    assert [moment.label for moment in finding.evidence.moments] == [
+        "at (0.40, 0.00) m",
+        "at (0.80, 0.00) m",
+    ]
+
+
+def test_a_place_that_it_only_drives_through_is_told_where_a_pause_is_asked_for():
+    found = failing("motion.visits", route(0.8), places=PLACES, pause="1 s")
+    assert "0 of 2 places; it was at (0.40, 0.00) m, at rest for less than 1 s" in found
+
+
+def test_each_visited_place_gives_its_share():
+    finding = judge("motion.visits", route(0.4), places=[*PLACES, [2, 2]])
+    assert (finding.status, finding.credit) == (Status.FAILED, pytest.approx(1 / 3))
+    assert "1 of 3 places; it came within 0.38 m of (0.80, 0.00) m" in finding.observed
+
+
+def test_the_order_counts_unless_the_author_says_otherwise():
+    backwards = PLACES[::-1]
+    finding = judge("motion.visits", route(0.8), places=backwards)
+    assert "it was at (0.40, 0.00) m, only before the places before it" in finding.observed
+    finding = judge("motion.visits", route(0.8), places=backwards, ordered=False)
+    assert finding.status is Status.PASSED
+
+
+def test_zones_are_visited_by_the_middle_of_the_robot():
+    zones = [[-0.1, -0.1, 0.1, 0.1], [0.5, -0.2, 1, 0.2]]
+    assert judge("motion.visits", route(0.8), places=zones).status is Status.PASSED
+    failing("motion.visits", route(0.8), places=[[0.5, 0.1, 1, 0.2]])
+
+
+WALL = "segments: [[-1, 0.5, 6, 0.5]]"
+
+
+def beside_the_wall(turn):
+    return drive(
+        on_timer(0.1, lambda pose: (0.2, turn(pose))), world=WALL, seconds=8.0, rest_s=None
+    )
+
+
+def test_a_robot_that_follows_the_wall_on_its_left():
+    run = beside_the_wall(lambda pose: -pose.yaw_rad)
+    parameters = {"distance": "0.5 m", "tolerance": "5 cm"}
+    finding = judge("motion.keeps_distance", run, side="left", **parameters)
+    assert finding.status is Status.PASSED
+    assert "at this distance (100 %)" in finding.observed
+    assert "never was" in failing("motion.keeps_distance", run, side="right", **parameters)
+
+
+def test_a_robot_that_drives_away_from_the_wall_fails():
+    run = beside_the_wall(lambda pose: -1.0 if pose.yaw_rad > -math.pi / 4 else 0.0)
+    found = failing("motion.keeps_distance", run, distance="0.5 m", tolerance="10 cm")
+    assert "at this distance" in found
