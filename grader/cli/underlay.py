@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Annotated
 
 import typer
@@ -9,7 +10,6 @@ import typer
 from grader.cli.options import Quiet, SandboxChoice, chosen_sandbox
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
-from grader.findings.wording import counted
 from grader.resources import cache_folder
 from grader.sandbox.choice import Choice
 
@@ -46,17 +46,13 @@ def add(
     from grader.submission.underlay.store import UnderlayStore
 
     found = [find_underlay(given) for given in what]
-    progress = Progress(quiet)
-    installation = ros.find()
+    progress, installation, began_s = Progress(quiet), ros.find(), time.monotonic()
     with progress.shown():
         place = chosen_sandbox(sandbox, progress)
         store = UnderlayStore(cache_folder(), installation, progress.say, place)
-        for underlay in found:
-            for built in store.add(underlay, wait):
-                say(
-                    f"{built.name}: {counted(len(built.packages), 'package')} built "
-                    f"in {built.duration_s:.0f} s"
-                )
+        built = [name for underlay in found for name in store.add(underlay, wait)]
+    if built:
+        say(f"Built in {time.monotonic() - began_s:.0f} s: {', '.join(built)}")
     command = write_command(installation, store)
     if command:
         say(f"The command ros2: {command}")
@@ -72,17 +68,15 @@ def list_command() -> None:
     from grader.submission.underlay.store import UnderlayStore
 
     store = UnderlayStore(cache_folder(), ros.find())
-    built = dict((one.name, one) for one, _ in store.installed())
+    built = {one.name: " ".join(one.packages) for one, _ in store.installed()}
     table = Table("UNDERLAY", "HERE", "PACKAGES", box=None, pad_edge=False)
-    for name in (*named_sets(), *(name for name in built if name not in named_sets())):
-        state, packages = "no", list[str]()
-        if name in named_sets():
-            underlay = find_underlay(name)
-            packages = sorted(underlay.listed)
-            state = "no" if store.missing([underlay]) else "in ROS"
-        if name not in named_sets() or (name in built and state != "no"):
-            state, packages = f"built {built[name].built[:10]}", list(built[name].packages)
-        table.add_row(name, state, " ".join(packages))
+    for name in named_sets():
+        underlay = find_underlay(name)
+        state = "no" if store.missing([underlay]) else "built" if name in built else "in ROS"
+        packages = built.pop(name, "") if state == "built" else ""
+        table.add_row(name, state, packages or " ".join(sorted(underlay.listed)))
+    for name, packages in built.items():
+        table.add_row(name, "built", packages)
     output_console().print(table)
 
 

@@ -71,9 +71,9 @@ class Underlay:
         return frozenset(name for part in parts for name in part) if all(parts) else frozenset()
 
     @property
-    def command(self) -> str:
-        """The command that builds it."""
-        return f"rosgrade underlay add {self.given}"
+    def python(self) -> tuple[str, ...]:
+        """Python libraries that its packages import."""
+        return self.repos.python if self.repos else ()
 
 
 def named_sets() -> tuple[str, ...]:
