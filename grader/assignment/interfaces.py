@@ -26,6 +26,8 @@ from grader.spec.name import INTERFACE
 from grader.spec.nearest_name import did_you_mean, nearest_or_all
 from grader.spec.source import Source
 from grader.submission.read.rosdistro import PACKAGES
+from grader.submission.underlay.definition import find_underlay
+from grader.submission.underlay.store import UnderlayStore
 
 FOLDER = "interfaces"
 """Beside ``assignment.yaml``: our copy of the interface packages that the student writes."""
@@ -54,12 +56,16 @@ class Interfaces:
     values: Values
 
     @classmethod
-    def of(cls, folder: Path, values: Values) -> Interfaces:
-        """Look around."""
+    def of(cls, folder: Path, values: Values, underlays: Sequence[str] = ()) -> Interfaces:
+        """Look around; without an underlay that is not built here, ROS is as good as not there."""
+        named = [find_underlay(given, folder) for given in underlays]
         files = [*resources.carried_interfaces().glob(f"*/{_MANIFEST}")]
         files += sorted(file for name in FOLDERS for file in (folder / name).rglob(_MANIFEST))
+        files += [file for one in named if one.folder for file in one.folder.rglob(_MANIFEST)]
         try:
-            prefixes: Sequence[Path] | None = ros.find().prefixes
+            installation = ros.find()
+            store = UnderlayStore(resources.cache_folder(), installation)
+            prefixes: Sequence[Path] | None = [*store.fetched(named), *installation.prefixes]
         except GraderFault:
             prefixes = None
         own = {fill_text(file.parent.name, values): file.parent for file in files}

@@ -126,7 +126,7 @@ def load_assignment(
         found.append(source.problem(("id",), text))
     bound = tuple(check for check in tried if check is not None)
     if not found:
-        interfaces = Interfaces.of(file.parent, values)
+        interfaces = Interfaces.of(file.parent, values, assignment.underlays)
         found += simulation.problems(source, assignment, interfaces)
         found += interface_problems(source, assignment, bound, interfaces)
         found += field_problems(source, assignment, bound, interfaces)

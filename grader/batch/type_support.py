@@ -58,8 +58,7 @@ class TypeSupport:
         Raises:
             MissingUnderlay: It is not.
         """
-        for missing in UnderlayStore(self._cache, self._ros).missing(underlays_of(self._loaded)):
-            raise missing
+        UnderlayStore(self._cache, self._ros).fetched(underlays_of(self._loaded))
 
     def student(self, on_build: Say = _silent) -> RosInstallation:
         """The ROS installation that submissions are built and run with."""

@@ -11,7 +11,7 @@ import pytest
 from grader import resources, ros
 from grader.assignment.interfaces import FOLDER
 from grader.assignment.load import LoadedAssignment, load_assignment
-from grader.batch.type_support import TypeSupport
+from grader.batch.type_support import TypeSupport, missing_underlays
 from grader.errors import AssignmentError
 from grader.recording.interface import sections_of
 from grader.ros import RosInstallation
@@ -114,3 +114,23 @@ def test_packages_beside_an_assignment_are_given_to_students_but_not_what_they_h
     assert {"arm", "hand"} & student.packages == {"arm"}
     # Neither has interfaces.
     assert support.prefixes() == ()
+
+
+@pytest.mark.ros
+def test_interfaces_of_an_underlay_that_is_not_built_are_not_refused_but_it_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "arms").mkdir()
+    (tmp_path / "arms/robots.repos").write_text(
+        "repositories:\n  robots:\n    {type: git, url: https://example.org, version: 1.0.0}\n"
+    )
+    record = "record: [{topic: /arm, type: robot_msgs/msg/Arm}]"
+    text = ASSIGNMENT.replace("timeout: 5 s", f"timeout: 5 s, {record}")
+    monkeypatch.setattr(f"{__name__}.ASSIGNMENT", text)
+    with pytest.raises(AssignmentError, match="there is no package 'robot_msgs'"):
+        arms(tmp_path)
+    loaded = arms(tmp_path, "underlays: [robots.repos]\n")
+    assert [str(tmp_path / "arms/robots.repos") in one for one in missing_underlays(loaded)] == [
+        True
+    ]

@@ -116,13 +116,20 @@ class UnderlayStore:
             ros = on_top(ros, [self.folder_prefix(at, ros)] if at else self._prefixes(one))
         return ros
 
+    def fetched(self, underlays: Iterable[Underlay]) -> list[Path]:
+        """Install spaces of those underlays that have to be fetched; quick, builds nothing.
+
+        Raises:
+            MissingUnderlay: One is not built.
+        """
+        return [path for one in underlays if one.repos for path in self._prefixes(one)]
+
     def missing(self, underlays: Iterable[Underlay]) -> list[MissingUnderlay]:
-        """Those that have to be fetched and are not there; quick."""
+        """Those that have to be fetched and are not there."""
         found = []
         for underlay in underlays:
             try:
-                if underlay.repos is not None:
-                    self._prefixes(underlay)
+                self.fetched([underlay])
             except MissingUnderlay as missing:
                 found.append(missing)
         return found

@@ -35,7 +35,7 @@ def test_a_file_in_the_format_of_vcstool_is_named_by_its_path(tmp_path: Path) ->
     (tmp_path / "course.repos").write_text(f"{REPOSITORY}    version: 1.0.0\n")
     underlay = find_underlay("course.repos", tmp_path)
     assert underlay.name == "course"
-    assert underlay.command == f"rosgrade underlay add {tmp_path / 'course.repos'}"
+    assert underlay.given == str(tmp_path / "course.repos")
     assert underlay.repos is not None
     assert underlay.repos.repositories["a/b"].version == "1.0.0"
     assert not underlay.listed
