@@ -20,7 +20,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from grader import resources
-from grader.assignment import model, mutant, variable
+from grader.assignment import limits, model, mutant, variable
 from grader.assignment.own_check import FOLDER, lesson_checks
 from grader.assignment.stimuli.stimulus import stimulus_models
 from grader.checks import window
@@ -52,8 +52,8 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
             for heading, found in {one.heading or one.key: one, **one.inner}.items()
         },
         "until": model.Until,
-        "limits": model.LimitOptions,
-        "build_limits": model.BuildLimitOptions,
+        "limits": limits.LimitOptions,
+        "build_limits": limits.BuildLimitOptions,
         "robot": description.RobotOptions,
         "robot: drives": description.Drive,
         "lidar": description.LidarOptions,

@@ -10,8 +10,8 @@ from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
+from grader.assignment.limits import BuildLimitOptions
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.model import BuildLimitOptions
 from grader.batch.reference_run import read_references
 from grader.batch.type_support import TypeSupport
 from grader.checks.need import StudentTests

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from grader.assignment.model import BuildLimitOptions, LimitOptions
+from grader.assignment.limits import BuildLimitOptions, LimitOptions
 from grader.sandbox.limits import BUILD
 from grader.sandbox.usage import (
     files_in_flight,
