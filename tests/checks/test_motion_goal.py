@@ -319,7 +319,7 @@ class TestMistakes:
 
     def test_the_same_speed_all_the_way(self):
         said = failing("motion.slows_down", run_to(GOAL, constant=0.1))
-        assert "0.1 m/s at the end, 0.1 m/s at most" in said
+        assert "0.1 m/s at the end; the largest is 0.1 m/s" in said
         assert "linear.x = gain * distance" in said
 
     @pytest.mark.parametrize(
@@ -439,7 +439,7 @@ class TestMistakes:
         said = failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
         assert "still turns at 0.5 rad/s" in said or "not at rest" in said
         said = failing("motion.settles", run, within="20 s")
-        assert "after 29.99 s not at rest when the observation ends" in said
+        assert "after 29.99 s it is not at rest when the observation ends" in said
 
     def test_straight_past_the_goal_is_no_second_phase(self):
         """It drives 5 cm past the goal at (0.6, 0) and aligns there."""
@@ -457,7 +457,7 @@ class TestMistakes:
     def test_a_detour_is_measured(self):
         run = run_to((-0.8, 0.1, 0.0), angular=0.5, linear=0.3, seconds=60)
         said = failing("motion.path_length", run, goal=yaml((-0.8, 0.1, 0.0)), most="20 %")
-        assert "longer" in said and "Look at its heading on the way" in said
+        assert "longer" in said and "turn to the goal at once" in said
 
     def test_a_callback_that_sleeps_while_the_robot_turns(self):
         student, until_s = Student(GOAL), [0.0]

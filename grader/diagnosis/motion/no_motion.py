@@ -15,6 +15,7 @@ from grader.diagnosis.wrong_value import MISREAD, was_integer
 from grader.findings.finding import Evidence
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.reference import Goal, UnknownValue
+from grader.findings.value import leaves
 from grader.findings.wording import code, codes, counted
 from grader.measure.compatibility import compatibility_table, refusals
 from grader.measure.motion.approach import Approach
@@ -186,13 +187,16 @@ def only_zeros(symptom: NotMoved) -> Cause | None:
     recording, sent = symptom.recording, symptom.sent
     if not all(is_zero(item.twist) for item in sent):
         return None
-    topic = code(command_topic(recording))
-    seen = (
-        f"{_STILL}: in all {counted(len(sent), 'command')} on {topic}, linear.x and angular.z are 0"
-    )
+    topic = command_topic(recording)
+    number = counted(len(sent), "command")
+    seen = f"{_STILL}: in all {number} on {code(topic)}, linear.x and angular.z are 0"
     last = recording.truth[-1]
     misread = misreading(recording, last)
-    if misread is not None:
+    twists = (item.value.get("twist", item.value) for item in recording.on(topic))
+    others = sorted({path for twist in twists for path, value in leaves(twist).items() if value})
+    if others:
+        seen += f", but {codes(others)} {'is' if len(others) == 1 else 'are'} not"
+    elif misread is not None:
         return Cause(f"{seen}; {misread.words}", misread.hint, symptom.evidence)
     return Cause(
         seen,
