@@ -263,7 +263,7 @@ class Rate(Matching):
         if self.rate is None and given == (None, None):
             raise ValueError("say how often: rate, at_least or at_most")
         if self.rate is not None and given != (None, None):
-            raise ValueError("rate stands alone, without at_least and at_most")
+            raise ValueError("'rate' cannot be used with 'at_least' or 'at_most'")
         return self
 
     @property
