@@ -71,8 +71,8 @@ def fields_hint(what: str, value: Mapping[str, Any], wrong: Sequence[str]) -> st
     """What to try where fields are wrong."""
     if all(_is_default(item) for _, item in _plain(value)):
         return (
-            f"Set the fields of the {what} in the callback, and return it: it came as a new one "
-            "is, with 0, false and '' everywhere."
+            f"Set the fields of the {what} in the callback, and return it. Now every field has "
+            "the value of a new one: 0, false or ''."
         )
     return f"Look where the callback sets {codes(wrong)} of the {what} that it returns."
 

@@ -163,7 +163,7 @@ def test_what_was_not_aborted_is_not_said_to_be():
 
 
 def test_a_rate_needs_some_feedback():
-    with pytest.raises(ValueError, match="a rate needs at_least: 3"):
+    with pytest.raises(ValueError, match="'rate' needs 'at_least': 3"):
         judge("action.feedback", acting(goal()), **FIB, rate="10 Hz")
 
 

@@ -140,7 +140,7 @@ class TestFields:
             ("float64[", "float32[", "`float32[2] velocities` instead"),
             ("Pose2D", "Pose", "`geometry_msgs/Pose pose` instead of `geometry_msgs/Pose2D pose`"),
             ("geometry_msgs/", "", "A type without a package is sought in bot_msgs itself"),
-            ("uint8 model", "uint8 model\nbool on", "a field `bool on` too many"),
+            ("uint8 model", "uint8 model\nbool on", "a field `bool on` that is not asked for"),
             ("BURGER=1", "BURGER 1", "A constant has an equals sign"),
         ],
     )

@@ -319,9 +319,9 @@ class TestOtherValues:
         asked = {**FRONT, "fields": ["data"]}
         whole = run(lines("7", SCAN_TIMES_S), **scanned({"data": 765072}))
         finding = judge("log.follows", whole, **asked)
-        assert "messages on `/scan`, within 500 ms" in finding.expected
+        assert "on `/scan`, each within 500 ms" in finding.expected
         finding = judge("log.follows", run(), **FRONT)
-        assert "messages on `/scan`, to 2 decimals, within 500 ms" in finding.expected
+        assert "on `/scan` to 2 decimals, each within 500 ms" in finding.expected
 
     def test_what_is_written_at_ctrl_c_answers_no_message(self):
         log = lines("2.50", SCAN_TIMES_S) + output(traceback("KeyboardInterrupt"), time_s=4.25)

@@ -133,9 +133,9 @@ class TestSet:
             (
                 setting(7.0, 0.5, accepted=False),
                 {"value": 7.0, "accepted": False, "reason": "positive"},
-                "the reason says nothing",
+                "the reason is empty",
             ),
-            (setting(0.9, 0.5), {"value": 0.9}, "it was accepted, but is 0.5 then"),
+            (setting(0.9, 0.5), {"value": 0.9}, "it was accepted, but its value is 0.5 afterwards"),
         ],
     )
     def test_another_answer_is_told(self, run, wanted, words):
@@ -173,7 +173,7 @@ class TestTakesEffect:
         [
             (moving(0.5), DATA, "after it was set a message has data = 0.5 instead of 0.9"),
             (moving(0.5), DATA, "The message is as it was before"),
-            (moving(0.7), DATA, "Look what the node makes of `speed` where it publishes"),
+            (moving(0.7), DATA, "Look at how the node uses `speed` where it publishes"),
             (moving(0.5, after=0.5, accepted=False, reason="no"), DATA, "was refused: no"),
             (moving(0.9), PERIOD, "messages come every 100 ms"),
             (moving(0.9, until_s=2.0), DATA, "0 messages in the"),
@@ -226,7 +226,7 @@ class TestLifecycle:
     def test_a_transition_that_failed(self):
         run = states("unconfigured", "unconfigured", success=False)
         found = failing("lifecycle.state", run, **self.WANTED)
-        assert "at the call 2 of get_state it is unconfigured" in found
+        assert "at call 2 of get_state it is unconfigured" in found
         assert "after the transition configure failed" in found
         assert "TransitionCallbackReturn.SUCCESS" in found
 

@@ -90,7 +90,7 @@ class TestResponds:
             (asked(response={"success": False, "message": "x"}), "success = false instead of true"),
             (asked(), "message = 'enabled' without “range”"),
             (asked(response=REFUSED), "sets `success` of the response"),
-            (asked(response={"success": False, "message": ""}), "as a new one is"),
+            (asked(response={"success": False, "message": ""}), "the value of a new one"),
             (asked(answer_s=1.5), "was not answered for 1.5 s"),
         ],
     )
@@ -157,7 +157,7 @@ class TestConcurrent:
         assert judge("service.concurrent", run, **SLOW).status is Status.PASSED
         one_after_another = {**SLOW, "calls": "one_after_another"}
         found = failing("service.concurrent", run, **one_after_another)
-        assert "both were worked on at the same time" in found
+        assert "both were processed at the same time" in found
 
     def test_calls_worked_on_one_after_another_pass(self):
         run = serving(asked(1.0, 0.4), asked(1.001, 0.8))

@@ -90,7 +90,7 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
     have the same name, each of them must answer. Calls count from the node's first message on (or,
     if it publishes nothing, from its appearance). Calls at the very end, with too little time for
     an answer, do not count. A callback may be busy for a while if answers still come in time. With
-    `typically`, also the median of the answers must come soon.
+    `typically`, the median of the answer times must be short too.
 
     If no call can be judged, the check uses what the process declared: that it spins and has a
     timer.
@@ -316,7 +316,7 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
     timer with a callback is right, whatever its period. If the process did not declare its
     publisher, the check ends as an error and costs no points.
     """
-    expected = f"a timer, in whose callback the node publishes on {code(parameters.topic)}"
+    expected = f"a timer whose callback publishes on {code(parameters.topic)}"
     messages = recording.on(parameters.topic)
     if not messages:
         return why_silent(recording, parameters.topic).finding(expected)

@@ -116,8 +116,8 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
 
     Judged by the process, which must still run when the observation ends, and by the ROS graph,
     which must not have lost the node before. Of several nodes, only those count that publish on a
-    recorded topic or subscribe to a topic of a stimulus; a helper node may end earlier. Offences in
-    the sandbox, such as a signal to its first process, end a node.
+    recorded topic or subscribe to a topic of a stimulus; a helper node may end earlier. What the
+    sandbox forbids, such as a signal to its first process, also fails.
     """
     name = parameters.name
     process = declarations.process_of(recording, name) if name else None
