@@ -61,7 +61,7 @@ def no_workspace(symptom: NoPackage) -> Cause | None:
         return None
     return Cause(
         problem or "no package.xml was found",
-        "Hand in the packages that are asked for, each of them once; colcon leaves out a "
+        "Hand in the packages that the task asks for, each of them once. colcon leaves out a "
         "folder with a file COLCON_IGNORE in it."
         if symptom.names
         else "Hand in the workspace, its src folder or the package itself: a ROS package is a "
@@ -130,9 +130,9 @@ def why_too_new(package: PackageRecord) -> Cause | None:
     if not package.newer_syntax:
         return None
     return Cause(
-        f"the Python here cannot read {package.newer_syntax[0]}",
-        "It is right in ROS 2 Jazzy, which has Python 3.12, and no point is lost by it. Tell "
-        "your instructor: it needs Python 3.12. Or do without this syntax.",
+        f"the Python of this machine cannot read {package.newer_syntax[0]}",
+        "It is right in ROS 2 Jazzy, which has Python 3.12, so you lose no points. Tell your "
+        "instructor that it needs Python 3.12, or do without this syntax.",
         ours=True,
     )
 
@@ -227,9 +227,9 @@ def why_lacking(submission: SubmissionRecord, name: str) -> Cause | None:
 
 def _not_here(lacking: list[str]) -> Cause:
     return Cause(
-        f"it needs {codes(lacking)} to build, which ROS 2 Jazzy has, but which is not installed "
-        "where this is graded",
-        "No point is lost by it. Tell your instructor: a full ROS 2 Jazzy builds it.",
+        f"it needs {codes(lacking)} to build: ROS 2 Jazzy has it, but it is not installed on the "
+        "machine that grades",
+        "You lose no points for it. Tell your instructor that a full ROS 2 Jazzy builds it.",
         ours=True,
     )
 
@@ -259,8 +259,8 @@ def _failed(build: BuildRecord, name: str) -> Cause:
     why = str(build.culprit) if build.culprit else ended[1] if ended else ""
     return Cause(
         f"`colcon build` failed: {why}" if why else "`colcon build` failed",
-        f"Create resource/{name}, an empty file by which ROS finds the package, and write the same "
-        "name in package.xml, setup.py, setup.cfg and for the folder of the Python module."
+        f"Create the empty file resource/{name}: ROS finds the package by it. Use the same name in "
+        "package.xml, setup.py, setup.cfg and for the folder of the Python module."
         if _NO_MARKER.search(why)
         else f"Run `colcon build --packages-select {name}` in the workspace and correct the first "
         "error that it prints.",

@@ -159,7 +159,7 @@ class TestBlocked:
         assert "answered 0 of 6 calls within 1 s" in found
         assert "while 12 messages were published" in found
         assert "rclpy.spin() was never called" in found
-        assert "let nothing before it wait or loop for ever" in found
+        assert "Nothing before it may wait or loop for ever" in found
 
     def test_the_line_of_the_loop_is_named(self):
         log = output(traceback("KeyboardInterrupt", source="time.sleep(0.3)", line=17))
@@ -172,7 +172,7 @@ class TestBlocked:
         traced = (*declarations(spin=False), spin)
         found = failing("executor.responsive", recording(calls=calls(None), declarations=traced))
         assert ": an executor spins, but" in found
-        assert "`/bot_publisher` was not given to it" in found
+        assert "`/bot_publisher` was not added to it" in found
 
     def test_a_loop_in_a_callback(self):
         found = failing("executor.responsive", recording(calls=calls(None)))

@@ -308,7 +308,7 @@ class TestOtherValues:
     @pytest.mark.parametrize("text", ["x = -0.62, y = 1.37", "x: -0.62\ny: 1.37"])
     def test_that_they_are_exchanged_is_said(self, text):
         found = position(lines(text, ODOM_TIMES_S))
-        assert "`pose.pose.position.x` and `pose.pose.position.y` are exchanged" in found
+        assert "`pose.pose.position.x` and `pose.pose.position.y` are swapped" in found
 
     def test_a_right_line_beside_an_exchanged_one_counts(self):
         text = "x = -0.62, y = 1.37\nx = 1.37, y = -0.62"
@@ -380,7 +380,7 @@ class TestWhatKeepsLinesBack:
         calls = (call(0.5, of=BOT), call(1.5, None, of=BOT), call(2.0, None, of=BOT))
         found = front(lines("1.37 -0.62", ODOM_TIMES_S), calls=calls)
         assert "something blocks the executor" in found
-        assert "from 1.50 s after launch on the node's parameter service answers no call" in found
+        assert "from 1.50 s after launch on the node's parameter service does not answer" in found
         assert "`while True`" in found
         busy = taken(1.0, 4.0, waited_s=2.0)
         assert "blocks the executor" in front(

@@ -31,7 +31,9 @@ from tests.checks.builder import (
     twist,
 )
 
-UNREADABLE = "1 message on `/cmd_vel` cannot be read: what was published are other bytes"
+UNREADABLE = (
+    "1 message on `/cmd_vel` cannot be read: the bytes that were published are not a message"
+)
 (NAN_OF_MINUS_ONE,) = struct.unpack("<d", b"\xff" * 8)
 VALUE = {"linear": {"x": 1.0}, "angular": {"z": 0.5}}
 

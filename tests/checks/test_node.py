@@ -105,7 +105,7 @@ class TestExists:
         ("name", "hint"),
         [
             ("Twist", "import it at the top of the file: `from geometry_msgs.msg import Twist`"),
-            ("rclpy", "`import rclpy`. Otherwise it is used"),
+            ("rclpy", "`import rclpy`. Otherwise it is misspelt"),
         ],
     )
     def test_an_undefined_name_of_ros_comes_with_its_import(self, name, hint):
@@ -187,7 +187,7 @@ class TestExists:
         run = nodeless(declarations=(*said, declared("node", node=NODE)))
         busy = replace(run, disturbance=taken(0.1, 1.0, waited_s=2.0))
         found = failing("node.exists", busy, name=NODE)
-        assert "the program changed ROS_DISCOVERY_SERVER, by which a node finds others" in found
+        assert "changed ROS_DISCOVERY_SERVER, which nodes use to find each other" in found
 
     @pytest.mark.parametrize(
         ("actual", "words"),

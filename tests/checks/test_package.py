@@ -256,7 +256,7 @@ class TestBuilds:
         error = SourceError("src/bot_publisher/setup.py", None, said)
         subject = submission(package(), build=failed_build(NAME, culprit=error))
         finding = judge("package.builds", subject, package=NAME)
-        assert finding.hint.startswith(f"Create resource/{NAME}, an empty file")
+        assert finding.hint.startswith(f"Create the empty file resource/{NAME}:")
 
     def test_a_syntax_error_in_a_file_that_is_not_needed(self):
         unused = SourceError("src/bot_publisher/bot_publisher/old.py", 9, "SyntaxError: ':'")

@@ -113,7 +113,7 @@ class TestResponds:
             (
                 (),
                 (declared("started"), declared("node", node=NODE), SPIN_OF_OTHERS),
-                "was not given to it",
+                "was not added to it",
             ),
             ([call(1.5 + 0.5 * n, None) for n in range(4)], (), "something blocks the executor"),
             ([call(1.5 + 0.5 * n) for n in range(4)], (), "although the node's executor spins"),
@@ -134,7 +134,7 @@ class TestResponds:
         run = serving(asked(4.4, None))
         finding = judge("service.responds", run, **TRUE, within="1 s")
         assert finding.status is Status.ERROR
-        assert "the run ended 100 ms later, before that was due" in finding.observed
+        assert "the run ended 100 ms later, before the answer was due" in finding.observed
 
     def test_an_interface_that_is_not_installed_is_our_error(self):
         run = serving(asked(answer_s=None, error="the interface x/srv/Y is not installed"))

@@ -101,7 +101,7 @@ class TestPublished:
             (
                 endpoint("/bot_publisher/cmd_vel"),
                 "/cmd_vel",
-                "Without `~/`, which puts the node's name in front",
+                "Leave out `~/`, which puts the node's name in front",
             ),
             (endpoint("/robot/cmd_vel"), "/cmd_vel", "`/robot` stands in front of the name"),
             (

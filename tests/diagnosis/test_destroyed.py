@@ -32,7 +32,7 @@ LISTENER = endpoint("/chatter", kind=Kind.SUBSCRIPTION, type="std_msgs/msg/Strin
 LATENCY = {"stimulus": "/chatter", "topic": "/cmd_vel", "most": "100 ms"}
 LOGGED = {"topic": "/chatter", "fields": ["data"], "at_least": 2, "sent": "after_launch"}
 FIRST_TEN = sent(every(-0.5 / 10, 10, -0.1))
-WORDS = "was destroyed 0.90 s after launch, while the process ran on"
+WORDS = "was destroyed 0.90 s after launch, while the process still ran"
 
 
 def gone(item, time_s=0.9):
@@ -97,7 +97,7 @@ def test_what_vanished_with_its_process_was_not_destroyed():
     run = deaf(sent={"/chatter": ()}, processes=(died(-11, 0.9),))
     found = failing("timing.latency", replace(run, messages={}), **LATENCY)
     assert "SIGSEGV" in found
-    assert "while the process ran on" not in found
+    assert "while the process still ran" not in found
 
 
 def test_what_the_scenario_ended_was_not_destroyed():

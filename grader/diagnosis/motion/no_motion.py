@@ -113,8 +113,8 @@ def why_rejected(recording: Recording) -> Cause | None:
     return Cause(
         f"{counted(len(refused), 'command')} on {code(command_topic(recording))} {were} not finite "
         f"(first: {first.text}); the robot stops instead",
-        "A command must be finite: look for a division by zero, for inf from a range that sees "
-        "nothing, and for sqrt or acos of a number out of range.",
+        "A command must be finite: look for a division by zero, for a range of inf (nothing is "
+        "there), and for sqrt or acos of a number out of range.",
         evidence_at(recording, "command rejected", first.time_ns),
     )
 
@@ -140,7 +140,7 @@ def no_velocity_command(symptom: NotMoved) -> Cause | None:
     recording, topic = symptom.recording, command_topic(symptom.recording)
     found = sorted({message.type for message in recording.on(topic)})
     return Cause(
-        f"{_STILL}: what was published on {code(topic)} is no velocity command but {codes(found)}",
+        f"{_STILL}: the messages on {code(topic)} are no velocity commands but {codes(found)}",
         "Publish geometry_msgs/msg/Twist.",
         Evidence(moments=first_seen(recording, recording.on(topic))),
     )
@@ -235,6 +235,6 @@ def moves_too_late(symptom: NotMoved) -> Cause:
     return Cause(
         f"{_STILL}: the first command to move, {speed(first.twist.linear_m_s)} ahead, came "
         f"{format_duration(max(left_s, 0.0))} before the end",
-        "A speed below 1 mm/s, or one that holds for a moment only, does not move the robot.",
+        "A speed below 1 mm/s, or a command that lasts only a moment, does not move the robot.",
         symptom.evidence,
     )

@@ -140,7 +140,7 @@ def interrupted_place(
         return None
     path = submission_path(frame.file, recording.submission) or frame.file
     source = f": {frame.source}" if frame.source else ""
-    return SourceError(path, frame.line, f"was here when SIGINT came{source}")
+    return SourceError(path, frame.line, f"the program was here when it was interrupted{source}")
 
 
 def student_place(failure: Failure, submission: SubmissionRecord) -> SourceError | None:
