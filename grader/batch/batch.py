@@ -143,7 +143,7 @@ class Batch:
             # There is none yet, or it is damaged; what it says is written anew from the class.
             return
         if name != self.loaded.assignment.id:
-            raise UsageError(f"{self.ledger.out}: holds the grades of {name}; name a new folder")
+            raise UsageError(f"{self.ledger.out}: holds the grades of {name}; use a new folder")
 
     def _refuse_changed(self, keys: Iterable[str]) -> None:
         changed = sorted(key for key in keys if not self._is_of_this_version(key))
@@ -152,8 +152,8 @@ class Batch:
         named = ", ".join(changed[:_MOST_NAMED]) + (", …" if len(changed) > _MOST_NAMED else "")
         raise UsageError(
             f"{self.ledger.out}: {len(changed)} ({named}) graded with another version of "
-            f"{self.loaded.assignment.id}; {regrade_command(self.ledger.out, self.loaded)} judges "
-            "their recordings again, `--retry all` runs everything again, `--retry NAME` one"
+            f"{self.loaded.assignment.id}. {regrade_command(self.ledger.out, self.loaded)} judges "
+            "their recordings again; `--retry all` runs all of them again, `--retry NAME` one"
         )
 
     def _is_of_this_version(self, key: str) -> bool:

@@ -28,7 +28,7 @@ from grader.safe_text import one_line
 
 GRADES_FILE = "grades.csv"
 OVERVIEW_FILE = "index.html"
-NO_RESULT = "there is no result of it; run the batch again"
+NO_RESULT = "it has no result; run the batch again"
 _MOST_TWINS = 5
 _load = cache(load_assignment)
 
@@ -138,7 +138,7 @@ def find_reports(out: Path) -> tuple[Path, ...]:
     inside = sorted(file.parent.relative_to(out) for file in out.rglob(RESULT_FILE))
     found = tuple(out / path for path in inside if "/." not in f"/{path}")
     if not found:
-        raise UsageError(f"{out}: there is no {RESULT_FILE} in it, nor in a folder below it")
+        raise UsageError(f"{out}: there is no {RESULT_FILE} in it or in a folder below it")
     return found
 
 
@@ -170,16 +170,16 @@ def render_again(folder: Path, assignment: str | None = None) -> Result:
     loaded = _load(assignment or _stored(folder, result))
     if loaded.sha256 != result.assignment.sha256:
         raise UsageError(
-            f"{folder}: the assignment has changed since this was graded: "
-            f"{regrade_command(folder, loaded)} judges again with it as it is now"
+            f"{folder}: the assignment has changed since this was graded. "
+            f"{regrade_command(folder, loaded)} judges again with the new assignment"
         )
     shown = visible_part(loaded) if result.withheld.checks else loaded
     graded = regrade(select(shown, tuple(check.id for check in result.checks)), found)
     changed = _changed(result, graded.grade)
     if changed:
         raise UsageError(
-            f"{folder}: judged again it is not what the result says ({', '.join(changed)}): "
-            f"{regrade_command(folder, loaded)} writes both anew"
+            f"{folder}: judging again does not give the stored result ({', '.join(changed)}). "
+            f"{regrade_command(folder, loaded)} writes the new result and report"
         )
     write_report(graded, folder, result)
     return result

@@ -71,7 +71,7 @@ def refuse_foreign(folder: Path, *, keep: bool) -> None:
     install = folder / INSTALL_FOLDER
     if foreign or (keep and install.exists() and not (folder / RESULT_FILE).is_file()):
         other = recordings if foreign else install
-        raise UsageError(f"{other}: is not of a report, and is left as it is; name another folder")
+        raise UsageError(f"{other}: does not belong to a report, so it stays; use another folder")
 
 
 def keep_install(graded: Graded, folder: Path) -> Path | None:

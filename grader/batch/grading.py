@@ -208,7 +208,7 @@ class Grading:
             )
             return read_recording(file)
         except UsageError as error:
-            raise GraderFault(f"the recording that was just made: {error}") from error
+            raise GraderFault(f"the new recording cannot be read: {error}") from error
         except OSError as error:
             # A full disk, a folder that was removed: it is tried again, and the others go on.
             told = GraderFault(f"this machine: {str(error)[:_LONGEST_WORDS]}")

@@ -58,7 +58,7 @@ def take_in(
     _refuse_single(folder, source)
     entries = list(_entries(folder, staging, on_left_out, out))
     if not entries:
-        raise UsageError(f"{source}: holds no submission; expected a folder or an archive of each")
+        raise UsageError(f"{source}: holds no submission; expected one folder or archive for each")
     if roster is None:
         return unique([row_of(item) for item in entries])
     return unique(matched(entries, roster, on_prefix))

@@ -83,7 +83,7 @@ class Ledger:
             known = {BATCH_FILE, SUBMISSIONS, _PARTIAL, _LOCK}
             inside = {item.name for item in self.out.iterdir()}
             if inside and not inside & known:
-                raise UsageError(f"{self.out}: holds something else; name a new folder")
+                raise UsageError(f"{self.out}: holds other files; use a new folder")
             lock = (self.out / _LOCK).open("w")
         except OSError as error:
             told = UsageError(f"{self.out}: cannot be written: {error.strerror}")

@@ -42,7 +42,7 @@ class FoundRecordings:
         for recording in self.recordings.values():
             if "assignment" in recording.environment:
                 return recording.environment["assignment"]
-        raise UsageError(f"{self.folder}: it does not say for which assignment; name it")
+        raise UsageError(f"{self.folder}: the assignment is not stored here; name it too")
 
     @property
     def location(self) -> str | None:
@@ -89,7 +89,7 @@ def stored_assignment(path: Path, name: str, location: str | None, *command: str
         return str(resources.assignments() / name)
     if location is not None and Path(location).exists():
         return location
-    lay = f" in {location}, which is not there any more" if location else ""
+    lay = f" in {location}, which does not exist any more" if location else ""
     raise UsageError(
         f"{path}: was graded with the assignment {name!r}{lay}; name its folder: "
         f"`{shlex.join(('rosgrade', *command))} FOLDER`"

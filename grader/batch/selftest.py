@@ -142,7 +142,7 @@ def _starter_verdict(grade: Grade) -> MutantVerdict:
     if grade.score > MOST_FOR_STARTER * grade.max_score:
         problem = (
             f"{counted_points(grade.score)} of {number(grade.max_score)}, and a starter package "
-            f"may have {MOST_FOR_STARTER:.0%} at most: give the points to what the lesson is about"
+            f"may have {MOST_FOR_STARTER:.0%} at most: give the points for what the lesson teaches"
         )
     return MutantVerdict(not_judged, problem)
 

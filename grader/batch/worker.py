@@ -62,7 +62,7 @@ def unpack(packed: bytes, folder: Path) -> None:
             target = folder / member.name
             end = target.parent / member.linkname if member.issym() else target
             if not end.resolve().is_relative_to(folder.resolve()):
-                raise GraderFault(f"a worker sent a file that leads out: {member.name}")
+                raise GraderFault(f"a worker sent a file outside its folder: {member.name}")
             if member.isdir():
                 target.mkdir(parents=True, exist_ok=True)
                 continue
@@ -138,7 +138,7 @@ def _make_grading(order: Order) -> Grading:
     if loaded.sha256 != order.sha256:
         raise GraderFault(
             f"the worker on {os.uname().nodename} has another version of the assignment "
-            f"{order.assignment}; install the same one there"
+            f"{order.assignment}; install the same version there"
         )
     return make_grading(order, loaded)
 

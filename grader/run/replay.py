@@ -191,7 +191,7 @@ def _tell(recording: Recording) -> int:
         _say("rosgrade", f"the node has ended by itself (exit code {codes})")
     missed = [wait.what for wait in recording.waits if wait.met_ns is None]
     for what in missed:
-        _say("rosgrade", f"waited in vain for {what}")
+        _say("rosgrade", f"did not come in time: {what}")
     return 0 if recording.ending is Ending.UNTIL and not missed else 1
 
 

@@ -113,8 +113,8 @@ class Sandbox:
                     tree.discard()
                     self._tree = None
             raise GraderFault(
-                f"files of the students' Python were deleted in {tree.path.parent}, perhaps by "
-                "a clean-up; grade again, and they are made again"
+                f"files of the sandbox's Python were deleted in {tree.path.parent}, perhaps by a "
+                "clean-up. Grade again: rosgrade makes them again"
             )
 
         return check

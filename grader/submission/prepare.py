@@ -194,7 +194,7 @@ def _no_package(located: Located) -> str:
         "and folders with a COLCON_IGNORE do not count)"
     )
     if archives:
-        return f"{problem}; unpack {shown(archives[0])}, and hand in what is in it"
+        return f"{problem}; unpack {shown(archives[0])}, and hand in its content"
     if all(path.endswith(".py") for path in paths):
         return f"{problem}; hand in the whole package, not only its Python files"
     return problem

@@ -497,7 +497,7 @@ ATTACKS = {
     "squats_the_probe_s_name": Attack(
         SQUAT,
         lost=frozenset({"untouched"}),
-        named=("is called `/rosgrade_probe`, as the node", "publishes on `/clock` and `/odom`"),
+        named=("is called `/rosgrade_probe`, like the node", "publishes on `/clock` and `/odom`"),
     ),
     "is_called_as_the_probe": Attack(name="rosgrade_probe", lost=frozenset({"node", "untouched"})),
     "floods_topics_and_rosout": Attack(
@@ -509,7 +509,7 @@ ATTACKS = {
     "announces_endless_samples": Attack(
         HEARTBEAT,
         lost=frozenset({"starts"}),
-        named=("keeps the middleware of the node that watches the run busy",),
+        named=("keep the middleware of the node that watches the run busy",),
     ),
     "burns_the_cpus_in_turns": ended(RELAY, "s of CPU time, 3 s are allowed"),
     "injection": ended(INJECTION, "RuntimeError"),
@@ -522,7 +522,7 @@ ATTACKS = {
     ),
     "build_fork_bomb": unbuilt(BOMB, "it started 64 processes"),
     "build_plants_links": unbuilt(PLANT, "'share/passwd', a link out to '/etc/passwd'"),
-    "build_digs_deep": unbuilt(DIG, "it made more than 100 folders in one another"),
+    "build_digs_deep": unbuilt(DIG, "it nested folders more than 100 deep"),
     "build_installs_outside": unbuilt(
         "import setuptools\n_s = setuptools.setup\ndef setup(**k):\n"
         "    k['data_files'].append(('/etc/cron.d', ['package.xml']))\n    _s(**k)\n"

@@ -221,7 +221,7 @@ def test_a_batch_of_another_assignment_replaces_no_grades(course: Class) -> None
     other = course.folder / "other"
     other.mkdir()
     (other / "assignment.yaml").write_text(YAML.replace("id: lesson", "id: other"))
-    with pytest.raises(UsageError, match="holds the grades of lesson; name a new folder"):
+    with pytest.raises(UsageError, match="holds the grades of lesson; use a new folder"):
         Batch(load_assignment(other), course.ledger, frozenset({"all"})).read(
             take_in(course.folder / "class", course.folder)
         )

@@ -417,7 +417,7 @@ def test_what_cannot_be_read_again_keeps_its_grade_and_is_told(
     assert ada.done.entry.problem == f"not judged again: {ada.problem}"
     assert not cai.problem and cai.done.fresh
     for row in (ben, dee):
-        assert row.problem == "there is no result of it; run the batch again"
+        assert row.problem == "it has no result; run the batch again"
         assert row.done.result is None
     assert not eli.problem and eli.done.entry.problem == "handed in nothing"
     assert ledger.read().entries[0].problem == ""

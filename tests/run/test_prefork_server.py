@@ -110,7 +110,7 @@ def test_no_cell_is_made_where_files_of_the_students_python_were_deleted(
     check()
     assert prefork_server.is_alive
     next(sandbox.python_tree.glob("lib/python3*/site-packages/rclpy/node.py")).unlink()
-    with pytest.raises(GraderFault, match="files of the students' Python were deleted"):
+    with pytest.raises(GraderFault, match="files of the sandbox's Python were deleted"):
         check()
     assert not prefork_server.is_alive
     prefork_server.close()

@@ -83,7 +83,7 @@ def test_a_python_that_somebody_tidied_up_is_found_out_and_made_anew(tmp_path: P
     check()
     (site,) = sandbox.python_tree.glob("lib/python3*/site-packages")
     (site / "rclpy" / "node.py").unlink()
-    with pytest.raises(GraderFault, match="files of the students' Python were deleted"):
+    with pytest.raises(GraderFault, match="files of the sandbox's Python were deleted"):
         check()
     # Whoever ran beside it is not blamed either, although a whole one is there by now.
     (site,) = sandbox.python_tree.glob("lib/python3*/site-packages")

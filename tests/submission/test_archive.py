@@ -176,7 +176,7 @@ def test_a_rare_compression_is_refused(tmp_path: Path) -> None:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_LZMA) as archive:
         archive.writestr("a.py", b"x" * 1000)
-    assert "rare method" in refusal(tmp_path, buffer.getvalue())
+    assert "rare compression method" in refusal(tmp_path, buffer.getvalue())
 
 
 # The second one is read by old Pythons in quadratic time.

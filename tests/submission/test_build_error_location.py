@@ -122,7 +122,7 @@ LOGS = {
             Hello
         SyntaxError: invalid syntax
         """,
-        "src/bot/setup.py: setup.py prints something, which colcon takes for its answer",
+        "src/bot/setup.py: setup.py prints something: colcon cannot read its answer then",
     ),
     "CMake": (
         """\

@@ -132,7 +132,7 @@ def test_what_leads_out_of_an_install_space_is_named_and_nothing_of_it_is_used(
     (install / "lib").mkdir(parents=True)
     (install / "lib/up").symlink_to("../../..")
     os.mkfifo(install / "lib/pipe")
-    assert refused() == "the build installed 'lib/pipe', which is no file, folder or link"
+    assert refused() == "the build installed 'lib/pipe', which is not a file, folder or link"
     assert not install.exists()
 
 

@@ -41,7 +41,7 @@ _PIPES_LIMIT_S = 5.0
 _MOST_MALFORMED = 10
 """Packets; no library sends a single one."""
 _FORGERY = "wrote into the channel through which rosgrade reports from inside a process"
-_NAMES = "made a node or a topic with a name that ROS does not allow, past the checks of rclpy"
+_NAMES = "made a node or a topic with a name that ROS does not allow, without rclpy's checks"
 _GARBAGE = "sent garbage to the UDP ports of the node that watches the run"
 
 

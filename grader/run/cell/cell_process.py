@@ -65,7 +65,7 @@ class CellProcess:
         except OSError as error:
             for descriptor in (in_write, out_read, self._status):
                 os.close(descriptor)
-            raise GraderFault(f"the prefork server of cells has ended: {error.strerror}") from error
+            raise GraderFault(f"the process starting runs has ended: {error.strerror}") from error
         finally:
             for descriptor in theirs:
                 os.close(descriptor)
@@ -105,7 +105,7 @@ class CellProcess:
             raise MiddlewareHung
         # A cell that was taken over must not make us read what it points to.
         if self.returncode or not self.recording.is_file() or self.recording.is_symlink():
-            ended = f"the cell of scenario {order.scenario!r} ended with status {self.returncode}"
+            ended = f"the run of scenario {order.scenario!r} ended with status {self.returncode}"
             if self.returncode == -signal.SIGKILL:
                 ended += " (it was killed, or stopped by a signal such as SIGSTOP)"
             last_words = self._errors.read_text(encoding="utf-8", errors="replace").strip()

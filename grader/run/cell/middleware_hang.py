@@ -79,7 +79,7 @@ def hung_recording(order: CellOrder, submission: SubmissionRecord, launched_ns: 
     breach = Breach(
         now_ns,
         "forbidden packets",
-        "sent what keeps the middleware of the node that watches the run busy without end",
+        "sent packets that keep the middleware of the node that watches the run busy for ever",
         "",
     )
     ended = [

@@ -35,8 +35,8 @@ class MachineFaults:
         way = "forward" if step_ns > 0 else "back"
         return (
             f"the clock of this machine was set {way} by {abs(step_ns) / NS:.3g} s in the middle "
-            "of the run (NTP does that, the host of a virtual machine, and sleep), so that no "
-            "time that was recorded can be trusted"
+            "of the run (by NTP, the host of a virtual machine, or sleep), so the recorded "
+            "times are wrong"
         )
 
     def out_of_memory(self, processes: Iterable[Process], breaches: Sequence[Breach]) -> str | None:
@@ -48,8 +48,8 @@ class MachineFaults:
             if process.stopped_by == "itself" and process.exit_code == -signal.SIGKILL:
                 return (
                     f"this machine ran out of memory in the middle of the run: the kernel ended "
-                    f"{now - self._kills} of its processes, and {process.name} was killed; grade "
-                    "fewer at once (--jobs), or where there is more memory"
+                    f"{now - self._kills} of its processes, and {process.name} was killed. Grade "
+                    "fewer at once (--jobs), or on a machine with more memory"
                 )
         return None
 

@@ -279,7 +279,7 @@ class StudentProcesses:
         """Sandboxes that could not be set up, one sentence each; call after :meth:`clean_up`."""
         return tuple(
             f"the sandbox of {process.name} could not be set up: "
-            f"{' '.join(self._output.tail(process.name, 'stderr', 1)) or 'it said nothing'}"
+            f"{' '.join(self._output.tail(process.name, 'stderr', 1)) or 'no message'}"
             for process in self._running
             if process.stopped_by == "itself"
             and not process.is_ended
@@ -299,7 +299,7 @@ class StudentProcesses:
             code = process.exit_code
             if process.stopped_by == "itself" and code in (-signal.SIGKILL, -signal.SIGSTOP):
                 name = signal.Signals(-code).name
-                return f"{process.name} got {name} from outside of its sandbox, during the run"
+                return f"{process.name} got {name} from outside its sandbox during the run"
         return None
 
     def records(self) -> tuple[Process, ...]:

@@ -119,7 +119,7 @@ class Builder(BuildSetting):
             standalone: Packages that are built for themselves, as if handed in alone.
 
         Raises:
-            BuildKilled: It was ended by no limit of ours.
+            BuildKilled: The build was ended, although it was within its limits.
         """
         wall_s = self.limits.python_s if only_python else self.limits.other_s
         key = build_key(located.sha256, self.ros, self.limits, self.sandbox, is_standalone)
@@ -222,8 +222,8 @@ class Builder(BuildSetting):
         # A program of the build may also kill itself; then it does so again.
         if _is_cut_off(status, output) or (killed and not self.is_second):
             raise BuildKilled(
-                f"colcon ended in the middle of a build (status {status}), twice, which no limit "
-                "of ours does: perhaps it was stopped, or memory ran out; grade again"
+                f"colcon ended in the middle of a build (status {status}), twice, although the "
+                "build was within its limits. Was it stopped, or did memory run out? Grade again"
             )
         if status != 0 and "No space left on device" in output:
             for place in (colcon.scratch, colcon.install.parent):

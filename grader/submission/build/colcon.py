@@ -206,7 +206,7 @@ class Colcon:
                 deep = [folder for folder in folders if cut_deep(folder)]
         if not deep or outcome.ended_by_us:
             return outcome
-        return replace(outcome, ended_by_us=f"it made more than {MOST_DEEP} folders in one another")
+        return replace(outcome, ended_by_us=f"it nested folders more than {MOST_DEEP} deep")
 
 
 def _colcon(ros: RosInstallation, path: str) -> list[str]:

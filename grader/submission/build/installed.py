@@ -108,7 +108,7 @@ def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> s
                         planted.append(f"{_named(path, install)}, a link out to {target!r}")
                     path.unlink()
             elif not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
-                planted.append(f"{_named(path, install)}, which is no file, folder or link")
+                planted.append(f"{_named(path, install)}, which is not a file, folder or link")
                 path.unlink()
             total += status.st_size
             count += 1

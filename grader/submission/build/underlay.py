@@ -42,7 +42,7 @@ def install_prefix(
             ros=ros,
             cache=cache,
             limits=_LIMITS,
-            on_progress=lambda what: on_progress(f"{what} (ours, once on this machine)"),
+            on_progress=lambda what: on_progress(f"{what} (once on this machine)"),
             is_second=is_second,
         )
         with opened(packages) as located:

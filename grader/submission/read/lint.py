@@ -129,7 +129,7 @@ def _check(
     except GraderFault as fault:
         return f"ruff could not be run: {fault}", found
     if outcome.ended_by_us:
-        return f"ruff was ended for its {outcome.ended_by_us}", found
+        return f"ruff was ended: too much {outcome.ended_by_us}", found
     return "ruff failed" if outcome.status else None, found
 
 
