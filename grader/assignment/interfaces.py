@@ -101,8 +101,8 @@ def interface_problems(
             yield from _unknown(source, place, interface, elsewhere, known)
         elif is_imported:
             text = (
-                f"{package!r} is handed in, and the probe never imports what a student wrote: our "
-                f"own copy of it must be in {FOLDER}/{package} beside the assignment"
+                f"students hand in {package!r}, and rosgrade never imports their code: put your "
+                f"own copy of it in {FOLDER}/{package} beside the assignment"
             )
             yield source.problem(place, text)
 
@@ -138,7 +138,7 @@ def _unknown(
     elif known.prefixes is not None and package not in elsewhere:
         text = (
             f"there is no package {package!r}: not in ROS, not in {FOLDER}/ beside the assignment, "
-            "not among 'packages' nor what they have in 'depends'."
+            "and not in 'packages' or their 'depends'."
         )
         yield source.problem(place, text + did_you_mean(package, known.packages))
 

@@ -68,7 +68,7 @@ def _shown_runs(loaded: LoadedAssignment) -> Iterator[str]:
         for scenario in loaded.scenarios_of(bound):
             if scenario.id in meant:
                 yield (
-                    f"students see the run of the scenario {scenario.id!r}, which only hidden "
-                    f"checks name: the visible check {bound.spec.id!r} names no scenarios, and so "
-                    "judges all"
+                    f"students see the run of the scenario {scenario.id!r}, although only hidden "
+                    f"checks name it: the visible check {bound.spec.id!r} names no scenarios, so "
+                    "it judges all"
                 )

@@ -80,7 +80,7 @@ def find_assignment(name: str | Path) -> Path:
         raise UsageError(f"{given}: no such file or folder")
     raise UsageError(
         f"no assignment {str(name)!r}.{nearest_or_all(str(name), known)} "
-        f"One of your own is named by its folder, such as path/to/{name}."
+        f"For your own assignment give its folder, such as path/to/{name}."
     )
 
 
@@ -89,7 +89,7 @@ def refuse_swapped(name: str, submission: Path) -> None:
     known = list_assignments()
     if name not in known and str(submission) in known and not submission.exists():
         raise UsageError(
-            f"{submission} is an assignment, and an assignment comes first: {submission} {name}"
+            f"{submission} is an assignment. Give the assignment first: {submission} {name}"
         )
 
 

@@ -214,7 +214,7 @@ class Launch(Model):
     @model_validator(mode="after")
     def _one_thing(self) -> Launch:
         if (self.executable is None) == (self.file is None):
-            raise ValueError("name either an 'executable' or a launch 'file'")
+            raise ValueError("give either an 'executable' or a launch 'file'")
         if self.file is not None:
             given = {"name", "namespace", "parameters", "remap"} & self.model_fields_set
             if given:

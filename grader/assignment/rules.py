@@ -68,7 +68,7 @@ def _scenario(assignment: Assignment, scenario: Scenario) -> Iterator[tuple[Plac
     if scenario.world is None:
         for key in ("robot", "lidar", "odometry", "topics"):
             if key in scenario.model_fields_set:
-                yield (key,), "there is a simulated robot only in a 'world', which is missing"
+                yield (key,), "a simulated robot needs a 'world', which is missing"
         for key in ("at_rest", "travelled"):
             if any(getattr(one, key) is not None for one in (until, *until.any)):
                 text = f"{key!r} is about the simulated robot: 'world' is missing"
@@ -149,7 +149,7 @@ def _other_programs(scenarios: Sequence[Scenario]) -> Iterator[tuple[Place, str]
     for scenario, programs in zip(scenarios, launched, strict=True):
         if programs != launched[0]:
             text = (
-                "name the 'scenarios' that it judges, for they do not launch the same: "
+                "name the 'scenarios' that it judges: they launch different programs: "
                 f"{scenarios[0].id!r} launches {', '.join(launched[0])}, but {scenario.id!r} "
                 f"{', '.join(programs)}"
             )
@@ -236,7 +236,7 @@ def _(need: needs.Called, user: _User) -> Iterator[_Lack]:
         names = [one.call for one in calls]
         yield from _unnamed(user, need.service, scenario, names, "asks", service)
         if mine and all(one.at_once < need.at_once for one in mine):
-            text = f"the scenario {scenario.id!r} calls it never twice at once: 'at_once: 2'"
+            text = f"the scenario {scenario.id!r} never calls it twice at once: add 'at_once: 2'"
             yield key, text
         fields = user.value(need.request) or {}
         waits_s = [one.within for one in mine if _has_fields(fields, one.sequence)]

@@ -51,7 +51,7 @@ def _stimuli(scenario: Scenario, making: Making) -> Iterator[tuple[Place, str]]:
         after = getattr(item, "after", None)
         if after is not None and after >= scenario.timeout:
             shown, timeout = format_duration(after), format_duration(scenario.timeout)
-            text = f"{shown} is not before the timeout of {timeout} ends the scenario"
+            text = f"{shown} is too late: the timeout of {timeout} ends the scenario before"
             yield ("stimuli", number, "after"), text
     if scenario.until.stimuli is not None and not any(one.has_end for one in scenario.stimuli):
         yield ("until", "stimuli"), "no stimulus of the scenario has an end"

@@ -144,7 +144,7 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
     left = sum(bool(row.problem) or row.in_doubt for row in rows)
     if left:
         say(
-            f"{left} cannot be judged again from what was recorded; run them again with "
+            f"{left} cannot be judged again from their recordings; run them again with "
             "`rosgrade batch ... --retry NAME`"
         )
     graded = all(

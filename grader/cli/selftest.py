@@ -103,7 +103,7 @@ def selftest(
         _print(console, loaded.assignment.id, results)
         say(
             f"{loaded.assignment.id}: {score.accepted} of {score.right} right solutions with "
-            f"full points, {score.killed} of {score.mutants} mutants judged as they must: "
+            f"full points, {score.killed} of {score.mutants} mutants judged as expected: "
             f"mutation score {percent:.0f} %"
         )
     raise typer.Exit(0 if perfect else 1)

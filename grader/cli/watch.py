@@ -180,12 +180,12 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
             title = work.loaded.assignment.title
             if event is Step.BEGAN:
                 clock = Clock()
-                page.tell("grading what was saved", f"… {title}")
+                page.tell("grading the saved files", f"… {title}")
                 shown.enter_context(work.progress.shown())
                 continue
             shown.close()
             if not isinstance(event, Ended):
-                work.progress.say("saved meanwhile: beginning anew")
+                work.progress.say("saved again: starting over")
                 continue
             if event.graded is None:
                 print_error(str(event.problem))

@@ -71,14 +71,14 @@ def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None])
                     "overwritten"
                 )
         if any(_is_same(output, other) for other in written):
-            raise UsageError(f"{output}: is named for two outputs")
+            raise UsageError(f"{output}: is given for two outputs")
         written.append(output)
 
 
 def refuse_part(output: Path, folder: Path, what: str) -> None:
     """See that nothing is written into a folder that is read as a whole."""
     if Path(os.path.realpath(output)).is_relative_to(os.path.realpath(folder)):
-        raise UsageError(f"{output}: would be a part of {what}; name another folder")
+        raise UsageError(f"{output}: lies in {what}; use another folder")
 
 
 def _is_same(one: Path, other: Path) -> bool:
@@ -105,7 +105,7 @@ def check_folder(folder: Path) -> None:
     other = _in_the_way(folder)
     if other is not None:
         named = "" if other == folder else f"{other} "
-        raise UsageError(f"{folder}: {named}is not a folder; name another place")
+        raise UsageError(f"{folder}: {named}is not a folder; use another place")
 
 
 def _in_the_way(folder: Path) -> Path | None:
@@ -116,7 +116,7 @@ def _in_the_way(folder: Path) -> Path | None:
 
 def _why(file: Path, error: OSError) -> str:
     if error.errno == errno.EISDIR:
-        return "it is a folder; name a file"
+        return "it is a folder; give a file"
     other = _in_the_way(file.parent) if error.errno in (errno.ENOTDIR, errno.EEXIST) else None
     return f"{other} is not a folder" if other else error.strerror or str(error)
 

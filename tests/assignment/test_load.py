@@ -180,7 +180,7 @@ def test_checks_of_all_scenarios_need_the_same_programs_in_each(found: Found) ->
     other = "  - {id: other, launch: [{executable: sub}], timeout: 5 s}\nchecks:\n"
     two = GOOD.replace("[bot_pub]", "[bot_pub, sub]").replace("checks:\n", other)
     assert found(two) == [
-        "14: checks[0]: name the 'scenarios' that it judges, for they do not launch the same: "
+        "14: checks[0]: name the 'scenarios' that it judges: they launch different programs: "
         "'run' launches 'bot_pub', but 'other' 'sub'"
     ]
     assert found(two.replace("alive, points", "alive, scenarios: [run, other], points")) == []
@@ -192,7 +192,7 @@ def test_checks_of_all_scenarios_need_the_same_programs_in_each(found: Found) ->
 @pytest.mark.parametrize(
     ("key", "said"),
     [
-        ("robot: {pose: [0, 0, 0 deg]}", "robot: there is a simulated robot only in a 'world'"),
+        ("robot: {pose: [0, 0, 0 deg]}", "robot: a simulated robot needs a 'world'"),
         ("until: {at_rest: 1 s}", "until: 'at_rest' is about the simulated robot: 'world' is"),
         ("until: {any: [{travelled: 1 m}]}", "until: 'travelled' is about the simulated robot:"),
     ],

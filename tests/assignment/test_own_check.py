@@ -104,7 +104,7 @@ def test_loading_leaves_nothing_behind_in_the_folder(write: Write) -> None:
         ),
         ("checks.py:SETTING", "checks.py has no function 'SETTING'"),
         ("checks.py:nothing", "must take the recording as its first argument"),
-        ("checks.py:positional", "the argument 'a' cannot be given as a key of with"),
+        ("checks.py:positional", "the argument 'a' cannot be a key of 'with'"),
         ("checks.py:unclear", "its annotations cannot be read: name 'Missing' is not defined"),
         ("checks.py:words", "checks.py:words: it returns bool: a check returns a Finding"),
     ],

@@ -132,7 +132,7 @@ def test_an_interrupted_check_leaves_nothing_behind(number: signal.Signals, tmp_
     check.send_signal(number)
     _, told = check.communicate(timeout=60)
     assert check.returncode == 130, told
-    assert "rosgrade: interrupted: what still runs is ended" in told
+    assert "rosgrade: interrupted: ending what still runs" in told
     assert "Traceback" not in told
     assert not (tmp_path / "rosgrade-report" / "result.json").exists()
     assert not list(tmp_path.glob("rosgrade-scratch-*"))

@@ -45,7 +45,7 @@ def test_every_new_grade_is_told(page: ReportPage) -> None:
     page.tell("8.5 of 10 points", "a < b", is_new=True)
     state = {"version": 1, "told": "8.5 of 10 points", "title": "a < b"}
     assert json.loads(get(page, "/state").read()) == state
-    page.tell("grading what was saved", "…")
+    page.tell("grading the saved files", "…")
     assert json.loads(get(page, "/state").read())["version"] == 1
 
 

@@ -72,7 +72,7 @@ def test_the_submissions_of_a_class_are_named_by_their_folder(rosgrade: Rosgrade
     ended = rosgrade("batch", "timed_publisher", "class/ana", "class/ben", "--out", "results")
     assert ended.returncode == 2
     told = " ".join(ended.stderr.split())
-    assert "batch takes one folder, not 2 submissions: name the folder of all" in told
+    assert "batch takes one folder, not 2 submissions: give their folder" in told
 
 
 @pytest.mark.parametrize("command", ["check", "watch", "batch"])
@@ -83,7 +83,7 @@ def test_who_names_the_submission_first_is_told_the_order(
     more = ("--out", "results") if command == "batch" else ()
     ended = rosgrade(command, "mine", "timed_publisher", *more)
     assert ended.returncode == 2
-    assert "an assignment comes first: timed_publisher mine" in ended.stderr
+    assert "Give the assignment first: timed_publisher mine" in ended.stderr
 
 
 def test_a_submission_that_does_not_exist_is_named(rosgrade: Rosgrade) -> None:
@@ -120,7 +120,7 @@ def test_a_file_in_the_place_of_the_report_is_told_before_anything_is_graded(
 ) -> None:
     (tmp_path / "mine").touch()
     (tmp_path / "class").mkdir()
-    said = "mine: is not a folder; name another place"
+    said = "mine: is not a folder; use another place"
     for arguments in (
         ("check", "timed_publisher", ROOT / "reference" / "timed_publisher", "--report", "mine"),
         ("batch", "timed_publisher", "class", "--out", "mine", "--sandbox", "none"),
@@ -171,7 +171,7 @@ def test_a_number_of_jobs_that_is_none_is_told(
     place = lesson(tmp_path)
     ended = rosgrade("batch", place, tmp_path, "--out", tmp_path / "out", f"--jobs={jobs}")
     assert ended.returncode == 2
-    assert "must be auto or a number from 1 on" in ended.stderr and "Traceback" not in ended.stderr
+    assert "must be auto, or 1 or more" in ended.stderr and "Traceback" not in ended.stderr
 
 
 PRESSED = """

@@ -48,9 +48,7 @@ class TestPlot:
 
     def test_values_that_cannot_be_drawn_are_told(self):
         figure = draw_plot(make_plot([300.0, math.nan, math.inf], None), "p")
-        assert figure.caption == (
-            "Period of /cmd_vel: 1 value, 2 without a finite value not drawn."
-        )
+        assert figure.caption == ("Period of /cmd_vel: 1 value, 2 not finite and not drawn.")
 
     def test_of_a_flood_every_extreme_stays(self):
         y = [300.0 + (i % 7) for i in range(50_000)]

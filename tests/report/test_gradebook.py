@@ -108,7 +108,7 @@ TWICE = EXPORT.replace("Final Score", "ROS 2 Publisher (5)").replace("(read only
         ("90211", EXPORT.replace(",10,", ",(read only),"), TITLE, "Canvas skips the column"),
         ("90211", TWICE, "ROS 2 Publisher", r"several times: .*\(48211\), ROS 2 Publisher \(5\)"),
         *(
-            ("90211", EXPORT, title, "Canvas drops a column called")
+            ("90211", EXPORT, title, "Canvas drops the column")
             for title in ("Final Score", "Current Points", "Override Grade", "My Unposted finals")
         ),
     ],

@@ -66,7 +66,7 @@ def test_what_a_student_reads_first():
 
 def test_what_is_not_graded_has_no_score():
     text = rendered(not_graded())
-    assert text.startswith("## timed_publisher: Not graded\n\nSomething of the grader")
+    assert text.startswith("## timed_publisher: Not graded\n\nSomething failed in the grader")
     assert "| ! error | The queue depth is 10 | ? / 1 |" in text
 
 

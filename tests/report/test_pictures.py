@@ -70,7 +70,7 @@ class TestPath:
         away_m = math.dist((stopped.truth[-1].x_m, stopped.truth[-1].y_m), (0.4, 0.1))
         told = figure.caption.partition("It ended ")[2].partition(" from the goal")[0]
         assert told == (f"{away_m:.3g} m" if away_m >= 0.1 else f"{away_m * 100:.3g} cm")
-        assert "the dashed circle is what is near enough, 8 cm." in figure.caption
+        assert "the dashed circle is the tolerance, 8 cm." in figure.caption
 
     def test_a_robot_that_stands(self):
         run = drive(lambda _: None, world="{segments: [[1, -1, 1, 1]]}", seconds=1.0)

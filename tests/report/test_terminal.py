@@ -115,7 +115,7 @@ def test_what_was_not_graded_has_no_score():
     text = not_graded().printed()
     assert "Score" not in text
     assert "! error" in text and "? / 1" in text
-    assert "Not graded. Something of the grader or of the machine failed" in text
+    assert "Not graded. Something failed in the grader or the machine" in text
 
 
 def test_a_terminal_gets_colours_unless_they_are_unwanted(monkeypatch):

@@ -68,7 +68,7 @@ def _nested(value: Mapping[str, Any]) -> dict[str, Any]:
     root = _Inner()
     for key, item in value.items():
         if not _PATH.fullmatch(str(key)):
-            raise ValueError(f"{key!r} is no field: write its path, as in linear.x or data[0]")
+            raise ValueError(f"{key!r} is not a field: write its path, as in linear.x or data[0]")
         *steps, last = _STEP.findall(str(key))
         here: Any = root
         for step in steps:
@@ -93,7 +93,7 @@ def _plain(value: Any, where: str) -> Any:
     indices = [f"[{index}]" for index in range(len(value))]
     for index in indices:
         if index not in value:
-            raise ValueError(f"{where}{index} is missing: items are given from [0] on")
+            raise ValueError(f"{where}{index} is missing: give the items from [0] on")
     return [_plain(value[index], where + index) for index in indices]
 
 

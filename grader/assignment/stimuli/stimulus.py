@@ -48,6 +48,6 @@ else:
         Discriminator(
             _kind,
             custom_error_type="stimulus",
-            custom_error_message=f"its first key tells what it does: {', '.join(_KEYS)}",
+            custom_error_message=f"its first key must be one of {', '.join(_KEYS)}",
         ),
     ]

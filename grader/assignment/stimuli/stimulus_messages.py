@@ -79,7 +79,7 @@ def _from_csv(file: Path) -> Iterator[Given]:
             for row in reader:
                 label = f"{file.name}:{reader.line_num}"
                 if None in row:
-                    text = f"{label}: more values than the first row names fields"
+                    text = f"{label}: more values than fields in the first row"
                     raise StimulusError(text, ("from",))
                 # An empty cell leaves its field out, so that rows may have arrays of any length.
                 value = {name.strip(): cell.strip() for name, cell in row.items() if cell}

@@ -156,5 +156,5 @@ def _caption(plot: Plot, values: Sequence[float], band: svg.Point | None, lost: 
         told = f"{outside} of {count} outside (marked ×)" if outside else f"all {count} inside"
         parts = [f"allowed {allowed}{unit_of(plot.y_label)} (shaded)", told]
     if lost:
-        parts.append(f"{lost} without a finite value not drawn")
+        parts.append(f"{lost} not finite and not drawn")
     return f"{one_line(plot.title)}: {', '.join(parts)}."

@@ -231,7 +231,7 @@ def _doubts(export: CanvasExport, title: str, points: str, ours: float) -> Itera
     if _value(points) != ours:
         yield (
             f"{title} has {points} points in Canvas and {number(ours)} here; the scores are "
-            "filled in as they are"
+            "filled in without scaling"
         )
     if title not in export.points:
         others = [other for other in export.points if not _DROPPED.search(other)]
@@ -293,14 +293,14 @@ def _column(export: CanvasExport, wanted: str) -> str:
     ]
     if len(fitting) > 1:
         raise UsageError(
-            f"the gradebook has {wanted!r} several times: {', '.join(fitting)}. Name one whole"
+            f"the gradebook has {wanted!r} several times: {', '.join(fitting)}. Give one full title"
         )
     title = fitting[0] if fitting else cell(wanted)
     dropped = _DROPPED.search(title)
     if dropped:
         raise UsageError(
-            f"Canvas drops a column called {title!r} without a word, because it has "
-            f"{dropped[0]!r} in it, as its own totals: give the assignment another title there"
+            f"Canvas drops the column {title!r} without a message, because its name has "
+            f"{dropped[0]!r} in it, as the totals of Canvas do: rename the assignment there"
         )
     if re.search(r"read\s+only", export.points.get(title, "")):
         raise UsageError(f"Canvas skips the column {title!r}: it is read-only there")

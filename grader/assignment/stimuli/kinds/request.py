@@ -180,7 +180,7 @@ def _value(name: str, value: Any, drawn: dict[str, float]) -> Any:
         raise StimulusError(str(error), place) from None
     types = {type(item) for item in (found if isinstance(found, list) else [found])}
     if not types <= {bool, int, float, str} or (len(types) != 1 and types != {int, float}):
-        text = f"{name}: expected a truth, a number, a text, or a list of one kind of these"
+        text = f"{name}: expected true or false, a number, a text, or a list of one of these"
         raise StimulusError(text, place)
     return found
 
