@@ -109,7 +109,7 @@ FIT = [
     (publish("message: {}\nafter: 5 s"), "17: .*is too late: the timeout of 5 s"),
     (
         "      - {join: /echo, type: std_msgs/msg/String, name: late, after: 1 s}\n" * 2,
-        "15: .*'late' stands twice",
+        "15: .*the name 'late' is used twice",
     ),
     (
         publish("message: {}")
