@@ -246,7 +246,7 @@ def test_where_nothing_is_said_the_package_that_was_being_built_is_named() -> No
             "/usr/bin/ld: x.o: undefined reference to `drive'\ncollect2: error: ld returned 1",
             "/usr/bin/ld: x.o: undefined reference to `drive'",
         ),
-        ("", "it says nothing"),
+        ("", "there is no error message"),
     ],
 )
 def test_where_no_file_is_blamed_the_log_s_own_words_are_shown(said: str, words: str) -> None:
