@@ -392,7 +392,7 @@ def _explain_order(parameters: Series, found: Sequence[Any]) -> tuple[str, str]:
         return f": {grows} from message to message", hint
     if found[0] in found[1:] and steps[0]:
         return (
-            f": it is {_text(found[0])} again in message {found.index(found[0], 1) + 1}",
+            f": it goes back to the first value in message {found.index(found[0], 1) + 1}",
             "Is the value reset, does it overflow, or do two publishers count?",
         )
     return "", hint
