@@ -81,7 +81,7 @@ def test_a_right_action_passes(check, run, parameters, observed):
             "result",
             acting(goal(accepted=None, error="no server"), services=()),
             RESULT,
-            "has no action of its own",
+            "created no action",
         ),
         ("feedback", acting(goal(feedback=())), FEEDBACK, "gave 0 messages of feedback"),
         ("feedback", acting(goal(feedback=())), FEEDBACK, "publish_feedback"),

@@ -227,12 +227,16 @@ class TestGenerated:
         [
             ("rosidl_generate_interfaces(", "rosidl_generate_interface(", "which does not exist"),
             (CMAKE[CMAKE.index("rosidl_gen") :], "ament_package()\n", "never calls rosidl_gen"),
-            ("find_package(rosidl_default_generators REQUIRED)\n", "", "does not find `rosidl_"),
+            (
+                "find_package(rosidl_default_generators REQUIRED)\n",
+                "",
+                "no find_package() for `rosidl_",
+            ),
             ('"msg/BotStatus.msg"', '"BotStatus.msg"', "BotStatus.msg`, but `BotS"),
             ('"msg/BotStatus.msg"', '"msg/Wheel.srv"', "does not list `msg/BotStatus.msg`, but"),
             ('  "msg/BotStatus.msg"\n', "", "does not list `msg/BotStatus.msg` in"),
             ("  DEPENDENCIES geometry_msgs\n", "", "does not name `geometry_msgs` under DEPEND"),
-            ("find_package(geometry_msgs REQUIRED)\n", "", "does not find `geometry_msgs`"),
+            ("find_package(geometry_msgs REQUIRED)\n", "", "no find_package() for `geometry_msgs`"),
         ],
     )
     def test_what_cmake_lacks_is_told(self, old, new, words):

@@ -54,7 +54,7 @@ class TestExists:
     def test_parameter_services_are_not_offered_as_what_there_is(self):
         run = serving(services=(service("/bot_publisher/get_parameters"),))
         found = failing("service.exists", run, **ENABLE)
-        assert "`/bot_publisher` has no service of its own" in found
+        assert "`/bot_publisher` created no service" in found
         assert "self.create_service(Type, 'enable', self.callback)" in found
 
 
