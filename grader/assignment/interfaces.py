@@ -1,6 +1,6 @@
 """Whether interfaces that an assignment names exist, and have the fields that checks name.
 
-What a message cannot have would end as an error, for every student, once they have published one.
+A check of a field that its message does not have would end as an error for every student.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _ZERO = {"bool": False, **dict.fromkeys(FLOATS, 0.0), **dict.fromkeys(TEXTS, "")
 
 @dataclass(frozen=True)
 class Interfaces:
-    """Definitions that are at hand.
+    """The interface definitions that can be read on this machine.
 
     Attributes:
         own: Package -> its folder, of the assignment and of rosgrade; the first win.
@@ -50,7 +50,7 @@ class Interfaces:
 
     @classmethod
     def of(cls, folder: Path) -> Interfaces:
-        """Look around."""
+        """Those of rosgrade, of an assignment's folder and of the installed ROS."""
         files = [*resources.carried_interfaces().glob(f"*/{_MANIFEST}")]
         files += sorted((folder / FOLDER).rglob(_MANIFEST))
         try:
@@ -90,8 +90,8 @@ def interface_problems(
 ) -> Iterator[Problem]:
     """Find interfaces that are neither in ROS, nor beside the assignment, nor handed in.
 
-    A package of Jazzy that is not installed here, and one that the solution ``depends`` on, may
-    well have it: another machine will tell.
+    A package of Jazzy that is not installed here, or that the solution ``depends`` on, is not
+    judged: it may have the interface.
     """
     handed_in = {package.name for package in assignment.packages}
     elsewhere = {name for package in assignment.packages for name in package.depends} | PACKAGES

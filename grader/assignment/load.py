@@ -40,7 +40,7 @@ class LoadedAssignment:
 
     @property
     def folder(self) -> Path:
-        """Where it lies: worlds, own checks and the handout are beside the YAML."""
+        """The folder of the YAML, with worlds, own checks and the handout."""
         return self.file.parent
 
     @property
@@ -85,7 +85,7 @@ def find_assignment(name: str | Path) -> Path:
 
 
 def refuse_swapped(name: str, submission: Path) -> None:
-    """Say it where the submission was named first, and then the assignment."""
+    """Refuse a command that names the submission first, and then the assignment."""
     known = list_assignments()
     if name not in known and str(submission) in known and not submission.exists():
         raise UsageError(
@@ -98,7 +98,7 @@ def load_assignment(
 ) -> LoadedAssignment:
     """Load an assignment.
 
-    Mistakes in its form are told first; once there are none, what does not fit together.
+    Mistakes in its form are reported first; without any, what does not fit together.
     """
     file = find_assignment(name)
     source = read_source(file)

@@ -70,7 +70,7 @@ class LimitOptions(Model):
     output: _Output = _DEFAULTS.output_bytes
 
     def limits(self) -> SandboxLimits:
-        """For the sandbox."""
+        """The same limits as the sandbox takes them."""
         return SandboxLimits(
             memory_bytes=int(self.memory),
             processes=self.processes,
@@ -154,7 +154,7 @@ SHOWN_FROM = tuple(Visibility)
 
 @dataclass(frozen=True)
 class Withheld:
-    """What a student is told of checks that are not shown yet: number and points."""
+    """Number and points of the checks that a student does not see yet."""
 
     checks: int = 0
     points: float = 0.0

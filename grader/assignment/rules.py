@@ -97,7 +97,7 @@ def _requirements(source: Source, checks: Sequence[CheckSpec]) -> Iterator[Probl
             if required not in shown:
                 advice = nearest_or_all(required, shown, "The checks are")
                 yield source.problem(place, f"there is no check {required!r}.{advice}")
-            # A skip could not be told otherwise.
+            # Else a student would see a skipped check without its reason.
             elif SHOWN_FROM.index(shown[required]) > SHOWN_FROM.index(spec.visibility):
                 text = (
                     f"{required!r} is {shown[required].value!r}, so {spec.id!r} cannot be "
@@ -144,7 +144,7 @@ def _check(assignment: Assignment, bound: BoundCheck) -> Iterator[tuple[Place, s
 
 
 def _other_programs(scenarios: Sequence[Scenario]) -> Iterator[tuple[Place, str]]:
-    """A check of all scenarios would judge one program in the runs of another, too."""
+    """Checks without ``scenarios`` where the scenarios launch different programs."""
     launched = [sorted(map(_program, scenario.launch)) for scenario in scenarios]
     for scenario, programs in zip(scenarios, launched, strict=True):
         if programs != launched[0]:
@@ -166,7 +166,7 @@ def _program(launch: Launch) -> str:
 
 @dataclass(frozen=True)
 class _User:
-    """A check with what its needs are looked for in."""
+    """A check with the assignment and the scenarios that must meet its needs."""
 
     bound: BoundCheck
     assignment: Assignment
@@ -319,7 +319,7 @@ def _unnamed(
     does: str,
     wanted: str | None = None,
 ) -> Iterator[_Lack]:
-    """No stimulus is about what a parameter names."""
+    """The problem that no stimulus uses the name in a parameter."""
     wanted = wanted or user.value(key)
     if wanted is not None and wanted not in names:
         text = f"no stimulus of the scenario {scenario.id!r} {does} {wanted!r}."
@@ -334,7 +334,7 @@ def _has_fields(wanted: Mapping[str, Any], given: Sequence[Mapping[str, Any]]) -
 def _impatient(
     user: _User, scenario: Scenario, key: str | None, waits_s: Iterable[float]
 ) -> Iterator[_Lack]:
-    """A stimulus that waits for less time than the check allows."""
+    """The problem of a stimulus that waits for less time than the check allows."""
     if key is None:
         return
     within_s = user.value(key)
@@ -346,11 +346,11 @@ def _impatient(
 
 
 def no_package(name: str, names: Collection[str]) -> str:
-    """That no package of the assignment has a name."""
+    """The text for a name that no package of the assignment has."""
     return f"{name!r} is not among 'packages'.{nearest_or_all(name, names, 'The packages are')}"
 
 
 def no_executable(name: str, package: Package) -> str:
-    """That a package has no executable of a name."""
+    """The text for a name that no executable of the package has."""
     advice = nearest_or_all(name, package.executables, "It has")
     return f"the package {package.name!r} has no executable {name!r} in 'packages'.{advice}"

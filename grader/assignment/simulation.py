@@ -1,4 +1,4 @@
-"""What must fit in scenarios as they are run: worlds, random values, stimuli."""
+"""Validation of scenarios as they are run: worlds, random values, stimuli."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def read_scenario_world(file: Path, values: dict[str, str]) -> World:
 
 
 def problems(source: Source, assignment: Assignment, known: Interfaces) -> Iterator[Problem]:
-    """Find what does not fit.
+    """Find worlds, random values and stimuli that do not fit.
 
     Worlds are tried with the values of several seeds, functions with the seed 0. Fields of
     messages are checked where the definitions are at hand.

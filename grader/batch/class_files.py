@@ -80,19 +80,19 @@ def _note(done: Done, same: Sequence[Entry]) -> str:
 
 
 def standing(ledger: Ledger, entry: Entry) -> Done:
-    """A row of a batch as its folder has it."""
+    """A row of a batch with the result in the batch's folder."""
     result = ledger.result(entry.key) if not entry.fault else None
     if result is not None and entry.sha256 in ("", result.submission.sha256):
         return Done(entry, result, fresh=False)
     if entry.sha256 and not entry.fault:
-        told = "; ".join(part for part in (entry.problem, NO_RESULT) if part)
-        entry = replace(entry, problem=told)
+        problem = "; ".join(part for part in (entry.problem, NO_RESULT) if part)
+        entry = replace(entry, problem=problem)
     return Done(entry, None, fresh=False)
 
 
 def class_rows(done: Sequence[Done], ledger: Ledger | None = None) -> list[ClassRow]:
-    """What is shown of a class, sorted by key."""
-    said = notes(done)
+    """The rows of a class as the overview shows them, sorted by key."""
+    noted = notes(done)
     rows = sorted(done, key=lambda item: item.entry.key)
     return [
         ClassRow(
@@ -100,7 +100,7 @@ def class_rows(done: Sequence[Done], ledger: Ledger | None = None) -> list[Class
             name=item.entry.name,
             report=_report(item, ledger),
             result=item.result,
-            note=said[item.entry.key],
+            note=noted[item.entry.key],
             late=item.entry.late,
             missing=not (item.entry.sha256 or item.entry.fault),
         )
@@ -126,8 +126,8 @@ def write_class(done: Sequence[Done], ledger: Ledger) -> Path:
 def find_reports(out: Path) -> tuple[Path, ...]:
     """The report folders at a path: itself, or those of a class in it, sorted.
 
-    Hidden folders are left out: a batch that still runs writes in them. So is what a batch has
-    left in its folder of rows that it does not have any more, or of what was handed in before.
+    Hidden folders are left out: a batch that still runs writes in them. So are reports of rows
+    that the batch no longer has, and of earlier submissions.
     """
     if not out.exists():
         raise UsageError(f"{out}: does not exist")

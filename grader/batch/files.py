@@ -1,4 +1,4 @@
-"""The files that grading one submission leaves."""
+"""The files that are written for one graded submission."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def write_graded(
     )
     result = make_result(graded.grade, graded.recordings, facts)
     write_report(graded, folder, result)
-    # Last: where it says what the grade is, the report beside it says the same.
+    # Last, so that the report beside a result always has the same grade.
     for file in (folder / RESULT_FILE, json_file):
         if file is not None:
             write_whole(file, result_json(result))

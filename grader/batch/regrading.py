@@ -26,7 +26,7 @@ from grader.submission.record import SubmissionRecord, read_record
 
 @dataclass(frozen=True)
 class FoundRecordings:
-    """What there is to judge again."""
+    """Recordings of a submission to judge again, with its result if there is one."""
 
     folder: Path
     recordings: Mapping[str, Recording]
@@ -36,7 +36,7 @@ class FoundRecordings:
 
     @property
     def assignment(self) -> str:
-        """Id of the assignment that it was recorded for."""
+        """Id of the assignment that they were recorded for."""
         if self.result is not None:
             return self.result.assignment.id
         for recording in self.recordings.values():

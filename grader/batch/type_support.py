@@ -17,7 +17,7 @@ _WORD = re.compile(r"\w+")
 
 
 class TypeSupport:
-    """What the probe imports to hear and send messages of an assignment."""
+    """The built interface packages that the probe imports for an assignment."""
 
     def __init__(self, loaded: LoadedAssignment, ros: RosInstallation, cache: Path) -> None:
         """Set up; nothing is built yet."""
@@ -28,7 +28,7 @@ class TypeSupport:
         self._found: tuple[Path, ...] | None = None
 
     def prefixes(self, on_build: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
-        """Install spaces of ours for the cell; built where they are not there yet, or any more."""
+        """Install spaces of these packages for the cell; what is missing is built first."""
         with self._lock:
             # The cache may be emptied while a class is graded, or rosgrade watches.
             if self._found is None or not all(path.is_dir() for path in self._found):

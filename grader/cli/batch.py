@@ -191,10 +191,10 @@ def _summary(done: Sequence[Done], wall_s: float) -> str:
         most = next(row.result.max_score for row in rows if row.graded and row.result is not None)
         parts.append(f"median {median(scores):g} of {most:g} points")
         parts.append(f"{sum(row.full for row in rows)} with full points")
-    told = {
+    counts = {
         "the same as another": copies(done),
         "could not be graded (again with --retry errors)": count[RowStatus.NOT_GRADED],
         "unreadable, without a score": count[RowStatus.UNREADABLE],
         "handed in nothing": count[RowStatus.MISSING],
     }
-    return "; ".join([*parts, *(f"{number} {what}" for what, number in told.items() if number)])
+    return "; ".join([*parts, *(f"{number} {what}" for what, number in counts.items() if number)])

@@ -45,9 +45,9 @@ def validate(
             print_error(str(error))
             broken += 1
             continue
-        told = [*lint_warnings(loaded, mutants.mutants if mutants else None)]
-        told += not_installed(loaded.assignment.libraries)
-        for warning in told:
+        warnings = [*lint_warnings(loaded, mutants.mutants if mutants else None)]
+        warnings += not_installed(loaded.assignment.libraries)
+        for warning in warnings:
             print_warning(f"{loaded.file}: {warning}")
         tested = f", {counted(len(mutants.mutants), 'mutant')}" if mutants else ""
         typer.echo(

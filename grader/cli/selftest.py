@@ -124,5 +124,5 @@ def _print(console: Console, assignment: str, results: list[TrialResult]) -> Non
         )
     console.print(table)
     for result in results:
-        for line in result.told:
+        for line in result.findings:
             say(f"{result.trial.id}: {line}")

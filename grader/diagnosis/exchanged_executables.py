@@ -18,7 +18,7 @@ def why_exchanged(recording: Recording) -> Cause | None:
         name, _, executable = process.name.partition("/")
         package = recording.submission.package(name)
         other = package and _runs(package, executable)
-        # Where both run, each node is there, whatever started it.
+        # Where both run, each node is there all the same.
         if package and other and f"{name}/{other}" not in launched:
             target = dict(package.entry_points)[executable]
             place = SourceError(package.file("setup.py"), None, f"{executable} = {target}")

@@ -139,7 +139,7 @@ def why_not_delivered(recording: Recording, topic: str) -> Cause | None:
 
 
 def why_not_sent(recording: Recording, topic: str) -> Cause:
-    """Why a stimulus published nothing: no subscription of the student's could get it, or ours."""
+    """Why a stimulus published nothing; without another reason the run should be repeated."""
     return why_not_delivered(recording, topic) or Cause.to_repeat(
         f"nothing was sent on {code(topic)}"
     )

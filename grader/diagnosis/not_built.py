@@ -16,10 +16,10 @@ from grader.submission.intake.paths import is_within
 from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
 
 _LOG_LINES = 15
-# Of a culprit's message, which may join several lines of the log.
+# Of the first error's message, which may join several lines of the log.
 _COMPARED = 60
 _ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
-# What colcon says of its own doings around the tool's output.
+# Lines of colcon itself around the tool's output.
 _CHATTER = re.compile(r"Starting +>>>|(Finished|Failed|Aborted) +<<<|Summary:|\s+\d+ packages? ")
 # What setuptools says of data_files, as `ros2 pkg create` writes them.
 _NO_MARKER = re.compile(r"can't copy 'resource/[\w-]+': doesn't exist")
@@ -155,7 +155,7 @@ def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
     build = submission.build
     if build is None:
         return Cause("nothing was built, so this cannot be judged", ours=True)
-    # A package that is not among those that failed was built, whatever became of the others.
+    # A package that is not among the failed ones was built, even if others failed.
     if build.succeeded or (build.failed_packages and name not in build.failed_packages):
         return None
     return cause_of(NotBuilt(submission, name, build))
@@ -298,7 +298,7 @@ def _clean(build: BuildRecord) -> str:
 
 
 def _relevant(build: BuildRecord, name: str) -> tuple[str, ...]:
-    """What the build of the package wrote, up to what the culprit is blamed for, or its end."""
+    """The log of the package's build, up to its first error or to its end."""
     kept = [line for line in _written(build, name) if line.strip() and not _CHATTER.match(line)]
     if build.culprit is not None:
         message = build.culprit.message[:_COMPARED]

@@ -33,7 +33,7 @@ FieldTolerance = Annotated[
 def unlike(
     value: Mapping[str, Any], wanted: Mapping[str, Any], tolerance: Tolerance
 ) -> tuple[Difference, ...]:
-    """The wanted fields that a value has not.
+    """The wanted fields that a value does not have.
 
     Raises:
         NoSuchField: It cannot have such a field.

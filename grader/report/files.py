@@ -47,8 +47,8 @@ def write_whole(file: Path, content: str | bytes) -> None:
         finally:
             draft.unlink(missing_ok=True)
     except OSError as error:
-        told = UsageError(f"{file} cannot be written: {_why(file, error)}")
-        raise machine_fault(error, file) or told from error
+        refusal = UsageError(f"{file} cannot be written: {_why(file, error)}")
+        raise machine_fault(error, file) or refusal from error
 
 
 def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:
@@ -94,7 +94,7 @@ def _is_of(file: Path, folder: Path) -> bool:
     if not (file.is_file() and folder.is_dir()):
         return False
     inside = os.path.relpath(os.path.realpath(file), os.path.realpath(folder)).split("/")
-    # Reports are no part of what is graded, whatever stands in their place.
+    # Reports are no part of what is graded, even if other files are in their place.
     if inside[0] == ".." or "rosgrade-report" in inside:
         return False
     return _SOURCES.fullmatch(inside[-1]) is not None
@@ -144,5 +144,5 @@ def write_folders(place: Path, files: Mapping[str, str]) -> None:
         finally:
             shutil.rmtree(draft, ignore_errors=True)
     except OSError as error:
-        told = UsageError(f"{error.filename2 or error.filename}: {error.strerror}")
-        raise machine_fault(error) or told from error
+        refusal = UsageError(f"{error.filename2 or error.filename}: {error.strerror}")
+        raise machine_fault(error) or refusal from error

@@ -1,6 +1,6 @@
 """Any entry of ``stimuli``: what the probe does in a scenario besides observing.
 
-A stimulus is told by its first key, such as ``publish``; the kinds are found in ``kinds/``.
+The first key of a stimulus, such as ``publish``, names its kind; the kinds are in ``kinds/``.
 """
 
 from __future__ import annotations

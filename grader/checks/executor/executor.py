@@ -157,7 +157,7 @@ def _working_from(recording: Recording, node: str) -> int:
     if process is None:
         return begin_ns
     # Before an executor spins the constructor may wait for something. A node that never answers
-    # does not spin, whatever its process declares.
+    # does not spin, even if its process declares that it does.
     spun = [item.time_ns for item in recording.declared("spin") if item.process == process.name]
     answered = [
         call.answered_ns
@@ -230,7 +230,7 @@ def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> 
 
 
 def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
-    """The finding where no call counts: what the process declared must do."""
+    """The finding where no call counts, from what the process declared."""
     ended = why_ended(recording)
     if ended is not None:
         return ended.finding(expected)
@@ -247,7 +247,7 @@ def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
         if name in seen and offered.isdisjoint((name, one) for one in executor_services(name))
     ]
     if lacking:
-        # What a process declares would be all that there is, and it can declare anything.
+        # Only declarations would be left, and a process can declare anything.
         busy = was_held_up(recording)
         return Cause(
             f"{codes(lacking)} has none of the services "

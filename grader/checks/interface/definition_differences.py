@@ -12,7 +12,7 @@ from grader.spec.nearest_name import nearest
 
 @dataclass(frozen=True)
 class Difference:
-    """One thing that differs, by the name of the entry in the student's definition or in ours."""
+    """One difference, by the name of the entry in the student's definition or the expected one."""
 
     name: str
     text: str

@@ -173,8 +173,8 @@ def _compared(
         )
     differing = [
         (item, section.lines.get(item.name))
-        for ours, section in zip(wanted, own, strict=True)
-        for item in differ(ours, section, name.package)
+        for expected, section in zip(wanted, own, strict=True)
+        for item in differ(expected, section, name.package)
     ]
     if not differing:
         return Finding.passed(parameters.asked_for, f"found in {code(definition.file)}")

@@ -121,13 +121,13 @@ class Matching(Records):
         return f"{level}log messages{whose}{what}"
 
     def says(self, text: str) -> bool:
-        """Whether a record's text is meant."""
+        """Whether a record has the text."""
         if self.text is not None and self.text.casefold() not in text.casefold():
             return False
         return self.pattern is None or re.search(self.pattern, text) is not None
 
     def found(self, recording: Recording) -> list[Logged]:
-        """The records that are meant."""
+        """The records with the text at the level."""
         return [
             item
             for item in self.of(recording)

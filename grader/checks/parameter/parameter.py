@@ -184,7 +184,7 @@ def settings_to(recording: Recording, parameters: OfSetting) -> tuple[Setting, .
 
 
 def refusal(item: Setting) -> str:
-    """What the node said when it refused a value."""
+    """The node's reason for the refusal of a value."""
     return f"refused: {item.reason or 'without a reason'}"
 
 

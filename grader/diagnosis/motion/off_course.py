@@ -1,4 +1,4 @@
-"""Why a robot left its course, whatever the way it is steered."""
+"""Why a robot left its course, for reasons that do not depend on how it is steered."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from grader.recording.model import NS, Call, Process, Recording
 from grader.spec.unit import format_duration
 from grader.submission.record import SourceError
 
-# What had less time for an answer than this may be unanswered for that reason.
+# A call with less time for an answer than this may be unanswered for that reason.
 _ANSWER_S = 1.0
 # A node whose callbacks return at once answers a call to its parameter services sooner.
 _SLOW_S = 0.5

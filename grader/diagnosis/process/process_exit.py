@@ -245,7 +245,7 @@ def raised(symptom: ProcessExit) -> Cause | None:
 
 
 def offence(recording: Recording) -> Cause | None:
-    """What the processes did that is never allowed, also where they ended before it was seen."""
+    """A forbidden action of the processes, also where they ended before it was seen."""
     for breach in recording.breaches:
         if not breach.allowed:
             moment = Moment(breach.what, recording.since_launch_s(breach.time_ns))

@@ -29,7 +29,7 @@ Replay = Mapping[str, Any]
 STEP = 10
 """Steps of 10 ms from one sample to the next."""
 MOST = 1e6
-"""Metres, or the like, beyond which nothing is told apart."""
+"""Largest number that is kept, in metres or the like; a larger one becomes this."""
 MOST_BEAMS = 90
 MOST_SCANS = 200
 MOST_LINES = 120

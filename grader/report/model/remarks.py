@@ -17,7 +17,7 @@ _FLOOD = 1000
 def remarks(recording: Recording) -> tuple[str, ...]:
     """Say what is conspicuous about a run, one sentence each.
 
-    A limit of the sandbox that was reached is told elsewhere (``Recording.breaches``).
+    A limit of the sandbox that was reached is reported elsewhere (``Recording.breaches``).
     """
     return (*_renaming(recording), *_posing(recording), *_excess(recording), *_tricks(recording))
 

@@ -21,7 +21,7 @@ MOST_CHARACTERS = 500
 
 
 class Row(NamedTuple):
-    """One thing that is said, such as what was ``observed``; ``printed`` has several lines."""
+    """One part of an explanation, such as ``observed``; ``printed`` has several lines."""
 
     name: str
     text: str

@@ -28,7 +28,7 @@ class MachineFaults:
         self._kills = oom_kills()
 
     def clock_was_set(self) -> str | None:
-        """That the clock was set since the beginning, in words; None if it was not."""
+        """A sentence if the clock was set since the beginning, else None."""
         step_ns = ahead_ns() - self._ahead_ns
         if abs(step_ns) <= _TRIFLE_NS:
             return None
@@ -40,7 +40,7 @@ class MachineFaults:
         )
 
     def out_of_memory(self, processes: Iterable[Process], breaches: Sequence[Breach]) -> str | None:
-        """That the kernel may have ended one of these processes, in words; None if not."""
+        """A sentence if the kernel may have ended one of these processes, else None."""
         now = oom_kills()
         if breaches or self._kills is None or now is None or now == self._kills:
             return None

@@ -44,7 +44,7 @@ _SIGNALLED = 128
 # What colcon, Python, compilers and make say of a program of theirs that was killed.
 _KILLED = re.compile(r"code -9\b|\bSIGKILL\b|\bKilled\b")
 _LEAST_FREE_BYTES = 64 * MIB
-# What makes the sandbox, each with its own complaint; colcon is only started by the last.
+# Error messages of the programs that set up a sandbox, the last of which starts colcon.
 _NOT_STARTED = re.compile(r"(?:/\S*/)?(?:sh|unshare|mkdir|mount|setpriv|bwrap|prlimit): .*")
 
 
@@ -171,7 +171,7 @@ class Builder(BuildSetting):
     def _run(
         self, colcon: Colcon, sources: Sources, parts: Mapping[str, CachedBuild]
     ) -> BuildRecord:
-        """Really build."""
+        """Build without a look into the cache."""
         install = colcon.install
         for name, part in parts.items():
             assert part.install is not None
@@ -179,7 +179,7 @@ class Builder(BuildSetting):
             for line in part.build.log.splitlines():
                 self.on_output(line)
         finished = set(parts)
-        # It is there before anything of the student's runs, who could else put a link in its place.
+        # Made before the student's code runs, which could otherwise put a link in its place.
         install.mkdir(exist_ok=True)
         kills = oom_kills()
         check_python = self.sandbox.watched() if self.sandbox else None

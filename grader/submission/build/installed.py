@@ -85,7 +85,7 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
 def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> str | None:
     """See that an install space holds nothing that is dangerous to open or follow.
 
-    Symbolic links to what was handed in, or to nothing, go: nothing will be there.
+    Symbolic links to the submission's files, or to nothing, are removed: they will lead nowhere.
 
     Returns:
         Why it cannot be used at all, in which case it is removed, or None.

@@ -1,4 +1,4 @@
-"""Interface packages of ours: built as a student's are, kept in the cache, laid under others.
+"""rosgrade's own interface packages: built like a student's, cached, used as underlays.
 
 The wheels of ROS 2 lack ``example_interfaces``, which tutorials use all the time. And an assignment
 in whose lesson the student writes an interface package brings its own copy, because the probe never
@@ -34,7 +34,7 @@ def install_prefix(
     cache: BuildCache,
     on_progress: Callable[[str], None] = lambda _: None,
 ) -> Path:
-    """The install space (merged layout) of interface packages of ours, built if need be."""
+    """The install space (merged layout) of interface packages of rosgrade, built if needed."""
     check_toolchain(ros.environment({})["PATH"])
 
     def attempt(is_second: bool) -> CachedBuild:
@@ -66,9 +66,9 @@ def completed(
     cache: BuildCache,
     on_progress: Callable[[str], None] = lambda _: None,
 ) -> RosInstallation:
-    """Add to an installation what it lacks of the packages of ours that are named."""
+    """Add rosgrade's packages among some names to an installation that lacks them."""
     if missing_tools(ros.environment({})["PATH"]):
-        # What needs them will say so, and the rest of the submission is graded.
+        # The build of what needs them fails, and the rest of the submission is graded.
         return ros
     underlays = tuple(
         install_prefix(CARRIED / name, ros, cache, on_progress)

@@ -1,6 +1,6 @@
 """Open a submission: a folder or an archive becomes a private copy that no longer changes.
 
-So the student may go on editing, and nothing of ours can touch the original.
+So the student may go on editing, and rosgrade cannot change the original.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Python source of a student as a syntax tree, without running it and whatever it holds."""
+"""Python source of a student as a syntax tree, safely and without running it."""
 
 from __future__ import annotations
 
