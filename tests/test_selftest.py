@@ -1,4 +1,4 @@
-"""Every assignment of ours tells right from wrong: mutation score 100 %, with real nodes.
+"""Every assignment of rosgrade tells right from wrong: mutation score 100 %, with real nodes.
 
 Some assignments have many scenarios for each of many mutants, and the examples of the
 documentation are many: of those every 24th or every eighth trial is graded here, so that the

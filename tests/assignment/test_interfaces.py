@@ -1,4 +1,4 @@
-"""Interfaces that an assignment names: those that do not exist are told with their line."""
+"""Interfaces that an assignment names: those that do not exist are reported with their line."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("named", "expected"), MISTAKES)
-def test_an_interface_that_does_not_exist_is_told_with_its_line(
+def test_an_interface_that_does_not_exist_is_reported_with_its_line(
     found: Found, ros_with: Callable[..., None], named: dict[str, str], expected: list[str]
 ) -> None:
     ros_with(DEFINITIONS)

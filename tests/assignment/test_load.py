@@ -110,7 +110,7 @@ def test_a_loaded_assignment_has_its_checks_bound(write: Write, catalogue: Catal
         ),
     ],
 )
-def test_a_check_that_does_not_fit_is_told_with_its_line(
+def test_a_check_that_does_not_fit_is_reported_with_its_line(
     found: Found, check: str, said: str
 ) -> None:
     assert found(f"{HEAD}  - {check}\n") == [f"13: {said}"]
@@ -202,7 +202,7 @@ def test_what_is_about_the_robot_needs_a_world(found: Found, key: str, said: str
     assert told.startswith(f"12: scenarios[0].{said}")
 
 
-def test_limits_of_the_build_and_libraries_are_told_with_their_line(found: Found) -> None:
+def test_limits_of_the_build_and_libraries_are_reported_with_their_line(found: Found) -> None:
     begin = GOOD.index("scenarios:")
     line = GOOD[:begin].count("\n") + 1
     written = "build_limits: {memory: 3 s, wall_tme: 9 s}\nlibraries: [numpy, scipy==1.2]\n"
@@ -223,7 +223,7 @@ def test_checks_of_a_run_need_a_scenario(found: Found) -> None:
     ]
 
 
-def test_checks_that_wait_for_each_other_are_told_once_as_a_circle(found: Found) -> None:
+def test_checks_that_wait_for_each_other_are_reported_once_as_a_circle(found: Found) -> None:
     text = HEAD + "".join(
         f"  - {{id: {name}, points: 1, uses: node.alive, requires: [{required}]}}\n"
         for name, required in [
@@ -240,7 +240,7 @@ def test_checks_that_wait_for_each_other_are_told_once_as_a_circle(found: Found)
     ]
 
 
-def test_what_does_not_fit_is_told_once_the_form_is_right(found: Found) -> None:
+def test_what_does_not_fit_is_reported_once_the_form_is_right(found: Found) -> None:
     text = HEAD.replace("timeout: 5 s", "timeout: 5") + (
         "  - {id: a, uses: node.alife, points: 1, requires: [q]}\n"
         "  - {id: b, uses: node.alive, point: 1, scenarios: [run]}\n"

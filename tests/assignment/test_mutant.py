@@ -101,7 +101,7 @@ SETUP, NODE = "bot/setup.py", "bot/bot/node.py"
         ({"files": {"bot/resource/bot": ""}}, "changes nothing"),
     ],
 )
-def test_what_does_not_apply_is_told(changes: dict[str, object], said: str) -> None:
+def test_what_does_not_apply_is_reported(changes: dict[str, object], said: str) -> None:
     ((_, text),) = mutate(variant(**changes), FILES)[1]
     assert said in text
 

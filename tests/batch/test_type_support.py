@@ -28,9 +28,7 @@ def test_the_copy_is_that_of_the_reference() -> None:
         assert copy.read_bytes() == reference.read_bytes(), copy
 
 
-def test_what_somebody_has_deleted_is_built_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_was_deleted_is_built_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     built: list[Path] = []
 
     def build(_support: TypeSupport, _on_build: object) -> tuple[Path, ...]:

@@ -53,7 +53,9 @@ def test_an_archive_arrives_as_it_is(submission: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["folder", "archive"])
-def test_what_is_refused_is_not_sent_but_told(kind: str, submission: Path, tmp_path: Path) -> None:
+def test_a_refused_submission_is_not_sent_but_only_its_reason(
+    kind: str, submission: Path, tmp_path: Path
+) -> None:
     path = submission if kind == "folder" else tmp_path / "ana.zip"
     with (submission / "big.bin" if kind == "folder" else path).open("wb") as big:
         big.truncate(2**30)

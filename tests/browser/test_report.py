@@ -196,7 +196,7 @@ def test_the_whole_report_is_printed(look, pages, tmp_path):
     found.page.emulate_media(media="print")
     assert found.page.locator(".replay").is_hidden()
     assert found.page.locator(".contents").is_hidden()
-    # Paper is white, whatever the screen is.
+    # Paper is white, also where the screen is dark.
     ink = found.page.evaluate("() => getComputedStyle(document.body).color")
     assert ink == "rgb(26, 32, 43)"
 

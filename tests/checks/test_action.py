@@ -127,7 +127,7 @@ def test_a_right_action_passes(check, run, parameters, observed):
         ),
     ],
 )
-def test_what_is_wrong_is_told(check, run, parameters, words):
+def test_what_is_wrong_is_reported(check, run, parameters, words):
     assert words in failing(f"action.{check}", run, **parameters)
 
 
@@ -156,7 +156,7 @@ def test_what_the_machine_or_the_probe_did_is_judged_in_another_run(check, run, 
     assert (finding.status, finding.disturbed) == (Status.ERROR, True)
 
 
-def test_what_was_not_aborted_is_not_said_to_be():
+def test_a_goal_that_was_not_aborted_is_not_called_aborted():
     run = acting(goal(status="succeeded"))
     found = failing("action.result", run, **{**RESULT, "status": "aborted"})
     assert "goal_handle.abort()" in found and "rclpy aborts" not in found
@@ -190,7 +190,7 @@ def test_an_exception_that_rclpy_caught_is_the_cause(check, run):
         ("preempts", preempting(end_s=None), "was still worked on at the end: the process"),
     ],
 )
-def test_a_server_that_dies_is_the_cause_whatever_the_machine_took(check, run, words):
+def test_a_server_that_ends_is_the_cause_even_on_a_busy_machine(check, run, words):
     run = replace(
         run, processes=(died(-6, 1.6),), ending=Ending.EXITED, stop_ns=at(1.6),
         disturbance=taken(1.5, 1.6, waited_s=0.02),

@@ -133,7 +133,7 @@ class TestPasses:
         both = {STATUS: (*start, *good.on(STATUS)[6:]), ODOM: SOURCES}
         assert verdict(recording(messages=both)).status is Status.PASSED
 
-    def test_whether_a_node_lags_is_not_said_where_the_machine_kept_it_waiting(self):
+    def test_no_lag_is_reported_where_the_machine_kept_the_node_waiting(self):
         late = run(lambda t: right(t - 0.8), times=TIMES[20:])
         assert verdict(late).status is Status.FAILED
         busy = recording(messages=late.messages, disturbance=taken(0.1, 4.0, waited_s=1.0))

@@ -144,7 +144,7 @@ class TestFields:
             ("BURGER=1", "BURGER 1", "A constant has an equals sign"),
         ],
     )
-    def test_each_difference_is_told(self, old, new, words):
+    def test_each_difference_is_reported(self, old, new, words):
         found = self.fields(TEXT.replace(old, new))
         assert found.status is Status.FAILED
         assert words in f"{found.observed} | {found.hint}"
@@ -208,7 +208,7 @@ class TestConstants:
             ("BURGER=1", "BURGER 1", "no constant `uint8 BURGER=1`"),
         ],
     )
-    def test_each_difference_is_told(self, old, new, words):
+    def test_each_difference_is_reported(self, old, new, words):
         found = self.constants(TEXT.replace(old, new))
         assert found.status is Status.FAILED
         assert words in found.observed
@@ -239,7 +239,7 @@ class TestGenerated:
             ("find_package(geometry_msgs REQUIRED)\n", "", "no find_package() for `geometry_msgs`"),
         ],
     )
-    def test_what_cmake_lacks_is_told(self, old, new, words):
+    def test_what_cmake_lacks_is_reported(self, old, new, words):
         assert old in CMAKE
         finding = judge(
             "interface.generated", unbuilt(cmake=CMAKE.replace(old, new)), interface=INTERFACE

@@ -77,7 +77,7 @@ def test_a_message_right_after_the_match_counts_for_nothing_of_the_past():
     assert "got 9 of the 12" in failure(joined(9, depth=9, joins=(late,)))
 
 
-def test_a_longer_queue_loses_and_is_told():
+def test_a_longer_queue_loses_points_and_is_reported():
     found = failure(joined(12, depth=100))
     assert "it got 12 of the 12 messages published before it: the publisher's depth is 100" in found
     assert "depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL" in found
@@ -107,7 +107,7 @@ def test_a_publisher_that_was_out_of_sight_is_not_the_student_s_fault():
     assert verdict(run).status is Status.ERROR
 
 
-def test_a_shorter_queue_loses_and_is_told():
+def test_a_shorter_queue_loses_points_and_is_reported():
     found = failure(joined(9, depth=9))
     assert "it got 9 of the 12 messages published before it: the publisher's depth is 9" in found
 

@@ -306,7 +306,7 @@ class TestOtherValues:
         assert "none shows `pose.pose.position.x` = 1.37" in position(lines(text, ODOM_TIMES_S))
 
     @pytest.mark.parametrize("text", ["x = -0.62, y = 1.37", "x: -0.62\ny: 1.37"])
-    def test_that_they_are_exchanged_is_said(self, text):
+    def test_exchanged_names_are_reported(self, text):
         found = position(lines(text, ODOM_TIMES_S))
         assert "`pose.pose.position.x` and `pose.pose.position.y` are swapped" in found
 

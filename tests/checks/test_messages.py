@@ -162,7 +162,7 @@ class TestSilence:
         # On a machine that nothing disturbed it is no excuse, since a process could declare it.
         assert count(run, exactly=1).status is Status.FAILED
 
-    def test_a_run_that_the_machine_mostly_took_says_nothing(self):
+    def test_a_run_with_too_little_cpu_time_is_no_failure(self):
         finding = count(silent(disturbance=taken(0.5, 4.4, waited_s=2.5)), at_least=1)
         assert (finding.status, finding.disturbed) == (Status.ERROR, True)
         assert "the machine took 2.5 s of 4.1 s" in finding.observed

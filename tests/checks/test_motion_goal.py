@@ -190,7 +190,7 @@ def test_huge_commands_break_nothing(huge):
     assert math.isfinite(verdict.r2) and verdict.r2 < 0.9
 
 
-def test_the_gain_is_told():
+def test_the_gain_is_reported():
     run = run_to(GOAL, angular=1.7)
     finding = judge("motion.proportional", run, goal=yaml(GOAL), phase="align")
     assert finding.status is Status.PASSED
@@ -417,7 +417,7 @@ class TestMistakes:
             ((0.4, 0.2, 0.0), "came to rest at (0.3"),
         ],
     )
-    def test_another_goal_is_told(self, goal, words):
+    def test_another_goal_is_reported(self, goal, words):
         run = run_to((*goal[:2], wrap(goal[2])))
         assert words in failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
 
@@ -427,14 +427,14 @@ class TestMistakes:
         said = failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
         assert "measured from where the robot started" in said
 
-    def test_a_robot_that_is_too_slow_is_told(self):
+    def test_a_robot_that_is_too_slow_is_reported(self):
         run = run_to(GOAL, linear=0.02, seconds=20)
         assert (
             "if it drives to the goal, it is too slow"
             in failing("motion.reaches", run, goal=yaml(GOAL), **REACHES).lower()
         )
 
-    def test_a_robot_that_never_stops_turning_is_told(self):
+    def test_a_robot_that_never_stops_turning_is_reported(self):
         run = run_to(GOAL, align_law=lambda _: 0.5, straight=0.0, seconds=30)
         said = failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
         assert "still turns at 0.5 rad/s" in said or "not at rest" in said
@@ -535,7 +535,7 @@ def test_drive_plain_silence_says_why():
             assert "the robot never moved" in failing(name, run, **parameters)
 
 
-def test_a_robot_that_turns_the_long_way_and_never_rests_is_told_to_normalise_the_error():
+def test_a_robot_that_turns_the_long_way_and_never_rests_gets_the_advice_to_normalise_the_error():
     run = run_to(BEHIND, seconds=30.0, wrap=lambda error: error)
     finding = judge("motion.path_length", run, goal=yaml(BEHIND), position="8 cm", most="180 %")
     assert finding.status is Status.FAILED
@@ -563,7 +563,7 @@ def test_a_yaw_that_was_read_wrongly_is_named(yaw, words, hint, style):
     assert hint in finding.hint
 
 
-def test_a_robot_that_turns_on_and_on_is_told_to_look_at_its_yaw():
+def test_a_robot_that_turns_on_and_on_gets_the_advice_to_look_at_its_yaw():
     """Its commands follow nothing, and say nothing of what it took for its yaw."""
     run = run_to((0.6, 0.4, 1.0), law=lambda error: 0.5 + 0.1 * math.sin(20.0 * error))
     finding = judge("motion.reaches", run, goal=yaml((0.6, 0.4, 1.0)), **REACHES)

@@ -123,7 +123,7 @@ class TestKeepsDriving:
 
 
 class TestDrives:
-    def test_twice_the_speed_is_told(self):
+    def test_twice_the_speed_is_reported(self):
         run = drive(by_front(0.2), world=WALL, seconds=20)
         assert "it drives too fast" in failing("motion.drives", run, **DRIVES)
 
@@ -141,11 +141,11 @@ class TestDrives:
         said = failing("motion.drives", run, **DRIVES)
         assert "1 m/s was commanded, and the robot can do no more than 0.22 m/s" in said
 
-    def test_driving_backwards_is_told(self):
+    def test_driving_backwards_is_reported(self):
         run = drive(by_front(-0.1), seconds=5)
         assert "it drives the wrong way" in failing("motion.drives", run, speed="0.1 m/s")
 
-    def test_driving_on_and_off_is_told(self):
+    def test_driving_on_and_off_is_reported(self):
         ticks = iter(range(10_000))
         run = drive(on_scan(lambda _: (0.1 * (next(ticks) % 4 < 2), 0.0)), seconds=8)
         assert "paused in between, 9 times" in failing("motion.drives", run, speed="0.1 m/s")
@@ -157,7 +157,7 @@ class TestDrives:
         said = failing("motion.stays_at_rest", drive(law, seconds=6, rest_s=None))
         assert "turned on the spot" in said and "set off" not in said
 
-    def test_turning_in_place_of_driving_is_told(self):
+    def test_turning_in_place_of_driving_is_reported(self):
         run = drive(on_scan(lambda _: (0.0, 0.1)), seconds=5)
         assert "turns on the spot" in failing("motion.drives", run, speed="0.1 m/s")
 
@@ -242,7 +242,7 @@ class TestStops:
         assert "reported 0.0" in failing("motion.keeps_driving", run, distance="1 m")
         assert "reported 0.0" in failing("motion.drives", run, speed="0.1 m/s")
 
-    def test_whoever_drove_on_with_zero_ahead_did_not_stop_for_it(self):
+    def test_a_robot_that_drove_on_with_zero_ahead_did_not_stop_for_it(self):
         def law(ranges):
             return (0.0 if min(filter(None, ranges), default=1.0) <= 0.2 else 0.1, 0.0)
 
@@ -264,13 +264,13 @@ class TestStops:
             said = failing(check, run, **parameters)
             assert "nearest of all" not in said and "made it stop? Log" in said
 
-    def test_a_robot_that_never_stops_is_told(self):
+    def test_a_robot_that_never_stops_is_reported(self):
         run = drive(lambda s: (0.1, 0.0) if s.new_scan else None, world=WALL, seconds=3)
         said = failing("motion.stops", run, **STOPS)
         assert "never stopped: it still drives at 0.1 m/s" in said
         assert "a wall is still" in said
 
-    def test_a_robot_that_hits_the_wall_is_told(self):
+    def test_a_robot_that_hits_the_wall_is_reported(self):
         run = drive(lambda s: (0.1, 0.0) if s.new_scan else None, world=WALL, seconds=12)
         for check, parameters in (("motion.stops", STOPS), ("motion.no_contact", {})):
             said = failing(check, run, **parameters)
@@ -328,7 +328,7 @@ class TestStops:
         assert "drove into a wall" in said and "; the last scan had come 6." in said
         assert "Without new scans the robot drives blindly" in said and "brake" not in said
 
-    def test_stopping_too_late_is_told(self):
+    def test_stopping_too_late_is_reported(self):
         late = iter(range(1000))
 
         def law(senses: Senses):
@@ -392,7 +392,7 @@ class TestRest:
             "motion.stays_at_rest", run, after="start"
         )
 
-    def test_setting_off_again_is_told(self):
+    def test_setting_off_again_is_reported(self):
         def forgetful(senses: Senses):
             if not senses.new_scan or senses.scan is None:
                 return None
@@ -402,7 +402,7 @@ class TestRest:
         said = failing("motion.stays_at_rest", run, after="stop")
         assert "set off again 10.1" in said and "a wall" in said
 
-    def test_backing_off_is_told(self):
+    def test_backing_off_is_reported(self):
         run = drive(on_scan(lambda _: (-0.05, 0.0)), world=WALL, seconds=2, rest_s=None)
         said = failing("motion.stays_at_rest", run, after="start")
         assert "set off backwards" in said

@@ -63,7 +63,7 @@ class TestDeclared:
             ({"speed": 0.5}, {"node": "bot"}, "found the node `/bot_publisher`"),
         ],
     )
-    def test_what_is_declared_otherwise_is_told(self, values, wanted, words):
+    def test_what_is_declared_otherwise_is_reported(self, values, wanted, words):
         assert words in failing("parameter.declared", read(**values), **{**SPEED, **wanted})
 
     def test_a_node_that_does_not_answer(self):
@@ -138,7 +138,7 @@ class TestSet:
             (setting(0.9, 0.5), {"value": 0.9}, "it was accepted, but its value is 0.5 afterwards"),
         ],
     )
-    def test_another_answer_is_told(self, run, wanted, words):
+    def test_another_answer_is_reported(self, run, wanted, words):
         assert words in failing("parameter.set", run, **SPEED, **wanted)
 
     def test_a_value_that_was_never_tried(self):
@@ -180,7 +180,7 @@ class TestTakesEffect:
             (moving(0.9, until_s=2.0), DATA, "Publish in every call of the callback"),
         ],
     )
-    def test_what_does_not_change_is_told(self, run, wanted, words):
+    def test_what_does_not_change_is_reported(self, run, wanted, words):
         assert words in failing("parameter.takes_effect", run, **SPEED, **wanted)
 
     def test_an_attempt_that_is_refused_later_changes_nothing(self):
@@ -235,7 +235,7 @@ class TestLifecycle:
         found = failing("lifecycle.state", run, **self.WANTED)
         assert "it is inactive" in found and "TransitionCallbackReturn" not in found
 
-    def test_a_node_without_states_is_told(self):
+    def test_a_node_without_states_is_reported(self):
         run = states("unconfigured", services=())
         assert "is no lifecycle node" in failing("lifecycle.state", run, **self.WANTED)
 

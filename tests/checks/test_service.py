@@ -71,7 +71,7 @@ class TestResponds:
         finding = judge("service.responds", run, **TRUE, request={"data": True})
         assert finding.status is Status.PASSED
 
-    def test_of_a_long_request_only_what_is_not_zero_is_told(self):
+    def test_of_a_long_request_only_fields_that_are_not_zero_are_shown(self):
         zeros = {"header": {"stamp": {"sec": 0}, "frame_id": ""}, "d": [], "k": [0.0] * 9}
         request = {**zeros, "width": 640, "rectify": False, "height": 480}
         run = serving(asked(request=request, response={"success": False}))
@@ -94,7 +94,7 @@ class TestResponds:
             (asked(answer_s=1.5), "was not answered for 1.5 s"),
         ],
     )
-    def test_a_wrong_or_late_answer_is_told_with_the_request(self, call, words):
+    def test_a_wrong_or_late_answer_is_reported_with_the_request(self, call, words):
         assert words in failing("service.responds", serving(call), **TRUE, **RANGE)
 
     def test_the_process_died_of_the_call(self):
@@ -130,7 +130,7 @@ class TestResponds:
         finding = judge("service.responds", run, **TRUE)
         assert (finding.status, finding.disturbed) == (Status.ERROR, True)
 
-    def test_an_answer_that_was_not_due_yet_costs_nobody_a_point(self):
+    def test_an_answer_that_was_not_due_yet_costs_no_point(self):
         run = serving(asked(4.4, None))
         finding = judge("service.responds", run, **TRUE, within="1 s")
         assert finding.status is Status.ERROR

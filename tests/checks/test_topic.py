@@ -128,7 +128,7 @@ class TestPublished:
             ),
         ],
     )
-    def test_what_is_there_instead_is_told(self, there, topic, words):
+    def test_what_is_there_instead_is_reported(self, there, topic, words):
         assert words in failing("topic.published", with_endpoints(there), topic=topic)
 
     def test_a_death_before_the_publisher_was_created(self):
@@ -144,7 +144,7 @@ class TestPublished:
         run = with_endpoints(endpoint("/cmdvel"), processes=(died(1),), ending=Ending.EXITED)
         assert "`/cmdvel` instead" in failing("topic.published", run, topic="/cmd_vel")
 
-    def test_a_topic_of_a_process_that_lives_is_no_misspelling_of_the_dead_one_s(self):
+    def test_a_topic_of_a_running_process_is_no_misspelling_of_one_of_an_ended_process(self):
         run = with_endpoints(
             endpoint("/cmd_vel_raw"),
             processes=(process(), died(1, name="bot/driver")),
@@ -187,7 +187,7 @@ class TestSubscribed:
             ),
         ],
     )
-    def test_what_is_there_instead_is_told(self, there, words):
+    def test_what_is_there_instead_is_reported(self, there, words):
         assert words in failing("topic.subscribed", with_endpoints(there), topic="/scan")
 
     def test_messages_of_others_on_the_topic_prove_no_subscription(self):

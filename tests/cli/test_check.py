@@ -84,7 +84,7 @@ def test_only_one_check_and_what_it_requires_is_judged(rosgrade: Rosgrade, tmp_p
         ({"a/package.xml": "<package", "notes.txt": ""}, "a/package.xml"),
     ],
 )
-def test_what_is_no_package_is_graded_with_nothing_and_says_why(
+def test_a_submission_without_a_package_gets_no_points_and_a_reason(
     rosgrade: Rosgrade, tmp_path: Path, files: dict[str, str], said: str
 ) -> None:
     submission = tmp_path / "submission"

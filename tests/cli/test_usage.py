@@ -76,7 +76,7 @@ def test_the_submissions_of_a_class_are_named_by_their_folder(rosgrade: Rosgrade
 
 
 @pytest.mark.parametrize("command", ["check", "watch", "batch"])
-def test_who_names_the_submission_first_is_told_the_order(
+def test_a_submission_in_front_of_the_assignment_is_refused_with_the_right_order(
     rosgrade: Rosgrade, tmp_path: Path, command: str
 ) -> None:
     (tmp_path / "mine").mkdir()
@@ -115,7 +115,7 @@ def test_another_distribution_in_the_shell_is_not_the_student_s_fault(
     assert "ROS 2 humble is sourced" in ended.stderr
 
 
-def test_a_file_in_the_place_of_the_report_is_told_before_anything_is_graded(
+def test_a_file_in_the_place_of_the_report_is_reported_before_anything_is_graded(
     rosgrade: Rosgrade, tmp_path: Path
 ) -> None:
     (tmp_path / "mine").touch()
@@ -139,7 +139,7 @@ def test_a_library_that_is_not_there_is_a_doubt(rosgrade: Rosgrade, tmp_path: Pa
     assert "'scypi', which is not installed here. Did you mean 'scipy'?" in ended.stderr
 
 
-def test_every_assignment_of_ours_is_valid(rosgrade: Rosgrade) -> None:
+def test_every_assignment_of_rosgrade_is_valid(rosgrade: Rosgrade) -> None:
     names = [folder.name for folder in sorted((ROOT / "assignments").iterdir())]
     ended = rosgrade("validate", *names, columns=300)
     assert ended.returncode == 0, ended.stderr
@@ -165,7 +165,7 @@ def test_the_schemas_are_json_schemas(rosgrade: Rosgrade, document: str) -> None
 
 
 @pytest.mark.parametrize("jobs", ["0", "-1", "1.5", "²", "many"])
-def test_a_number_of_jobs_that_is_none_is_told(
+def test_a_number_of_jobs_that_is_none_is_reported(
     rosgrade: Rosgrade, tmp_path: Path, jobs: str
 ) -> None:
     place = lesson(tmp_path)

@@ -1,4 +1,4 @@
-"""What the student's code destroyed is a finding, by name; what we or the machine ended is not."""
+"""What the student's code destroyed is a finding, by name; what the scenario ended is not."""
 
 from dataclasses import replace
 
@@ -59,7 +59,7 @@ def test_a_subscription_that_was_destroyed_after_what_was_sent_before_the_launch
     assert f"the subscription to `/chatter` {WORDS}" in found
 
 
-def test_a_publisher_that_was_destroyed_before_somebody_joined():
+def test_a_publisher_that_was_destroyed_before_a_late_joiner():
     run = recording(
         endpoints=(gone(endpoint(qos=LATCHED), 4.0), reader()),
         joins=(replace(join(4.2), matched_ns=None),),

@@ -53,7 +53,7 @@ def test_a_library_is_named_with_those_that_are_there(message: str) -> None:
         "something else",
     ],
 )
-def test_a_slip_in_a_name_of_the_student_s_or_of_ros_is_another_matter(message: str) -> None:
+def test_a_misspelt_name_of_the_student_s_or_of_ros_is_another_matter(message: str) -> None:
     assert library_hint(message, run()) is None
 
 

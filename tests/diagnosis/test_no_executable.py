@@ -40,7 +40,7 @@ CMAKE = {"build_type": "ament_cmake", "entry_points": ()}
         (CMAKE, "install(TARGETS bot_pub DESTINATION lib/${PROJECT_NAME})"),
     ],
 )
-def test_what_is_wrong_is_told_with_what_to_write(changes, words):
+def test_what_is_wrong_is_reported_with_what_to_write(changes, words):
     record = submission(package(**{"executables": (), **changes}))
     cause = why_no_executable(record, "bot_publisher", "bot_pub")
     assert words in f"{cause.observed} | {cause.hint}"

@@ -1,4 +1,4 @@
-"""What is told of a run although it costs nothing."""
+"""Remarks on a run, which cost no points."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_an_ordinary_run_is_not_worth_a_word() -> None:
         ),
     ],
 )
-def test_what_is_conspicuous_is_told_in_one_sentence(values, begins, ends) -> None:
+def test_what_is_conspicuous_is_reported_in_one_sentence(values, begins, ends) -> None:
     (said,) = remarks(run(**values))
     assert said.startswith(begins) and said.endswith(ends)
 
@@ -99,7 +99,7 @@ def test_a_topic_that_the_assignment_asks_for_is_no_robot_s() -> None:
     assert remarks(run(endpoints=(endpoint("/odom", Owner.STUDENT, Kind.SUBSCRIPTION),))) == ()
 
 
-def test_output_beyond_what_is_kept_and_another_domain_are_told() -> None:
+def test_output_beyond_what_is_kept_and_another_domain_are_reported() -> None:
     process = Process("bot/bot", 7, 1, 2, 0, "SIGINT", 0.1, dropped_bytes=1)
     assert remarks(run(processes=(process,), environment={"other_domains": "5"})) == (
         "the submission joined another ROS domain: 5",

@@ -44,7 +44,7 @@ def test_an_empty_folder_and_an_empty_zip(
         ({".src/bot/package.xml": ""}, "hidden folders"),
     ],
 )
-def test_a_submission_without_a_package_is_told_what_to_do(
+def test_a_submission_without_a_package_gets_advice(
     tree: Tree, named_ros: RosInstallation, files: dict[str, str | bytes], hint: str
 ) -> None:
     assert hint in problem(tree.write(files), named_ros)

@@ -1,4 +1,4 @@
-"""Interface packages of ours under what students hand in."""
+"""rosgrade's interface packages as underlays of submissions."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_a_ros_that_has_the_package_is_left_as_it_is(named_ros: RosInstallation)
     assert completed(named_ros, ["example_interfaces"], cache) is named_ros
 
 
-def test_what_nobody_names_is_not_built(named_ros: RosInstallation) -> None:
+def test_packages_that_are_not_named_are_not_built(named_ros: RosInstallation) -> None:
     cache = BuildCache(Path("/nowhere"))
     assert completed(named_ros, ["rclpy", "turtlesim"], cache) is named_ros
 
@@ -93,7 +93,7 @@ def test_underlays_are_seen_behind_the_submission(
 @pytest.mark.compiles
 @pytest.mark.ros
 @pytest.mark.slow
-def test_a_package_of_ours_that_does_not_build_is_our_fault(tmp_path: Path) -> None:
+def test_a_package_of_rosgrade_that_does_not_build_is_a_grader_fault(tmp_path: Path) -> None:
     folder = tmp_path / "bot_msgs"
     folder.mkdir()
     manifest = (EXAMPLE / "package.xml").read_text(encoding="utf-8")
