@@ -201,4 +201,4 @@ def make_node(name: str, context: Context) -> Node:
 
 
 def _never(message: Any) -> None:
-    """Stands where rclpy wants a callback; no executor serves it."""
+    """A callback that is never called, since no executor serves it."""

@@ -158,7 +158,7 @@ def _other_programs(scenarios: Sequence[Scenario]) -> Iterator[tuple[Place, str]
 
 
 def _program(launch: Launch) -> str:
-    """What is launched, with everything that gives its nodes and topics other names."""
+    """A launched program with the rules that give its nodes and topics other names."""
     renamed = [*launch.remap.items(), ("__node", launch.name), ("__ns", launch.namespace)]
     rules = ", ".join(f"{old}:={new}" for old, new in renamed if new is not None)
     return f"'{launch.program}'" + (f" ({rules})" if rules else "")

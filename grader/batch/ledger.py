@@ -202,7 +202,7 @@ def keep_earlier(file: Path) -> None:
 
 
 def _sync(path: Path) -> None:
-    """Let what was written, or the renames in a folder, survive a power cut."""
+    """Make a written file, or the renames in a folder, survive a power cut."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

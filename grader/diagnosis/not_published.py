@@ -206,7 +206,7 @@ def _firing(recording: Recording) -> list[declarations.DeclaredTimer]:
 
 
 def _heard(recording: Recording, topic: str) -> str:
-    """What the node was sent, in words, but for what it answers elsewhere; empty without any."""
+    """The messages to the node in words, without those that it answers elsewhere; or empty."""
     topics = {item.topic for item in recording.student_endpoints(Kind.SUBSCRIPTION)}
     return listing(
         f"{counted(len(recording.carried(name)), 'message')} on {code(name)}"

@@ -109,7 +109,7 @@ def check_folder(folder: Path) -> None:
 
 
 def _in_the_way(folder: Path) -> Path | None:
-    """What is where a folder is needed."""
+    """The file that is in the place of a needed folder."""
     there = next((one for one in (folder, *folder.parents) if os.path.lexists(one)), None)
     return None if there is None or there.is_dir() else there
 

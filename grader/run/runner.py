@@ -190,7 +190,6 @@ def _stimuli(
     seed: int,
     drawn: Mapping[str, float],
 ) -> tuple[dict[str, Any], ...]:
-    """Make the orders of the stimuli."""
     from grader.assignment.stimuli.message import StimulusError
     from grader.assignment.stimuli.stimulus_model import Making
 

@@ -172,12 +172,11 @@ def _working_from(recording: Recording, node: str) -> int:
 
 
 def _wait_s(recording: Recording, call: Call) -> float:
-    """How long a call waited for its answer."""
     return ((call.answered_ns or recording.stop_ns) - call.requested_ns) / NS
 
 
 def _own_s(recording: Recording, call: Call) -> float:
-    """The same without what the machine took meanwhile."""
+    """How long a call waited, without what the machine took meanwhile."""
     return left_s(recording, call.requested_ns, call.answered_ns or recording.stop_ns)
 
 

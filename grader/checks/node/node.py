@@ -136,7 +136,7 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
 
 
 def _why_gone(recording: Recording, name: str | None) -> Cause | None:
-    """A node that the scenario is about vanished early, and gave no sign of life after."""
+    """Why a node that the scenario is about vanished early, without a sign of life after it."""
     concerned = target_nodes(recording)
     nodes = concerned or recording.student_nodes
     if name is not None:

@@ -241,7 +241,7 @@ def _lacking(one: SourceFunction, returns: bool) -> str:
 def _shared(
     parameters: _Share, judged: Sequence[tuple[bool, SourceError]], what: str, hint: str
 ) -> Finding:
-    """Judge by how many have what they need."""
+    """The finding by the share of items that have what they need."""
     lacking = [place for good, place in judged if not good]
     having = len(judged) - len(lacking)
     observed = f"{having} of {len(judged)} have {what}"

@@ -110,7 +110,7 @@ def _millis(*values: float) -> list[int]:
 
 
 def _finite(value: float) -> float:
-    """A number for JSON: a scan may be of a submission that publishes its own."""
+    """A finite number for JSON: a student's own scan may hold any number."""
     return min(max(value, -MOST), MOST) if not math.isnan(value) else 0.0
 
 

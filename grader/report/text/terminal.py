@@ -175,5 +175,5 @@ def _line(console: Console, text: str) -> str:
 
 
 def _encodable(console: Console, text: str) -> str:
-    """What the terminal's encoding has no character for is written as an escape."""
+    """A text with escapes for characters that the terminal's encoding does not have."""
     return text.encode(console.encoding, "backslashreplace").decode(console.encoding)

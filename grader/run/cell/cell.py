@@ -366,7 +366,7 @@ class Cell:
 
 
 def _raise_if_abandoned() -> None:
-    """Standard input ends with the process that ordered the run."""
+    """Raise if standard input has ended, as it does with the runner that ordered the run."""
     readable, _, _ = select.select([0], [], [], 0)
     if readable and not os.read(0, 1):
         raise Abandoned

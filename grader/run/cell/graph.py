@@ -135,7 +135,7 @@ class GraphObserver:
         self._see_services(now_ns)
 
     def _found(self, ask: Callable[[], Iterable[_Found]]) -> Iterable[_Found]:
-        """What a question about the graph finds: nothing where ROS does not allow a name in it."""
+        """The answer to a question about the graph; empty where ROS does not allow a name in it."""
         try:
             return ask()
         except (NameValidationException, UnicodeDecodeError):

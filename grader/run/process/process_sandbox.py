@@ -153,7 +153,7 @@ class SandboxedProcess(subprocess.Popen[bytes]):
 
 
 def _check_executable(path: Path) -> None:
-    """Raise what the kernel would say of a program."""
+    """Raise the error that the kernel would give at the start of a program."""
     with path.open("rb") as file:
         begin = file.read(4)
     if not begin.startswith(_FORMATS):

@@ -209,7 +209,7 @@ class Builder(BuildSetting):
         )
 
     def _check_machine(self, outcome: Outcome, colcon: Colcon, *, memory_ran_out: bool) -> None:
-        """Raise what is not the student's fault."""
+        """Raise an error for a failure that is not the student's fault."""
         status, output = outcome.status, outcome.output
         if status is None:
             return

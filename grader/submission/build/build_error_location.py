@@ -205,7 +205,7 @@ class _Place:
         return next((error for error in found if error is not None), None)
 
     def _callers(self) -> Iterator[tuple[str, str]]:
-        """What called the command that failed, the innermost first."""
+        """The callers of the command of CMake that failed, the innermost first."""
         for number in range(self.number + 1, min(self.number + 40, len(self.lines))):
             if self.lines[number].startswith("Call Stack"):
                 callers = map(_CMAKE_CALLER.match, replace(self, number=number)._block())

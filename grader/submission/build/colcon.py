@@ -166,7 +166,7 @@ class Colcon:
 
     @cached_property
     def _include(self) -> Path:
-        """Copied before anything of the student's ran, which could put a link in its place."""
+        """A file for CMake, copied before the student's code could put a link in its place."""
         return Path(shutil.copy(_CMAKE_INCLUDE, self.scratch))
 
     def _run(

@@ -122,7 +122,7 @@ def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> s
 
 
 def _named(path: Path, install: Path) -> str:
-    """In quotes: the name is the student's."""
+    """A path in quotes, since the student chose the name."""
     return repr(str(path.relative_to(install)))
 
 

@@ -59,7 +59,7 @@ def meant(name: str, more: Iterable[str] = ()) -> str | None:
 
 @lru_cache(maxsize=4096)
 def _folded(name: str) -> str:
-    """What stays of a name without case, separators and plural."""
+    """A name without case, separators and plural."""
     return re.sub(r"[^a-z0-9]", "", name.lower()).removesuffix("s")
 
 

@@ -232,7 +232,6 @@ def _times(item: CallService | ReadParameters | SetParameters | SendGoal) -> dic
 def _fields(
     value: Mapping[str, Any], item: CallService | SendGoal, making: Making, place: Place
 ) -> dict[str, Any]:
-    """The fields of a request or a goal."""
     folder = "srv" if isinstance(item, CallService) else "action"
     if f"/{folder}/" not in item.type:
         text = f"expected an interface in {folder}, such as package/{folder}/Name"
