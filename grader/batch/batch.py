@@ -140,7 +140,7 @@ class Batch:
         try:
             name = self.ledger.read().assignment
         except UsageError:
-            # There is none yet, or it is damaged; what it says is written anew from the class.
+            # There is none yet, or it is damaged; it is written again from the class.
             return
         if name != self.loaded.assignment.id:
             raise UsageError(f"{self.ledger.out}: holds the grades of {name}; use a new folder")

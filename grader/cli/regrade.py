@@ -96,7 +96,7 @@ def _in_class(batch: Ledger, loaded: LoadedAssignment, folder: Path) -> None:
 
 
 def _write(ledger: Ledger, rows: Sequence[Regraded]) -> None:
-    """Write the gradebook and the overview anew; the one until now is kept where it changes."""
+    """Write the gradebook and the overview again; a gradebook that changes is kept as earlier."""
     from grader.batch.class_files import GRADES_FILE, write_class
     from grader.batch.ledger import keep_earlier
 

@@ -118,7 +118,7 @@ class Grade:
         raise KeyError(check)
 
     def first_to_fix(self) -> CheckResult | None:
-        """The failed check on which most others depend, or None where none must be mended."""
+        """The failed check on which most others depend, or None where none needs a correction."""
         reasons = {result.id: result.reason for result in self.of(Status.FAILED)}
         first = first_to_fix(
             reasons,
@@ -201,7 +201,7 @@ def first_to_fix(
         without_points: Checks that are worth none.
 
     Returns:
-        The check, or None where none failed that must be mended.
+        The check, or None where none failed that needs a correction.
     """
 
     def others(check: str) -> int:

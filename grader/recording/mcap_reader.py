@@ -136,7 +136,7 @@ def _message(schema: Schema, channel: Channel, record: Record) -> Message:
     try:
         value = _fields(decode(record.data))
     except NotImplementedError as error:
-        # A type that the library cannot read is no fault of who published it.
+        # A type that the library cannot read is not the fault of the publisher.
         raise ValueError(f"{channel.topic}: {error}") from error
     except Exception as error:
         # On such bytes the CDR decoder raises errors of any kind.

@@ -1,4 +1,4 @@
-"""Any entry of ``stimuli``: what the probe does in a scenario besides observing.
+"""Any entry of ``stimuli``: an action of the probe in a scenario.
 
 The first key of a stimulus, such as ``publish``, names its kind; the kinds are in ``kinds/``.
 """

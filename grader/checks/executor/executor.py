@@ -166,7 +166,7 @@ def _working_from(recording: Recording, node: str) -> int:
     ]
     if spun and answered:
         begin_ns = max(begin_ns, min(*spun, *answered))
-    # The tracer held its first publisher until it had matched, in vain if its type is another one.
+    # The tracer held its first publisher until it had matched; one of another type never does.
     held = [item.time_ns for item in recording.declared("held") if item.process == process.name]
     return max([begin_ns, *(time_ns for time_ns in held if time_ns < begin_ns + _MOST_HELD_NS)])
 

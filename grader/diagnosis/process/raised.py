@@ -112,7 +112,7 @@ def fatal_failure(recording: Recording, process: str) -> Failure | None:
     """The exception that ended a process: the deepest of the last chain.
 
     Of ``ValueError``, then another error while that one was handled, the ``ValueError`` is
-    the one to mend.
+    the one to correct.
     """
     found = [failure for failure in failures(recording, process) if not failure.ignored]
     first = len(found) - 1

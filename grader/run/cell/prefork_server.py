@@ -58,7 +58,7 @@ _ALWAYS = (
     "rcl_interfaces/srv/ListParameters",
 )
 SIMULATOR_MODULE = "grader.run.cell.simulator"
-"""What a cell with a simulated robot imports besides."""
+"""Module that a cell with a simulated robot imports in addition."""
 
 
 def readable(descriptors: Collection[int], limit_s: float | None = None) -> set[int]:

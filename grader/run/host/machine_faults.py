@@ -1,7 +1,7 @@
 """What the machine may do to a run in the middle: set its clock, or run out of memory.
 
 Messages and log lines carry the time of day. Once NTP, the host of a virtual machine or a laptop's
-sleep has set that clock, the time between two of them is unknown. What the kernel ends for want of
+sleep has set that clock, the time between two of them is unknown. What the kernel ends for lack of
 memory stayed within its limits: the machine had too little for all that ran on it.
 """
 

@@ -91,7 +91,7 @@ def main(command: list[str]) -> None:
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     limit()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        # Ctrl-C in the terminal reaches the caller, who closes our input.
+        # Ctrl-C in the terminal reaches the caller, who closes the standard input of this process.
         signal.signal(number, signal.SIG_IGN)
     status = run(command)
     kill_all()
