@@ -171,14 +171,14 @@ class TestDrives:
             "motion.drives", run, speed="0.1 m/s"
         )
 
-    def test_a_speed_in_another_field_is_told(self):
+    def test_a_speed_in_another_field_is_reported(self):
         run = drive(on_scan(lambda _: (0.0, 0.0)), seconds=2)
         found = [replace(m, value=twist((0, 0.1, 0), (0, 0, 0))) for m in run.on("/cmd_vel")]
         run = simulated(run.truth, run.scene, messages={**run.messages, "/cmd_vel": tuple(found)})
         said = failing("motion.drives", run, speed="0.1 m/s")
         assert "linear.x and angular.z are 0, but `linear.y` is not" in said
 
-    def test_a_speed_that_is_not_a_number_is_told(self):
+    def test_a_speed_that_is_not_a_number_is_reported(self):
         run = drive(on_scan(lambda _: (math.nan, 0.0)), seconds=2)
         assert "9 commands on `/cmd_vel` were not finite (first: linear nan" in failing(
             "motion.drives", run, speed="0.1 m/s"

@@ -38,7 +38,7 @@ def test_a_library_is_named_with_those_that_are_there(message: str) -> None:
     assert hint is not None
     assert "Is `pandas` spelt right?" in hint
     assert "has Python's standard library, ROS 2 and `numpy` and `scipy`." in hint
-    # It may be what the handout asks for, so nobody is told to do without it.
+    # It may be what the handout asks for, so no advice is to do without it.
     assert "do without" not in hint
     assert "ask your instructor to allow it" in hint
 

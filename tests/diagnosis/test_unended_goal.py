@@ -26,7 +26,7 @@ class TestBusyExecutor:
             ),
         ],
     )
-    def test_it_is_told_by_a_late_answer(self, late):
+    def test_it_is_recognised_by_a_late_answer(self, late):
         assert "its executor is busy while" in failing("action.cancels", acting(late), **FIB)
 
     def test_it_is_the_students_on_any_machine_unless_that_took_all_the_time(self):
