@@ -6,7 +6,7 @@ _INTERRUPTED = 130
 
 
 def main() -> None:
-    """Run it; Ctrl-C while it is still being imported ends it as at any other time."""
+    """Run the command; Ctrl-C during the imports ends it as at any other time."""
     try:
         from grader.cli.app import main as run
     except KeyboardInterrupt:

@@ -71,22 +71,22 @@ def plan(
         ros_python: The Python version that the sourced ROS was built for, or None.
     """
     distro = _sourced(environ)
-    ours = f"ROS 2 {DISTRO.title()}"
+    jazzy = f"ROS 2 {DISTRO.title()}"
     if distro and distro != DISTRO:
         raise SetupError(
-            f"ROS 2 {distro.title()} is sourced in this shell and rosgrade is for {ours}: use a "
-            f"shell that sources nothing (rosgrade then installs its own ROS) or {ours}"
+            f"ROS 2 {distro.title()} is sourced in this shell and rosgrade is for {jazzy}: use a "
+            f"shell that sources nothing (rosgrade then installs its own ROS) or {jazzy}"
         )
     if distro and ros_python not in SUPPORTED:
         raise SetupError(
-            f"{ours} is sourced in this shell but holds no rclpy for Python {_supported()}: use a "
+            f"{jazzy} is sourced in this shell but holds no rclpy for Python {_supported()}: use a "
             f"shell that sources nothing, or sudo apt install ros-{DISTRO}-rclpy "
             f"ros-{DISTRO}-common-interfaces"
         )
     if not distro and platform != WHEELS_PLATFORM:
         raise SetupError(
-            f"{ours} comes as wheels for {WHEELS_PLATFORM} only and this is {platform}: install "
-            f"{ours} here, source it and try again"
+            f"{jazzy} comes as wheels for {WHEELS_PLATFORM} only and this is {platform}: install "
+            f"{jazzy} here, source it and try again"
         )
     wanted = (ros_python,) if distro else SUPPORTED
     seen: List[str] = []

@@ -224,16 +224,16 @@ def _class_section(one: type) -> str:
     entries = re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", attributes, re.MULTILINE)
     rows = [(f"`{name}`", " ".join(words.split())) for name, words in entries]
     for name, member in vars(one).items():
-        told = inspect.getdoc(member)
-        if told and isinstance(member, _READABLE) and not name.startswith("_"):
+        meaning = inspect.getdoc(member)
+        if meaning and isinstance(member, _READABLE) and not name.startswith("_"):
             call = ""
             if isinstance(member, FunctionType):
                 names = [each for each in inspect.signature(member).parameters if each != "self"]
                 call = f"({', '.join(names)})"
-            rows.append((f"`{name}{call}`", told.partition("\n")[0]))
+            rows.append((f"`{name}{call}`", meaning.partition("\n")[0]))
     table = [_outside_code(_table(("name", "meaning"), rows).replace("``", "`"))] if rows else []
-    told = _outside_code(text.strip().replace("``", "`"))
-    return "\n\n".join([f"## {one.__name__}", told, *table])
+    text = _outside_code(text.strip().replace("``", "`"))
+    return "\n\n".join([f"## {one.__name__}", text, *table])
 
 
 def _anchor(heading: str) -> str:

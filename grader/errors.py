@@ -4,7 +4,7 @@ RosgradeError
 ├── UsageError            the caller: wrong argument, missing file
 ├── AssignmentError       the author of an assignment: bad YAML, with file and line
 ├── SubmissionError       the student: what was handed in cannot be read
-└── GraderFault           us or the machine: never costs a student a point
+└── GraderFault           rosgrade or the machine: never costs a student a point
 
 A bug is none of these: it keeps its traceback.
 """
@@ -26,7 +26,7 @@ _OF_MACHINE = {
     errno.EROFS: ("the file system is read-only", "name another place"),
     errno.EIO: ("the disk cannot be read or written", "look at the system's log"),
 }
-"""What the operating system refuses through no fault of the caller's, and what to do about it."""
+"""System errors for which the machine is the reason: in words, and what to do about them."""
 
 
 class RosgradeError(Exception):
@@ -52,7 +52,7 @@ class Problem:
 
 
 class AssignmentError(RosgradeError):
-    """An assignment, world or mutant file says something that it must not."""
+    """An assignment, world or mutant file has mistakes."""
 
     def __init__(self, file: Path, problems: list[Problem]) -> None:
         """Keep the problems as data and make the text from them.
@@ -78,11 +78,11 @@ class SubmissionError(RosgradeError):
 
 
 class GraderFault(RosgradeError):
-    """Something of ours or of the machine failed; the submission is not graded."""
+    """rosgrade or the machine failed; the submission is not graded."""
 
 
 def machine_fault(error: OSError, place: Path | None = None) -> GraderFault | None:
-    """Say what this machine lacks and what to do about it; None where that is not the reason.
+    """The fault for an error of which the machine is the reason; None for any other error.
 
     Args:
         place: What was written, where the error does not name it.

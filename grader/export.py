@@ -116,7 +116,7 @@ def _rosgrade(loaded: LoadedAssignment) -> dict[str, Member]:
 
 
 def _assignment(loaded: LoadedAssignment) -> dict[str, Path]:
-    """What grading needs of an assignment: neither its solution nor what tells of it."""
+    """The files of an assignment that grading needs: without its solution and its mutants."""
     found = {path.relative_to(loaded.folder): path for path in _files(loaded.folder)}
     return {
         inside.as_posix(): path

@@ -1,4 +1,4 @@
-"""What the kernel has ended because this machine, or the container, ran out of memory."""
+"""Processes that the kernel has ended because this machine, or the container, had no memory."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _VMSTAT = Path("/proc/vmstat")
 
 
 def oom_kills() -> int | None:
-    """How many processes the kernel has ended for want of memory; None where it does not tell."""
+    """How many processes the kernel has ended for lack of memory; None where that is unknown."""
     try:
         found = re.search(r"^oom_kill (\d+)$", _VMSTAT.read_text(), re.MULTILINE)
     except OSError:

@@ -23,12 +23,12 @@ _KEPT = ("LANG", "LC_ALL", "LC_CTYPE", "TZ", "XDG_RUNTIME_DIR", "TMPDIR", "HOME"
 
 @dataclass(frozen=True)
 class RosInstallation:
-    """Where ROS is and how a child process gets to see it.
+    """Where ROS is, and the environment in which a child process finds it.
 
     Attributes:
         source: ``wheels`` or ``sourced``.
         inherited: Variables that a sourced installation needs, taken from the environment.
-        underlays: Install spaces of ours (merged layout) with packages that it lacks; see
+        underlays: Install spaces (merged layout) with the packages that it lacks; see
             :mod:`grader.submission.underlay`.
     """
 

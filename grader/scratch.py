@@ -14,13 +14,13 @@ from grader.tree import remove_tree
 PREFIX = "rosgrade-scratch-"
 _ASCII_PLACE = "/tmp"
 _STALE_S = 3600.0
-"""One that is newer may not be locked yet, or something started from it may still be ending."""
+"""A newer folder may not be locked yet, or a process started from it may still be ending."""
 
 
 class Scratch:
     """A scratch folder, below the system's folder for temporary files.
 
-    As long as it is there its maker holds a lock on it, which no end of a process outlives.
+    Its maker holds a lock on it, which the system releases at the latest when the process ends.
 
     Attributes:
         path: Its absolute path.

@@ -116,7 +116,6 @@ def _graded_alone(jobs: Sequence[Job]) -> list[Job]:
 
 @contextmanager
 def _load(cpus: int, seed: int) -> Iterator[None]:
-    """Load CPUs in bursts."""
     burners = [
         multiprocessing.get_context("spawn").Process(
             target=_burn, args=(seed + number,), daemon=True

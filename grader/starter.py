@@ -144,7 +144,7 @@ def _package(assignment: Assignment, package: Package) -> Iterator[tuple[str, st
 
 
 def _node_name(assignment: Assignment, package: Package, program: Program) -> str | None:
-    """What a visible check wants the node of a program to be called, where it is run alone."""
+    """The node name that a visible check expects of a program that is launched alone."""
     alone = {
         scenario.id
         for scenario in assignment.scenarios
@@ -172,7 +172,7 @@ def _interfaces(assignment: Assignment, package: Package) -> Iterator[Interface]
 
 
 def rendered(name: str, **values: object) -> str:
-    """Fill in a template of a file that is no page."""
+    """Fill in a template that is not an HTML page."""
     return _environment().get_template(f"{name}.j2").render(values)
 
 
@@ -182,7 +182,7 @@ def _environment() -> Environment:
 
     made = Environment(
         loader=FileSystemLoader(resources.templates()),
-        # XML alone has something to escape.
+        # Only XML needs escapes.
         autoescape=lambda name: bool(name) and str(name).endswith(".xml.j2"),
         undefined=StrictUndefined,
         trim_blocks=True,

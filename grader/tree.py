@@ -1,7 +1,7 @@
-"""Folders that students' programs have filled, perhaps with folders in folders without end.
+"""Folders that students' programs have filled, perhaps nested too deep to walk through.
 
 Recursion ends with a RecursionError in a tree that is deep enough, and a path may be too long for
-the system. So what lies too deep is removed before anything looks.
+the system. So what lies too deep is removed before the folder is read.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _LONGEST_PATH = 3000
 
 
 def remove_tree(path: Path) -> None:
-    """Remove a folder with all that is in it, however deep that is; what cannot go, stays."""
+    """Remove a folder with all its content, at any depth, as far as that is possible."""
     try:
         shutil.rmtree(path, ignore_errors=True)
     except RecursionError:
@@ -35,7 +35,7 @@ def listing(folder: Path) -> frozenset[str]:
     found = []
     ahead = [str(folder)]
     while ahead:
-        # What is gone by now is not listed.
+        # A file that was removed meanwhile is not listed.
         with contextlib.suppress(OSError):
             for entry in os.scandir(ahead.pop()):
                 name = entry.path.removeprefix(str(folder))
@@ -74,7 +74,7 @@ def cut_deep(folder: Path) -> bool:
 
 
 def _grant(path: bytes, mode: int) -> None:
-    """Give the owner of a file or folder what it takes to read it, and to remove what is in it."""
+    """Give the owner the permission to read a file or folder, and to remove its content."""
     wanted = stat.S_IRWXU if stat.S_ISDIR(mode) else stat.S_IRUSR if stat.S_ISREG(mode) else 0
     if mode & wanted != wanted:
         # What belongs to another user stays as it is.

@@ -86,7 +86,7 @@ class Drive(Model):
 
 
 class Push(Model):
-    """A push that moves the robot besides its wheels; odometry tells of it like of any motion.
+    """A push that moves the robot besides its wheels; odometry shows it like any motion.
 
     For scenarios that distinguish a node that reads where the robot is from one that only counts.
     """

@@ -82,7 +82,7 @@ class Lidar:
         """Take a scan.
 
         Args:
-            noise: One number is drawn for each beam, whatever is seen, so that a scan does not
+            noise: One number is drawn for each beam in every scan, so that a scan does not
                 change the noise of the next; none without noise.
         """
         options = self.options

@@ -55,7 +55,7 @@ def run(
     chosen = _options(options, robot, pose)
     simulation = make_simulation(read, chosen, seed)
     context = Context()
-    # Ctrl-C is ours: rclpy's handler would shut the context down within a step.
+    # Ctrl-C is handled here: rclpy's handler would shut the context down within a step.
     rclpy.init(
         args=[],
         context=context,

@@ -40,10 +40,10 @@ class Sink(Protocol):
     """Receiver of the truth, such as a recording; called from the loop, so it must be quick."""
 
     def on_step(self, step: Step, stamp_ns: int) -> None:
-        """A step was done."""
+        """Called after each step."""
 
     def on_late(self, lateness: Lateness) -> None:
-        """Steps are late; they are done right after this call."""
+        """Called when steps are late, which are done right after this call."""
 
 
 class PolledGroup(CallbackGroup):
@@ -153,7 +153,7 @@ class RosSimulator:
 
     def _take_commands(self, now_ns: int) -> None:
         """Take what the queue holds, with the simulated time at which it arrived."""
-        # Bounded, for a student may publish faster than we take.
+        # Bounded, for a student may publish faster than this loop takes.
         for _ in range(self._command.depth):
             try:
                 with self.command.handle:
@@ -206,4 +206,4 @@ def make_node(name: str, context: Context) -> Node:
 
 
 def _never(message: Any) -> None:
-    """Stands where rclpy wants a callback; no executor serves it."""
+    """A callback that is never called, since no executor serves it."""

@@ -18,7 +18,7 @@ MAX_AHEAD = 5
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """Steps that the host did not let us do in time."""
+    """Steps that are late because of the host."""
 
     index: int
     steps: int

@@ -118,7 +118,7 @@
         d: `M${-radius} ${-radius}L${radius} ${radius}M${-radius} ${radius}L${radius} ${-radius}`, class: "out",
       });
       this.chart(figure);
-      this.told = make(figure, "p", { class: "told" });
+      this.readout = make(figure, "p", { class: "readout" });
       this.log = make(figure, "ol", { class: "log said-so-far" });
     }
     goal(world, { x, y, yaw, radius }, size) {
@@ -175,7 +175,7 @@
       const over = time > run.end + 0.05 ? " The run has ended." : "";
       const away = run.goals.map((goal) =>
         ` ${Math.hypot(now.x - goal.x, now.y - goal.y).toFixed(2)} m from the goal (dashed: within ${goal.within}).`).join("");
-      this.told.textContent =
+      this.readout.textContent =
         `Commanded ${now.cv.toFixed(2)} m/s, ${now.cw.toFixed(2)} rad/s; true ${now.v.toFixed(2)} m/s, ${now.w.toFixed(2)} rad/s.` +
         (run.touches(time) ? " It touches something." : "") + away + over;
       this.svg.setAttribute("aria-label", `${this.name}: robot at x ${now.x.toFixed(2)} m, y ${now.y.toFixed(2)} m, heading ${Math.round(now.yaw * 180 / Math.PI)}°`);

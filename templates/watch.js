@@ -5,10 +5,10 @@ let shown = null;
 const follow = async () => {
   try {
     const state = await (await fetch("state")).json();
-    status.textContent = state.told;
+    status.textContent = state.text;
     document.title = state.title;
     if (shown !== null && state.version !== shown) {
-      // A reload keeps the place that somebody reads at.
+      // A reload keeps the scroll position.
       frame.contentWindow.location.reload();
     }
     shown = state.version;

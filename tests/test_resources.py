@@ -21,7 +21,7 @@ def test_in_this_checkout_they_stand_beside_the_package() -> None:
 def test_in_a_wheel_they_are_inside_the_package(tmp_path: Path) -> None:
     package = tmp_path / "site-packages" / "grader"
     (package / "_data" / "assignments").mkdir(parents=True)
-    # Another distribution's folder of that name is not ours.
+    # Another distribution's folder of that name is not rosgrade's.
     (tmp_path / "site-packages" / "assignments").mkdir()
     assert resources.root(package) == package / "_data"
 

@@ -1,4 +1,4 @@
-"""Every assignment of ours tells right from wrong: mutation score 100 %, with real nodes.
+"""Every assignment of rosgrade tells right from wrong: mutation score 100 %, with real nodes.
 
 Some assignments have many scenarios for each of many mutants, and the examples of the
 documentation are many: of those every 24th or every eighth trial is graded here, so that the
@@ -50,7 +50,7 @@ def test_the_mutation_score_is_perfect(name: str) -> None:
             selftest(loaded, grading, jobs=2 * cpu_count(), chosen=lambda trial: trial.id in kept)
         )
     wrong = {
-        result.trial.id: (str(result.verdict), *result.told)
+        result.trial.id: (str(result.verdict), *result.findings)
         for result in results
         if not result.verdict.right
     }

@@ -1,4 +1,4 @@
-"""Folders in folders without end are taken away, and stop nobody."""
+"""Folders that are nested without end are removed, and stop no program."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MORE_THAN_PYTHON_RECURS = 1200
 
 
 def dig(folder: Path, depth: int, name: str = "d") -> None:
-    """Make folders in one another, whatever the length of their path."""
+    """Make nested folders, even if their path is too long for the system."""
     folder.mkdir(parents=True, exist_ok=True)
     descriptor = os.open(folder, os.O_RDONLY)
     for _ in range(depth):
@@ -54,7 +54,7 @@ def test_what_lies_too_deep_is_cut_off_and_all_else_stays(name: str, tmp_path: P
     assert not cut_deep(tmp_path)
 
 
-def test_nobody_keeps_its_owner_from_reading_a_tree(tmp_path: Path) -> None:
+def test_no_mode_keeps_its_owner_from_reading_a_tree(tmp_path: Path) -> None:
     file, locked, link = tmp_path / "a" / "b" / "file", tmp_path / "a", tmp_path / "link"
     file.parent.mkdir(parents=True)
     file.touch()

@@ -1,4 +1,4 @@
-"""Numbers that are published to the subscriber: nobody can write for known ones."""
+"""Random numbers that are published to the subscriber, so that students cannot know them."""
 
 from __future__ import annotations
 

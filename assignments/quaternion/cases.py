@@ -62,7 +62,7 @@ def quaternion(seed: int) -> list[dict]:
     found = [(0.0, 0.0, 0.0, 1.0), (half, 0.0, 0.0, half), (0.0, 0.0, -half, half)]
     # Half a turn: w is 0, but it is no zero quaternion.
     found.append((1.0, 0.0, 0.0, 0.0))
-    # Steep, but no gimbal lock: whoever takes a sine of 0.99 for one is always found out.
+    # Steep, but no gimbal lock: code that takes a sine of 0.99 for gimbal lock always fails.
     found += [_pitched(math.radians(pitch), chance) for pitch in (84.5, -84.5)]
     found += [_unit_quaternion(chance) for _ in range(54)]
     return [_quaternion(item) for item in found]
@@ -72,7 +72,7 @@ def scaled(seed: int) -> list[dict]:
     """Quaternions whose length is not 1."""
     chance = random.Random(f"{seed}/scaled")
     found = [(0.0, 0.0, 1.0, 1.0), (2.0, 0.0, 0.0, 2.0)]
-    # Who does not scale these takes a sine of 8 for that of the pitch, or one of 0.008.
+    # Code that does not scale these computes a sine of the pitch of 8, or of 0.008.
     found += [_scaled(_pitched(pitch, chance), size) for pitch, size in ((1.0, 3.2), (-1.0, 0.1))]
     found += [
         _scaled(_unit_quaternion(chance), 10.0 ** chance.uniform(-1.0, 1.0)) for _ in range(26)
@@ -85,7 +85,7 @@ def gimbal_lock(seed: int) -> list[dict]:
 
     They have length 1 but for rounding errors, which make the sine of the pitch a little less
     than 1 in some, and a little more in others. Short of it, roll and yaw are two angles still:
-    whoever takes a sine of 0.999 (87.4 degrees) or 0.9999 (89.2 degrees) for 1 loses one of them.
+    code that takes a sine of 0.999 (87.4 degrees) or 0.9999 (89.2 degrees) for 1 loses one of them.
     """
     chance = random.Random(f"{seed}/gimbal_lock")
     half = math.sqrt(0.5)

@@ -1,6 +1,6 @@
 """Whether interfaces that an assignment names exist, and have the fields that checks name.
 
-What a message cannot have would end as an error, for every student, once they have published one.
+A check of a field that its message does not have would end as an error for every student.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _ZERO = {"bool": False, **dict.fromkeys(FLOATS, 0.0), **dict.fromkeys(TEXTS, "")
 
 @dataclass(frozen=True)
 class Interfaces:
-    """Definitions that are at hand.
+    """The interface definitions that can be read on this machine.
 
     Attributes:
         own: Package -> its folder, of the assignment and of rosgrade; the first win.
@@ -112,8 +112,8 @@ def interface_problems(
 ) -> Iterator[Problem]:
     """Find interfaces that are neither in ROS, nor beside the assignment, nor handed in.
 
-    A package of Jazzy that is not installed here, and one that the solution ``depends`` on, may
-    well have it: another machine will tell.
+    A package of Jazzy that is not installed here, or that the solution ``depends`` on, is not
+    judged: it may have the interface.
     """
     handed_in = {package.name for package in assignment.packages}
     elsewhere = {name for package in assignment.packages for name in package.depends} | PACKAGES
@@ -123,8 +123,8 @@ def interface_problems(
             yield from _unknown(source, place, interface, elsewhere, known)
         elif is_imported:
             text = (
-                f"{package!r} is handed in, and the probe never imports what a student wrote: our "
-                f"own copy of it must be in {FOLDER}/{package} beside the assignment"
+                f"students hand in {package!r}, and rosgrade never imports their code: put your "
+                f"own copy of it in {FOLDER}/{package} beside the assignment"
             )
             yield source.problem(place, text)
 
@@ -160,7 +160,7 @@ def _unknown(
     elif known.prefixes is not None and package not in elsewhere:
         text = (
             f"there is no package {package!r}: not in ROS, not in {FOLDER}/ beside the assignment, "
-            "not among 'packages' nor what they have in 'depends'."
+            "and not in 'packages' or their 'depends'."
         )
         yield source.problem(place, text + did_you_mean(package, known.packages))
 

@@ -50,7 +50,7 @@ class LimitOptions(Model):
     output: _Output = _DEFAULTS.output_bytes
 
     def limits(self) -> SandboxLimits:
-        """For the sandbox."""
+        """The same limits as the sandbox takes them."""
         return SandboxLimits(
             memory_bytes=int(self.memory),
             processes=self.processes,

@@ -28,7 +28,7 @@ def lint_warnings(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) ->
 def _unknown_topics(loaded: LoadedAssignment) -> Iterator[str]:
     for bound in loaded.checks:
         named = [getattr(bound.parameters, key, None) for key in ("topic", "publishes")]
-        # Topics that must stay free need not be there, but one that nearly is, is misspelt.
+        # A topic that must stay free need not be there; one with a nearly equal name is misspelt.
         stated = "topics" in bound.parameters.model_fields_set
         kept_free = getattr(bound.parameters, "topics", ()) if stated else ()
         for scenario in loaded.scenarios_of(bound):
@@ -45,7 +45,7 @@ def _unknown_topics(loaded: LoadedAssignment) -> Iterator[str]:
 
 
 def _dependencies(assignment: Assignment) -> Iterator[str]:
-    """What a solution is said to need, and that seems not to exist."""
+    """Names under ``depends`` that seem not to exist."""
     own = {package.name for package in assignment.packages}
     for package in assignment.packages:
         for name in package.depends:
@@ -59,7 +59,7 @@ def _dependencies(assignment: Assignment) -> Iterator[str]:
 
 
 def _shown_runs(loaded: LoadedAssignment) -> Iterator[str]:
-    """Runs that are named for hidden checks alone, but that a visible check judges unnamed."""
+    """Scenarios that only hidden checks name, but that a visible check without names judges."""
     visible = [b for b in loaded.checks if b.spec.visibility is Visibility.VISIBLE]
     hidden = [b for b in loaded.checks if b.spec.visibility is not Visibility.VISIBLE]
     named = {scenario for bound in visible for scenario in bound.spec.scenarios}
@@ -68,7 +68,7 @@ def _shown_runs(loaded: LoadedAssignment) -> Iterator[str]:
         for scenario in loaded.scenarios_of(bound):
             if scenario.id in meant:
                 yield (
-                    f"students see the run of the scenario {scenario.id!r}, which only hidden "
-                    f"checks name: the visible check {bound.spec.id!r} names no scenarios, and so "
-                    "judges all"
+                    f"students see the run of the scenario {scenario.id!r}, although only hidden "
+                    f"checks name it: the visible check {bound.spec.id!r} names no scenarios, so "
+                    "it judges all"
                 )

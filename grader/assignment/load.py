@@ -49,7 +49,7 @@ class LoadedAssignment:
 
     @property
     def folder(self) -> Path:
-        """Where it lies: worlds, own checks and the handout are beside the YAML."""
+        """The folder of the YAML, with worlds, own checks and the handout."""
         return self.file.parent
 
     @property
@@ -89,16 +89,16 @@ def find_assignment(name: str | Path) -> Path:
         raise UsageError(f"{given}: no such file or folder")
     raise UsageError(
         f"no assignment {str(name)!r}.{nearest_or_all(str(name), known)} "
-        f"One of your own is named by its folder, such as path/to/{name}."
+        f"For your own assignment give its folder, such as path/to/{name}."
     )
 
 
 def refuse_swapped(name: str, submission: Path) -> None:
-    """Say it where the submission was named first, and then the assignment."""
+    """Refuse a command that names the submission first, and then the assignment."""
     known = list_assignments()
     if name not in known and str(submission) in known and not submission.exists():
         raise UsageError(
-            f"{submission} is an assignment, and an assignment comes first: {submission} {name}"
+            f"{submission} is an assignment. Give the assignment first: {submission} {name}"
         )
 
 
@@ -107,7 +107,7 @@ def load_assignment(
 ) -> LoadedAssignment:
     """Load an assignment.
 
-    Mistakes in its form are told first; once there are none, what does not fit together.
+    Mistakes in its form are reported first; without any, what does not fit together.
     """
     file = find_assignment(name)
     written = read_source(file)

@@ -83,7 +83,7 @@ SHOWN_FROM = tuple(Visibility)
 
 @dataclass(frozen=True)
 class Withheld:
-    """What a student is told of checks that are not shown yet: number and points."""
+    """Number and points of the checks that a student does not see yet."""
 
     checks: int = 0
     points: float = 0.0
@@ -143,7 +143,7 @@ class Launch(Model):
     @model_validator(mode="after")
     def _one_thing(self) -> Launch:
         if (self.executable is None) == (self.file is None):
-            raise ValueError("name either an 'executable' or a launch 'file'")
+            raise ValueError("give either an 'executable' or a launch 'file'")
         if self.file is not None:
             given = {"name", "namespace", "parameters", "remap"} & self.model_fields_set
             if given:

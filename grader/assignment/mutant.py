@@ -110,7 +110,7 @@ def _apply(change: Change, files: dict[str, bytes]) -> Iterator[tuple[Place, str
         if edit.file not in files:
             yield ("edits", index, "file"), f"the reference has no file {edit.file!r}"
         elif found != edit.count:
-            text = f"the text stands {found} times in {edit.file}, {edit.count} is expected"
+            text = f"the text occurs {found} times in {edit.file}, not {edit.count}"
             yield ("edits", index, "replace"), text
         else:
             files[edit.file] = files[edit.file].replace(old, new)

@@ -97,7 +97,7 @@ def load_own_check(text: str, folder: Path) -> Check:
         raise ValueError(f"{text}: the function must take the recording as its first argument")
     for argument in arguments:
         if argument.kind not in (argument.POSITIONAL_OR_KEYWORD, argument.KEYWORD_ONLY):
-            raise ValueError(f"{text}: the argument '{argument}' cannot be given as a key of with")
+            raise ValueError(f"{text}: the argument '{argument}' cannot be a key of 'with'")
 
     def judge(recording: Any, values: Parameters) -> Any:
         keys = {argument.name: getattr(values, argument.name) for argument in arguments}

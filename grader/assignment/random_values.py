@@ -1,4 +1,4 @@
-"""Random values of a scenario, drawn from its seed, and what stands for them."""
+"""Random values of a scenario: drawn from its seed, and put in the place of ``$name``."""
 
 from __future__ import annotations
 

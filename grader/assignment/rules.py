@@ -80,7 +80,7 @@ def _scenario(assignment: Assignment, scenario: Scenario) -> Iterator[tuple[Plac
     if scenario.world is None:
         for key in ("robot", "lidar", "odometry", "topics"):
             if key in scenario.model_fields_set:
-                yield (key,), "there is a simulated robot only in a 'world', which is missing"
+                yield (key,), "a simulated robot needs a 'world', which is missing"
         for key in ("at_rest", "travelled"):
             if any(getattr(one, key) is not None for one in (until, *until.any)):
                 text = f"{key!r} is about the simulated robot: 'world' is missing"
@@ -109,7 +109,7 @@ def _requirements(source: Source, checks: Sequence[CheckSpec]) -> Iterator[Probl
             if required not in shown:
                 advice = nearest_or_all(required, shown, "The checks are")
                 yield source.problem(place, f"there is no check {required!r}.{advice}")
-            # A skip could not be told otherwise.
+            # Else a student would see a skipped check without its reason.
             elif SHOWN_FROM.index(shown[required]) > SHOWN_FROM.index(spec.visibility):
                 text = (
                     f"{required!r} is {shown[required].value!r}, so {spec.id!r} cannot be "
@@ -166,12 +166,12 @@ def _check(assignment: Assignment, bound: BoundCheck) -> Iterator[tuple[Place, s
 
 
 def _other_programs(scenarios: Sequence[Scenario]) -> Iterator[tuple[Place, str]]:
-    """A check of all scenarios would judge one program in the runs of another, too."""
+    """Checks without ``scenarios`` where the scenarios launch different programs."""
     launched = [sorted(map(_program, scenario.launch)) for scenario in scenarios]
     for scenario, programs in zip(scenarios, launched, strict=True):
         if programs != launched[0]:
             text = (
-                "name the 'scenarios' that it judges, for they do not launch the same: "
+                "name the 'scenarios' that it judges: they launch different programs: "
                 f"{scenarios[0].id!r} launches {', '.join(launched[0])}, but {scenario.id!r} "
                 f"{', '.join(programs)}"
             )
@@ -180,7 +180,7 @@ def _other_programs(scenarios: Sequence[Scenario]) -> Iterator[tuple[Place, str]
 
 
 def _program(launch: Launch) -> str:
-    """What is launched, with everything that gives its nodes and topics other names."""
+    """A launched program with the rules that give its nodes and topics other names."""
     renamed = [*launch.remap.items(), ("__node", launch.name), ("__ns", launch.namespace)]
     rules = ", ".join(f"{old}:={new}" for old, new in renamed if new is not None)
     return f"'{launch.program}'" + (f" ({rules})" if rules else "")
@@ -188,7 +188,7 @@ def _program(launch: Launch) -> str:
 
 @dataclass(frozen=True)
 class _User:
-    """A check with what its needs are looked for in."""
+    """A check with the assignment and the scenarios that must meet its needs."""
 
     bound: BoundCheck
     assignment: Assignment
@@ -263,7 +263,7 @@ def _(need: needs.Called, user: _User) -> Iterator[_Lack]:
         names = [one.call for one in calls]
         yield from _unnamed(user, need.service, scenario, names, "asks", service)
         if mine and all(one.at_once < need.at_once for one in mine):
-            text = f"the scenario {scenario.id!r} calls it never twice at once: 'at_once: 2'"
+            text = f"the scenario {scenario.id!r} never calls it twice at once: add 'at_once: 2'"
             yield key, text
         fields = user.value(need.request) or {}
         waits_s = [one.within for one in mine if _has_fields(fields, one.sequence)]
@@ -353,7 +353,7 @@ def _unnamed(
     does: str,
     wanted: str | None = None,
 ) -> Iterator[_Lack]:
-    """No stimulus is about what a parameter names."""
+    """The problem that no stimulus uses the name in a parameter."""
     wanted = wanted or user.value(key)
     if wanted is not None and wanted not in names:
         text = f"no stimulus of the scenario {scenario.id!r} {does} {wanted!r}."
@@ -368,7 +368,7 @@ def _has_fields(wanted: Mapping[str, Any], given: Sequence[Mapping[str, Any]]) -
 def _impatient(
     user: _User, scenario: Scenario, key: str | None, waits_s: Iterable[float]
 ) -> Iterator[_Lack]:
-    """A stimulus that waits for less time than the check allows."""
+    """The problem of a stimulus that waits for less time than the check allows."""
     if key is None:
         return
     within_s = user.value(key)
@@ -380,11 +380,11 @@ def _impatient(
 
 
 def no_package(name: str, names: Collection[str]) -> str:
-    """That no package of the assignment has a name."""
+    """The text for a name that no package of the assignment has."""
     return f"{name!r} is not among 'packages'.{nearest_or_all(name, names, 'The packages are')}"
 
 
 def no_executable(name: str, package: Package) -> str:
-    """That a package has no executable of a name."""
+    """The text for a name that no executable of the package has."""
     advice = nearest_or_all(name, package.executables, "It has")
     return f"the package {package.name!r} has no executable {name!r} in 'packages'.{advice}"

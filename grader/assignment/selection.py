@@ -65,8 +65,8 @@ def select(
 def visible_part(loaded: LoadedAssignment) -> LoadedAssignment:
     """What a student may see before grading: the visible checks, and the scenarios that they need.
 
-    Nothing of the other checks is left but their number and points, so whatever is made from
-    the part (recordings, grade, reports) cannot tell more.
+    Of the other checks only their number and points are left, so recordings, grade and reports
+    cannot reveal more.
 
     Args:
         loaded: The whole assignment; no visible check requires one that is not.

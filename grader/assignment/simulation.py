@@ -1,4 +1,4 @@
-"""What must fit in scenarios as they are run: worlds, random values, stimuli."""
+"""Validation of scenarios as they are run: worlds, random values, stimuli."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def read_scenario_world(file: Path, values: dict[str, str]) -> World:
 
 
 def problems(source: Source, assignment: Assignment, known: Interfaces) -> Iterator[Problem]:
-    """Find what does not fit.
+    """Find worlds, random values and stimuli that do not fit.
 
     Worlds are tried with the values of several seeds, functions with the seed 0. Fields of
     messages are checked where the definitions are at hand.
@@ -51,7 +51,7 @@ def _stimuli(scenario: Scenario, making: Making) -> Iterator[tuple[Place, str]]:
         after = getattr(item, "after", None)
         if after is not None and after >= scenario.timeout:
             shown, timeout = format_duration(after), format_duration(scenario.timeout)
-            text = f"{shown} is not before the timeout of {timeout} ends the scenario"
+            text = f"{shown} is too late: the timeout of {timeout} ends the scenario before"
             yield ("stimuli", number, "after"), text
     if scenario.until.stimuli is not None and not any(one.has_end for one in scenario.stimuli):
         yield ("until", "stimuli"), "no stimulus of the scenario has an end"

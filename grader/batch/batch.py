@@ -1,4 +1,4 @@
-"""A class's submissions, graded one beside the other, each once, whatever happens meanwhile."""
+"""The grading of a class: submissions side by side, each once, with results in one folder."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Batch:
     def read(
         self, rows: Sequence[HandedIn], on_read: Callable[[str], None] = lambda _: None
     ) -> tuple[list[Entry], dict[str, Path]]:
-        """Read what was handed in, and find the same among it."""
+        """Read what was handed in, and find identical submissions."""
         self._refuse_other()
         unknown = self.retry - {RETRY_ALL, RETRY_ERRORS} - {row.key for row in rows}
         if unknown:
@@ -120,7 +120,7 @@ class Batch:
             self._write()
 
     def left(self, done: Iterable[Done]) -> list[Done]:
-        """What an interrupted batch has not come to, each with the grade that it still has."""
+        """Rows that an interrupted batch has not graded, each with its earlier grade if any."""
         finished = {item.entry.key for item in done}
         left = []
         for key in self._entries.keys() - finished:
@@ -145,7 +145,7 @@ class Batch:
         given = self._given[key]
         if given and dict(find(self.ledger.folder(key)).submission.given) != given:
             return False
-        # Of the same submissions only one is graded, whichever of them was named.
+        # Of identical submissions only one is graded, even if another one was named.
         same = {key, *self._twins.get(key, ())}
         if RETRY_ALL in self.retry or not self.retry.isdisjoint(same):
             return False
@@ -155,10 +155,10 @@ class Batch:
         try:
             name = self.ledger.read().assignment
         except UsageError:
-            # There is none yet, or it is damaged; what it says is written anew from the class.
+            # There is none yet, or it is damaged; it is written again from the class.
             return
         if name != self.loaded.assignment.id:
-            raise UsageError(f"{self.ledger.out}: holds the grades of {name}; name a new folder")
+            raise UsageError(f"{self.ledger.out}: holds the grades of {name}; use a new folder")
 
     def _refuse_changed(self, keys: Iterable[str]) -> None:
         changed = sorted(key for key in keys if not self._is_of_this_version(key))
@@ -167,8 +167,8 @@ class Batch:
         named = ", ".join(changed[:_MOST_NAMED]) + (", …" if len(changed) > _MOST_NAMED else "")
         raise UsageError(
             f"{self.ledger.out}: {len(changed)} ({named}) graded with another version of "
-            f"{self.loaded.assignment.id}; {regrade_command(self.ledger.out, self.loaded)} judges "
-            "their recordings again, `--retry all` runs everything again, `--retry NAME` one"
+            f"{self.loaded.assignment.id}. {regrade_command(self.ledger.out, self.loaded)} judges "
+            "their recordings again; `--retry all` runs all of them again, `--retry NAME` one"
         )
 
     def _is_of_this_version(self, key: str) -> bool:
@@ -185,32 +185,32 @@ class Batch:
             self._entries[key] = self._with_fault(self._entries[key], error)
 
     def _with_fault(self, entry: Entry, error: Exception) -> Entry:
-        """Tell on its row why it could not be graded; the others go on."""
+        """Note on the row why it could not be graded; the others go on."""
         if isinstance(error, OSError):
             error = machine_fault(error) or error
-        told = str(error).partition("\n")[0]
+        fault = str(error).partition("\n")[0]
         if not isinstance(error, RosgradeError):
-            told = f"a fault of rosgrade, see {FAULTS_FILE}: {type(error).__name__}"
+            fault = f"a fault of rosgrade, see {FAULTS_FILE}: {type(error).__name__}"
         log = self.ledger.out / FAULTS_FILE
         with log.open("a", encoding="utf-8", errors="backslashreplace") as stream:
             stream.write(f"{entry.key}\n{''.join(traceback.format_exception(error))}\n")
-        return replace(entry, fault=shown(told))
+        return replace(entry, fault=shown(fault))
 
     def _finished(self, key: str, *, fresh: bool) -> Iterable[Done]:
         entry = self._entries[key]
         result = self.ledger.result(key) if entry.sha256 and not entry.fault else None
         yield Done(entry, result, fresh)
         for twin in [self._entries[name] for name in self._twins.get(key, ())]:
-            told = self._entries[twin.key] = replace(twin, fault=entry.fault)
+            row = self._entries[twin.key] = replace(twin, fault=entry.fault)
             if result is not None:
                 try:
                     self._copy(key, twin)
                 except RosgradeError as error:
                     why = str(error).partition("\n")[0]
                     again = GraderFault(f"{why}; `--retry {key}` grades both again")
-                    told = self._entries[twin.key] = self._with_fault(twin, again)
-            known = result is not None and not told.fault
-            yield Done(told, self.ledger.result(twin.key) if known else None, fresh)
+                    row = self._entries[twin.key] = self._with_fault(twin, again)
+            known = result is not None and not row.fault
+            yield Done(row, self.ledger.result(twin.key) if known else None, fresh)
 
     def _copy(self, key: str, twin: Entry) -> None:
         """Give an identical submission of another student the same result, under its own name."""
@@ -238,7 +238,7 @@ class Batch:
 
 
 def _teams(rows: Sequence[HandedIn]) -> dict[str, str]:
-    """For each of a team, who share what was handed in: the key of the first of them."""
+    """For each member of a team, which shares a submission: the key of the first member."""
     shared: dict[Path, list[str]] = {}
     for row in rows:
         if row.path is not None:

@@ -28,7 +28,7 @@ from grader.safe_text import one_line
 
 GRADES_FILE = "grades.csv"
 OVERVIEW_FILE = "index.html"
-NO_RESULT = "there is no result of it; run the batch again"
+NO_RESULT = "it has no result; run the batch again"
 _MOST_TWINS = 5
 _load = cache(load_assignment)
 
@@ -80,19 +80,19 @@ def _note(done: Done, same: Sequence[Entry]) -> str:
 
 
 def standing(ledger: Ledger, entry: Entry) -> Done:
-    """A row of a batch as its folder has it."""
+    """A row of a batch with the result in the batch's folder."""
     result = ledger.result(entry.key) if not entry.fault else None
     if result is not None and entry.sha256 in ("", result.submission.sha256):
         return Done(entry, result, fresh=False)
     if entry.sha256 and not entry.fault:
-        told = "; ".join(part for part in (entry.problem, NO_RESULT) if part)
-        entry = replace(entry, problem=told)
+        problem = "; ".join(part for part in (entry.problem, NO_RESULT) if part)
+        entry = replace(entry, problem=problem)
     return Done(entry, None, fresh=False)
 
 
 def class_rows(done: Sequence[Done], ledger: Ledger | None = None) -> list[ClassRow]:
-    """What is shown of a class, sorted by key."""
-    said = notes(done)
+    """The rows of a class as the overview shows them, sorted by key."""
+    noted = notes(done)
     rows = sorted(done, key=lambda item: item.entry.key)
     return [
         ClassRow(
@@ -100,7 +100,7 @@ def class_rows(done: Sequence[Done], ledger: Ledger | None = None) -> list[Class
             name=item.entry.name,
             report=_report(item, ledger),
             result=item.result,
-            note=said[item.entry.key],
+            note=noted[item.entry.key],
             late=item.entry.late,
             missing=not (item.entry.sha256 or item.entry.fault),
         )
@@ -126,8 +126,8 @@ def write_class(done: Sequence[Done], ledger: Ledger) -> Path:
 def find_reports(out: Path) -> tuple[Path, ...]:
     """The report folders at a path: itself, or those of a class in it, sorted.
 
-    Hidden folders are left out: a batch that still runs writes in them. So is what a batch has
-    left in its folder of rows that it does not have any more, or of what was handed in before.
+    Hidden folders are left out: a batch that still runs writes in them. So are reports of rows
+    that the batch no longer has, and of earlier submissions.
     """
     if not out.exists():
         raise UsageError(f"{out}: does not exist")
@@ -138,7 +138,7 @@ def find_reports(out: Path) -> tuple[Path, ...]:
     inside = sorted(file.parent.relative_to(out) for file in out.rglob(RESULT_FILE))
     found = tuple(out / path for path in inside if "/." not in f"/{path}")
     if not found:
-        raise UsageError(f"{out}: there is no {RESULT_FILE} in it, nor in a folder below it")
+        raise UsageError(f"{out}: there is no {RESULT_FILE} in it or in a folder below it")
     return found
 
 
@@ -170,16 +170,16 @@ def render_again(folder: Path, assignment: str | None = None) -> Result:
     loaded = _load(assignment or _stored(folder, result))
     if loaded.sha256 != result.assignment.sha256:
         raise UsageError(
-            f"{folder}: the assignment has changed since this was graded: "
-            f"{regrade_command(folder, loaded)} judges again with it as it is now"
+            f"{folder}: the assignment has changed since this was graded. "
+            f"{regrade_command(folder, loaded)} judges again with the new assignment"
         )
     shown = visible_part(loaded) if result.withheld.checks else loaded
     graded = regrade(select(shown, tuple(check.id for check in result.checks)), found)
     changed = _changed(result, graded.grade)
     if changed:
         raise UsageError(
-            f"{folder}: judged again it is not what the result says ({', '.join(changed)}): "
-            f"{regrade_command(folder, loaded)} writes both anew"
+            f"{folder}: judging again does not give the stored result ({', '.join(changed)}). "
+            f"{regrade_command(folder, loaded)} writes the new result and report"
         )
     write_report(graded, folder, result)
     return result

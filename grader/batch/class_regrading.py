@@ -28,7 +28,7 @@ class Regraded:
 
     @property
     def gained(self) -> float:
-        """Points more than before, or fewer; none where one of the two is no grade."""
+        """Points gained, negative if lost; 0 unless both are graded."""
         before, after = self.before, self.done.result
         if before is None or before.score is None or after is None or after.score is None:
             return 0.0
@@ -36,7 +36,7 @@ class Regraded:
 
     @property
     def in_doubt(self) -> bool:
-        """Whether there was a grade and now is none."""
+        """Whether there was a grade before, but not any more."""
         after = self.done.result
         graded = self.before is not None and self.before.graded
         return graded and (after is None or not after.graded)
@@ -90,5 +90,5 @@ def _regrade(loaded: LoadedAssignment, ledger: Ledger, entry: Entry, before: Res
 
 
 def _not_judged(entry: Entry, before: Result | None, why: str) -> Regraded:
-    told = "; ".join(part for part in (entry.problem, f"not judged again: {why}") if part)
-    return Regraded(Done(replace(entry, problem=told), before, fresh=False), before, problem=why)
+    problem = "; ".join(part for part in (entry.problem, f"not judged again: {why}") if part)
+    return Regraded(Done(replace(entry, problem=problem), before, fresh=False), before, problem=why)

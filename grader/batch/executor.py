@@ -1,4 +1,4 @@
-"""Who grades the submissions of a batch: threads here, or the workers of a Dask cluster."""
+"""Executors that grade a batch: threads of this process, or the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from grader.errors import GraderFault, RosgradeError, UsageError
 
 _CONNECT_S = 15
 _ANSWER_S = _CONNECT_S + 5.0
-"""Dask itself waits for ever for the words of something that is no scheduler."""
+"""Dask itself would wait for ever for an answer of a program that is no scheduler."""
 _EACH_WORKER = 2
 """Submissions on their way to a thread of a worker: one is graded, one waits."""
 
@@ -29,10 +29,10 @@ class BatchExecutor(Protocol):
 
     @property
     def capacity(self) -> int:
-        """So many are worth handing over at once, as things are now; at least one."""
+        """How many submissions to hand over at once at the moment; at least one."""
 
     def submit(self, key: str, path: Path, folder: Path, given: Given) -> Future[None]:
-        """Grade what is at a path, and leave report, result and recordings in a folder.
+        """Grade the submission at a path, and write report, result and recordings to a folder.
 
         ``given`` are the values of variables that the roster says.
 
@@ -40,7 +40,7 @@ class BatchExecutor(Protocol):
         """
 
     def close(self) -> None:
-        """End what is being graded and let nothing of it run on."""
+        """Stop all gradings and every process that they started."""
 
 
 class LocalExecutor:
@@ -95,7 +95,7 @@ class DaskExecutor:
                 "in its checkout"
             ) from error
         self._client = _connected(address, distributed.Client)
-        # That a scheduler is lost is told by us, and without Dask's tracebacks.
+        # rosgrade itself reports that a scheduler is lost, without Dask's tracebacks.
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         self._order = order
         self._address = address

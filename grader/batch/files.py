@@ -1,4 +1,4 @@
-"""The files that grading one submission leaves."""
+"""The files that are written for one graded submission."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def write_graded(
     )
     result = make_result(graded.grade, graded.recordings, facts)
     write_report(graded, folder, result)
-    # Last: where it says what the grade is, the report beside it says the same.
+    # Last, so that the report beside a result always has the same grade.
     for file in (folder / RESULT_FILE, json_file):
         if file is not None:
             write_whole(file, result_json(result))
@@ -71,7 +71,7 @@ def refuse_foreign(folder: Path, *, keep: bool) -> None:
     install = folder / INSTALL_FOLDER
     if foreign or (keep and install.exists() and not (folder / RESULT_FILE).is_file()):
         other = recordings if foreign else install
-        raise UsageError(f"{other}: is not of a report, and is left as it is; name another folder")
+        raise UsageError(f"{other}: does not belong to a report, so it stays; use another folder")
 
 
 def keep_install(graded: Graded, folder: Path) -> Path | None:

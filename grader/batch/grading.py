@@ -41,7 +41,7 @@ _LONGEST_WORDS = 300
 
 @dataclass(frozen=True)
 class Graded:
-    """A graded submission with all that its grade rests on."""
+    """A graded submission with everything that its grade is made from."""
 
     grade: Grade
     prepared: Prepared
@@ -98,7 +98,7 @@ class Grading:
         def tested(record: SubmissionRecord) -> frozenset[str]:
             return _tested(named(self._loaded, replace(record, given=outside))[0])
 
-        # Each of them takes a CPU or more; beyond that they would only hold up each other.
+        # A build takes a CPU or more; too many would only slow down each other.
         with self._builds:
             prepared = prepare(
                 path,
@@ -239,11 +239,11 @@ class Grading:
             )
             return read_recording(file)
         except UsageError as error:
-            raise GraderFault(f"the recording that was just made: {error}") from error
+            raise GraderFault(f"the new recording cannot be read: {error}") from error
         except OSError as error:
             # A full disk, a folder that was removed: it is tried again, and the others go on.
-            told = GraderFault(f"this machine: {str(error)[:_LONGEST_WORDS]}")
-            raise machine_fault(error) or told from error
+            fault = GraderFault(f"this machine: {str(error)[:_LONGEST_WORDS]}")
+            raise machine_fault(error) or fault from error
 
 
 def _tested(loaded: LoadedAssignment) -> frozenset[str]:

@@ -37,7 +37,7 @@ class HandedIn:
 
 @dataclass(frozen=True)
 class Entry:
-    """Something in the folder, with the names that it has for its author."""
+    """A file or folder of the class, with the names that may tell whose it is."""
 
     key: str
     path: Path
@@ -66,10 +66,10 @@ def with_problem(row: HandedIn, problem: str) -> HandedIn:
 
 
 def _archive_in(folder: Path) -> Path | None:
-    """What was handed in where a platform has made a folder for it, as Moodle does, or None."""
+    """The submission in a folder that a platform made for it, as Moodle does; else None."""
     try:
         inside = list(folder.iterdir()) if folder.is_dir() else []
-        # What a student has in a repository is as they meant it.
+        # An archive in a student's repository is only a part of the submission.
         if any(item.name == ".git" for item in inside):
             return None
         return only_archive({item.name: item for item in inside if not is_ignored(item)})

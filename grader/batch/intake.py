@@ -58,7 +58,7 @@ def take_in(
     _refuse_single(folder, source)
     entries = list(_entries(folder, staging, on_left_out, out))
     if not entries:
-        raise UsageError(f"{source}: holds no submission; expected a folder or an archive of each")
+        raise UsageError(f"{source}: holds no submission; expected one folder or archive for each")
     if roster is None:
         return unique([row_of(item) for item in entries])
     return unique(matched(entries, roster, on_prefix))
@@ -74,7 +74,7 @@ def take_in_roster(
             "or name the folder of submissions"
         )
     rows = []
-    # What a team names is fetched once.
+    # A repository that a whole team names is fetched once.
     cloned: dict[str, HandedIn] = {}
     for student in roster.students:
         row = _from_roster(student, base, staging, cloned.get(student.submission))
@@ -224,7 +224,7 @@ def _names(files: list[tuple[Path, re.Match[str]]]) -> dict[str, Path]:
 
 
 def _gather(files: Mapping[str, Path], folder: Path) -> str:
-    """Copy files together into a new folder; says what went wrong, or nothing.
+    """Copy files together into a new folder; return what went wrong, or nothing.
 
     Several archives, such as one of each package, are unpacked side by side.
     """
@@ -270,6 +270,6 @@ def _of_gradescope(item: Path, about: Any) -> Iterator[Entry]:
     listed = submitters if isinstance(submitters, list) else []
     people = [person for person in listed if isinstance(person, dict)]
     for person in people or [{}]:
-        told = (person.get(field) for field in (":sid", ":email", ":name"))
-        names = tuple(str(value) for value in told if value) or (item.name,)
+        values = (person.get(field) for field in (":sid", ":email", ":name"))
+        names = tuple(str(value) for value in values if value) or (item.name,)
         yield Entry(shown(names[0]), item, names, shown(str(person.get(":name") or "")))

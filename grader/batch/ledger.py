@@ -30,13 +30,13 @@ _PARTIAL = ".partial"
 _LOCK = ".lock"
 _EARLIER = "earlier"
 _REPLACED = "#replaced"
-"""Behind the name of a result that makes way for another; no key has such a folder."""
+"""Suffix of a result's folder while another one replaces it; no key has such a folder."""
 _LONGEST_NAME = 120
 
 
 @dataclass(frozen=True)
 class Entry:
-    """What is known of a row, beside its result.
+    """Facts about a row besides its result.
 
     Attributes:
         key: Of the row; names its folder.
@@ -60,7 +60,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class BatchRows:
-    """What a batch consists of."""
+    """The assignment and the rows of a batch."""
 
     assignment: str
     location: str | None
@@ -83,11 +83,11 @@ class Ledger:
             known = {BATCH_FILE, SUBMISSIONS, _PARTIAL, _LOCK}
             inside = {item.name for item in self.out.iterdir()}
             if inside and not inside & known:
-                raise UsageError(f"{self.out}: holds something else; name a new folder")
+                raise UsageError(f"{self.out}: holds other files; use a new folder")
             lock = (self.out / _LOCK).open("w")
         except OSError as error:
-            told = UsageError(f"{self.out}: cannot be written: {error.strerror}")
-            raise machine_fault(error, self.out) or told from error
+            refusal = UsageError(f"{self.out}: cannot be written: {error.strerror}")
+            raise machine_fault(error, self.out) or refusal from error
         with lock:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -140,7 +140,7 @@ class Ledger:
         _sync(target.parent)
 
     def _put_back(self) -> None:
-        """Undo what :meth:`put` was killed in: the result before is whole, and so is its past."""
+        """Undo a :meth:`put` that was killed: the earlier result and its history are whole."""
         for old in (self.out / _PARTIAL).glob(f"*{_REPLACED}"):
             target = self.out / SUBMISSIONS / old.name.removesuffix(_REPLACED)
             if not target.exists():
@@ -163,7 +163,7 @@ class Ledger:
         assignment_sha256: str,
         location: str | None = None,
     ) -> None:
-        """Write down what the batch consists of."""
+        """Write the assignment and the rows."""
         data = {
             "assignment": {"id": assignment, "sha256": assignment_sha256, "location": location},
             "rows": [asdict(entry) for entry in entries],
@@ -202,7 +202,7 @@ def keep_earlier(file: Path) -> None:
 
 
 def _sync(path: Path) -> None:
-    """Let what was written, or the renames in a folder, survive a power cut."""
+    """Make a written file, or the renames in a folder, survive a power cut."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

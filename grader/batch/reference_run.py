@@ -72,9 +72,9 @@ def write_references(loaded: LoadedAssignment, recordings: Mapping[str, Recordin
 
 
 def fingerprint(loaded: LoadedAssignment, scenario: Scenario) -> str:
-    """What a run depends on, as a hash: the scenario as it is read, and its world."""
-    said = scenario.model_dump_json(exclude_defaults=True, exclude={"title"})
-    digest = hashlib.sha256(said.encode())
+    """Hash of everything that a run depends on: the scenario as it is read, and its world."""
+    definition = scenario.model_dump_json(exclude_defaults=True, exclude={"title"})
+    digest = hashlib.sha256(definition.encode())
     if scenario.world is not None:
         digest.update((loaded.folder / scenario.world).read_bytes())
     return digest.hexdigest()[:16]

@@ -26,7 +26,7 @@ from grader.submission.record import SubmissionRecord, read_record
 
 @dataclass(frozen=True)
 class FoundRecordings:
-    """What there is to judge again."""
+    """Recordings of a submission to judge again, with its result if there is one."""
 
     folder: Path
     recordings: Mapping[str, Recording]
@@ -36,13 +36,13 @@ class FoundRecordings:
 
     @property
     def assignment(self) -> str:
-        """Id of the assignment that it was recorded for."""
+        """Id of the assignment that they were recorded for."""
         if self.result is not None:
             return self.result.assignment.id
         for recording in self.recordings.values():
             if "assignment" in recording.environment:
                 return recording.environment["assignment"]
-        raise UsageError(f"{self.folder}: it does not say for which assignment; name it")
+        raise UsageError(f"{self.folder}: the assignment is not stored here; name it too")
 
     @property
     def location(self) -> str | None:
@@ -89,7 +89,7 @@ def stored_assignment(path: Path, name: str, location: str | None, *command: str
         return str(resources.assignments() / name)
     if location is not None and Path(location).exists():
         return location
-    lay = f" in {location}, which is not there any more" if location else ""
+    lay = f" in {location}, which does not exist any more" if location else ""
     raise UsageError(
         f"{path}: was graded with the assignment {name!r}{lay}; name its folder: "
         f"`{shlex.join(('rosgrade', *command))} FOLDER`"

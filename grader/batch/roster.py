@@ -63,7 +63,7 @@ class Student:
 
     @property
     def resembling(self) -> frozenset[str]:
-        """What may be meant for the student, as :func:`resemblance`."""
+        """Names that may mean the student, as :func:`resemblance`."""
         local = self.email.partition("@")[0]
         forms = (self.id, self.login, self.email, local, *name_forms(self.name))
         return frozenset(resemblance(form) for form in forms if form)

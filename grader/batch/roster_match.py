@@ -12,16 +12,16 @@ from grader.batch.roster import Roster, Student, name_forms, resemblance, writte
 from grader.findings.wording import listing
 from grader.submission.intake.paths import shown
 
-# No name of a repository has so many in earnest.
+# Parts of a repository's name that are compared; real names have fewer.
 _MOST_HYPHENS = 12
 _MOST_TWICE = 10
 
 
 class _Names:
-    """Who of a roster a name names."""
+    """Finds the students of a roster that an entry may belong to."""
 
     def __init__(self, students: Sequence[Student], entries: Sequence[Entry]) -> None:
-        """Learn the names of a class."""
+        """Collect the names of a class."""
         self._alike: dict[str, list[Student]] = {}
         for student in students:
             for form in student.resembling:
@@ -53,7 +53,7 @@ class _Names:
         return fitting[0]
 
     def exact(self, entry: Entry) -> set[str]:
-        """Students whom its names name; several where two of its names contradict each other."""
+        """Students with exactly its names; several where two of its names contradict each other."""
         keys: set[str] = set()
         for name in entry.names:
             found = {
@@ -71,7 +71,7 @@ class _Names:
         return set()
 
     def alike(self, entry: Entry) -> set[str]:
-        """Students whom it may be of: their name is written alike, or its name ends with it."""
+        """Students with a name that is written alike, or with which the entry's name ends."""
         parts = stem_of(entry.path).split("-")[-_MOST_HYPHENS:]
         ends = ["-".join(parts[first:]) for first in range(1, len(parts))]
         forms = map(resemblance, (*entry.names, *ends))
@@ -103,9 +103,9 @@ def matched(
     doubtful: dict[str, list[str]] = {}
     for entry in entries:
         # What the roster says itself needs no guess, and a team may have handed in one for all.
-        told = named.get(entry.path.name, set()) | named.get(stem_of(entry.path), set())
-        keys = told or names.exact(entry)
-        if not told and len(keys) != 1:
+        stated = named.get(entry.path.name, set()) | named.get(stem_of(entry.path), set())
+        keys = stated or names.exact(entry)
+        if not stated and len(keys) != 1:
             may_be = sorted(keys or names.alike(entry))
             for key in may_be:
                 doubtful.setdefault(key, []).append(shown(entry.path.name))

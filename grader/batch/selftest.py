@@ -69,7 +69,7 @@ class TrialResult:
     graded: bool
     repeated: bool
     grade: str
-    told: tuple[str, ...] = ()
+    findings: tuple[str, ...] = ()
 
 
 def trials(loaded: LoadedAssignment) -> tuple[Trial, ...]:
@@ -131,11 +131,11 @@ def run_trial(
         graded=graded.grade.graded,
         repeated=any(count > 1 for count in graded.runs.values()),
         grade=grade_json(make_result(graded.grade, graded.recordings, RunFacts("", 0.0))),
-        told=tuple(
+        findings=tuple(
             line
             for one in outcome.differences
             if one.actual is not None
-            for line in _told(graded, one.check)
+            for line in _findings(graded, one.check)
         ),
     )
 
@@ -148,12 +148,12 @@ def _starter_verdict(grade: Grade) -> MutantVerdict:
     if grade.score > MOST_FOR_STARTER * grade.max_score:
         problem = (
             f"{counted_points(grade.score)} of {number(grade.max_score)}, and a starter package "
-            f"may have {MOST_FOR_STARTER:.0%} at most: give the points to what the lesson is about"
+            f"may have {MOST_FOR_STARTER:.0%} at most: give the points for what the lesson teaches"
         )
     return MutantVerdict(not_judged, problem)
 
 
-def _told(graded: Graded, check: str) -> Iterator[str]:
+def _findings(graded: Graded, check: str) -> Iterator[str]:
     for item in graded.grade.result(check).findings:
         place, taken = "", ""
         recording = graded.recordings.get(item.scenario or "")

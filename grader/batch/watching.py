@@ -42,7 +42,7 @@ class Worker(Protocol):
 
 
 class Step(Enum):
-    """What happens besides the end of a grading."""
+    """Events of watching other than the end of a grading."""
 
     BEGAN = "a grading begins"
     CANCELLED = "a grading was ended by a change; the next one begins"

@@ -59,7 +59,7 @@ def pack(folder: Path) -> bytes:
 
 
 def unpack(packed: bytes, folder: Path) -> None:
-    """Write the files of a tar that :func:`pack` made; it comes from a worker of ours.
+    """Write the files of a tar that :func:`pack` made on a trusted worker.
 
     Links and executable bits are kept: they belong to what a submission's hash is of.
     """
@@ -68,7 +68,7 @@ def unpack(packed: bytes, folder: Path) -> None:
             target = folder / member.name
             end = target.parent / member.linkname if member.issym() else target
             if not end.resolve().is_relative_to(folder.resolve()):
-                raise GraderFault(f"a worker sent a file that leads out: {member.name}")
+                raise GraderFault(f"a worker sent a file outside its folder: {member.name}")
             if member.isdir():
                 target.mkdir(parents=True, exist_ok=True)
                 continue
@@ -102,7 +102,7 @@ class Parcel:
                     return cls(key, path.name, path.read_bytes(), False)
                 return cls(key, path.name, pack(located.root), True)
         except SubmissionError as error:
-            # It may be of any size, and there is nothing to run.
+            # A refused archive is not sent: it may be large, and nothing of it will run.
             return cls(key, path.name, b"", path.is_dir(), refused(path, error))
 
     def open(self, path: Path) -> None:
@@ -140,12 +140,12 @@ _held = threading.Lock()
 
 @functools.cache
 def _make_grading(order: Order) -> Grading:
-    """The one of this process: its builds, cells and limits are shared by all of its tasks."""
+    """The grading of this process; all tasks share its builds, cells and limits."""
     loaded = load_assignment(order.assignment)
     if loaded.sha256 != order.sha256:
         raise GraderFault(
             f"the worker on {os.uname().nodename} has another version of the assignment "
-            f"{order.assignment}; install the same one there"
+            f"{order.assignment}; install the same version there"
         )
     return make_grading(order, loaded)
 

@@ -1,7 +1,7 @@
 """The catalogue of checks: every check by its name.
 
 A family is a package beside this module, named as the first part of the names of its checks; a
-check is whatever one of its modules makes with :func:`grader.checks.check.check`.
+check is an object that one of its modules makes with :func:`grader.checks.check.check`.
 """
 
 from __future__ import annotations

@@ -46,13 +46,13 @@ class Parameters(Model):
 
     needs: ClassVar[tuple[Need, ...]] = ()
     doubt: ClassVar[Doubt | None] = None
-    """A failure in a run that was disturbed so must happen twice to count."""
+    """After such disturbances a failure must happen twice to count."""
     asks: ClassVar[str] = ""
     """What is asked for, in the words of the handout, such as ``the node `{self.name}```."""
 
     @property
     def asked_for(self) -> str:
-        """The same with the values of the parameters."""
+        """The text of :attr:`asks` with the values of the parameters."""
         return self._asked()
 
     def _asked(self) -> str:
@@ -69,7 +69,7 @@ class NoParameters(Parameters):
 
 @dataclass(frozen=True)
 class Check:
-    """One entry of the catalogue: ``family.noun``, as in YAML's ``uses``, and what judges."""
+    """One entry of the catalogue: ``family.noun``, as in YAML's ``uses``, and its function."""
 
     name: str
     subject: Subject

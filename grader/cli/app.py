@@ -98,7 +98,7 @@ def main() -> None:
     # So does a closed terminal, but for what `nohup` was asked to keep.
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
         signal.signal(signal.SIGHUP, signal.default_int_handler)
-    # Who waits for a child must be told of its end, whatever the caller had blocked or ignored.
+    # The end of a child must be reported even if the caller had blocked or ignored the signal.
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     try:
@@ -112,6 +112,6 @@ def main() -> None:
         print_error(str(machine_fault(error) or f"this machine: {error}"))
         sys.exit(NOT_GRADED)
     except Exception:
-        # A bug of ours must not look as if points were lost.
+        # The exit code of a bug must not look as if points were lost.
         traceback.print_exc()
         sys.exit(NOT_GRADED)

@@ -74,7 +74,7 @@ def batch(
     if context.args:
         # What a shell makes of `class/*`.
         count = 1 + len(context.args)
-        raise UsageError(f"batch takes one folder, not {count} submissions: name the folder of all")
+        raise UsageError(f"batch takes one folder, not {count} submissions: give their folder")
     refuse_swapped(assignment, submissions)
     refuse_inputs([out], [*assignment_places(assignment), submissions, roster])
     check_folder(out)
@@ -116,8 +116,8 @@ def batch(
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
                 signal.signal(signal.SIGTERM, signal.SIG_IGN)
                 progress.note(
-                    f"interrupted; {len(done)} of {len(entries)} are in {out}, and the same "
-                    "command goes on with the others"
+                    f"interrupted; {len(done)} of {len(entries)} are in {out}. Run the same "
+                    "command again to grade the others"
                 )
                 write_class([*done, *work.left(done)], ledger)
                 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -149,14 +149,14 @@ def _rows(
         return known, take_in_roster(known, submissions.parent, staging, progress.advance)
     read = read_roster(roster) if roster else None
 
-    not_taken = "is neither a folder nor an archive, and is left out"
+    not_taken = "is neither a folder nor an archive, so it is left out"
     return read, take_in(
         submissions,
         staging,
         read,
         on_left_out=lambda name: progress.note(f"{name} {not_taken}"),
         out=out,
-        on_prefix=lambda prefix: progress.say(f"names are read as {prefix}LOGIN"),
+        on_prefix=lambda prefix: progress.say(f"names of submissions are read as {prefix}LOGIN"),
     )
 
 
@@ -164,7 +164,7 @@ def _at_once(jobs: str) -> int | None:
     if jobs == _AUTO:
         return None
     if not (jobs.isdecimal() and int(jobs) > 0):
-        raise UsageError(f"--jobs {jobs}: must be auto or a number from 1 on")
+        raise UsageError(f"--jobs {jobs}: must be auto, or 1 or more")
     return int(jobs)
 
 
@@ -191,10 +191,10 @@ def _summary(done: Sequence[Done], wall_s: float) -> str:
         most = next(row.result.max_score for row in rows if row.graded and row.result is not None)
         parts.append(f"median {median(scores):g} of {most:g} points")
         parts.append(f"{sum(row.full for row in rows)} with full points")
-    told = {
+    counts = {
         "the same as another": copies(done),
         "could not be graded (again with --retry errors)": count[RowStatus.NOT_GRADED],
         "unreadable, without a score": count[RowStatus.UNREADABLE],
         "handed in nothing": count[RowStatus.MISSING],
     }
-    return "; ".join([*parts, *(f"{number} {what}" for what, number in told.items() if number)])
+    return "; ".join([*parts, *(f"{number} {what}" for what, number in counts.items() if number)])

@@ -46,10 +46,10 @@ def validate(
             print_error(str(error))
             broken += 1
             continue
-        told = [*lint_warnings(loaded, mutants.mutants if mutants else None)]
-        told += not_installed(loaded.assignment.libraries)
-        told += missing_underlays(loaded)
-        for warning in told:
+        warnings = [*lint_warnings(loaded, mutants.mutants if mutants else None)]
+        warnings += not_installed(loaded.assignment.libraries)
+        warnings += missing_underlays(loaded)
+        for warning in warnings:
             print_warning(f"{loaded.file}: {warning}")
         tested = f", {counted(len(mutants.mutants), 'mutant')}" if mutants else ""
         typer.echo(

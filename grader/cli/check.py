@@ -129,7 +129,7 @@ def check(
             from grader.report.text.terminal import print_grade
 
         except KeyboardInterrupt:
-            progress.say("interrupted: what still runs is ended, and no report is written")
+            progress.say("interrupted: ending what still runs; no report is written")
             raise
         finally:
             runner.close()

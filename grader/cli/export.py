@@ -122,7 +122,7 @@ def canvas(
     except OSError as error:
         raise UsageError(f"{canvas}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise UsageError(f"{canvas}: is not UTF-8: name the file as Canvas exports it") from error
+        raise UsageError(f"{canvas}: is not UTF-8: give the file as Canvas exported it") from error
     export = read_canvas(text, str(canvas))
     filled = canvas_csv(read_class(out), export, column, _statuses(zero))
     write_whole(output, filled.text)

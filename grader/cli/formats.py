@@ -119,7 +119,7 @@ class Formats:
 
     @contextmanager
     def grading(self) -> Iterator[None]:
-        """While this lasts, GitHub Actions obeys no command in what a student's code prints."""
+        """A context in which GitHub Actions obeys no command in what a student's code prints."""
         # Each is imported only where it is asked for: together they take 0.2 s.
         if self.classroom50:
             from grader.report.formats import classroom50
@@ -187,8 +187,8 @@ def _append(file: Path, text: str) -> None:
         with file.open("a", encoding="utf-8") as stream:
             stream.write(text)
     except OSError as error:
-        told = UsageError(f"{file} cannot be written: {error.strerror}")
-        raise machine_fault(error, file) or told from error
+        refusal = UsageError(f"{file} cannot be written: {error.strerror}")
+        raise machine_fault(error, file) or refusal from error
 
 
 def _write_classroom50(result: Result, folder: Path) -> None:

@@ -96,7 +96,7 @@ def _in_class(batch: Ledger, loaded: LoadedAssignment, folder: Path) -> None:
 
 
 def _write(ledger: Ledger, rows: Sequence[Regraded]) -> None:
-    """Write the gradebook and the overview anew; the one until now is kept where it changes."""
+    """Write the gradebook and the overview again; a gradebook that changes is kept as earlier."""
     from grader.batch.class_files import GRADES_FILE, write_class
     from grader.batch.ledger import keep_earlier
 
@@ -144,7 +144,7 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
     left = sum(bool(row.problem) or row.in_doubt for row in rows)
     if left:
         say(
-            f"{left} cannot be judged again from what was recorded; run them again with "
+            f"{left} cannot be judged again from their recordings; run them again with "
             "`rosgrade batch ... --retry NAME`"
         )
     graded = all(

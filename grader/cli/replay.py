@@ -60,8 +60,8 @@ def replay(
         type_support = TypeSupport(loaded, ros.find(), cache_folder()).prefixes(progress.say)
     reason = why_not_run(prepared.record, [one.name for one in loaded.assignment.packages])
     if prepared.install is None or reason is not None:
-        told = reason.observed if reason else prepared.record.problem
-        raise UsageError(f"{submission}: {told}")
+        problem = reason.observed if reason else prepared.record.problem
+        raise UsageError(f"{submission}: {problem}")
     status = replay_recording(
         recording,
         recorded,

@@ -46,8 +46,8 @@ def report(
     formats = Formats(files, junit_family, gradescope_metadata, github)
     if len(folders) > 1 and (files or gradescope_metadata or github):
         raise UsageError(
-            f"{out} has {len(folders)} reports, and a file of one of the formats holds one: "
-            "name a report's own folder"
+            f"{out} has {len(folders)} reports, and a file of such a format holds one: "
+            "give the folder of one report"
         )
     for folder in folders:
         read = [folder / RESULT_FILE, folder / RECORDINGS_FOLDER, gradescope_metadata]

@@ -103,7 +103,7 @@ def selftest(
         _print(console, loaded.assignment.id, results)
         say(
             f"{loaded.assignment.id}: {score.accepted} of {score.right} right solutions with "
-            f"full points, {score.killed} of {score.mutants} mutants judged as they must: "
+            f"full points, {score.killed} of {score.mutants} mutants judged as expected: "
             f"mutation score {percent:.0f} %"
         )
     raise typer.Exit(0 if perfect else 1)
@@ -124,5 +124,5 @@ def _print(console: Console, assignment: str, results: list[TrialResult]) -> Non
         )
     console.print(table)
     for result in results:
-        for line in result.told:
+        for line in result.findings:
             say(f"{result.trial.id}: {line}")

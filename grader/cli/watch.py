@@ -122,7 +122,7 @@ def watch(
 
 @dataclass
 class _Work:
-    """Grades the submission, each time with what is warm from the time before."""
+    """Grades the submission, each time with the warm processes of the time before."""
 
     loaded: LoadedAssignment
     load: Callable[[], LoadedAssignment]
@@ -142,7 +142,7 @@ class _Work:
         try:
             self.loaded, self.problem = self.load(), None
         except RosgradeError as error:
-            # Told as the end of the grading; who watches mends it and saves again.
+            # Shown as the end of the grading: the student corrects it and saves again.
             self.problem = error
         self.grading = Grading(self.loaded, self.runner, cache_folder(), seed=self.seed)
 
@@ -183,16 +183,16 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
             title = work.loaded.assignment.title
             if event is Step.BEGAN:
                 clock = Clock()
-                page.tell("grading what was saved", f"… {title}")
+                page.show("grading the saved files", f"… {title}")
                 shown.enter_context(work.progress.shown())
                 continue
             shown.close()
             if not isinstance(event, Ended):
-                work.progress.say("saved meanwhile: beginning anew")
+                work.progress.say("saved again: starting over")
                 continue
             if event.graded is None:
                 print_error(str(event.problem))
-                page.tell(f"not graded: {event.problem}", f"! {title}")
+                page.show(f"not graded: {event.problem}", f"! {title}")
             else:
                 result = write_graded(event.graded, work.report, clock)
                 console.rule(f"{time.strftime('%H:%M:%S')}, after {clock.elapsed_s:.1f} s")
@@ -201,10 +201,10 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
                 else:
                     print_changes(console, before, result)
                 before = result
-                told = score(result)
-                page.tell(
-                    f"{told}, graded at {time.strftime('%H:%M:%S')}",
-                    f"{told}: {title}",
+                points = score(result)
+                page.show(
+                    f"{points}, graded at {time.strftime('%H:%M:%S')}",
+                    f"{points}: {title}",
                     is_new=True,
                 )
                 work.runner.get_ready()

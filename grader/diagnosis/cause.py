@@ -9,11 +9,11 @@ from grader.findings.finding import Evidence, Finding
 
 @dataclass(frozen=True)
 class Cause:
-    """What several checks say in the same words when the same thing went wrong.
+    """The reason of a failure, in words that are the same in every check.
 
     Attributes:
-        ours: Not the student's fault, or it cannot be told: the finding is an error.
-        disturbed: The run is worth repeating: the machine has, or may have, a part in it.
+        ours: The fault is not, or not certainly, the student's: the finding is an error.
+        disturbed: The run should be repeated: the machine has, or may have, a part in it.
     """
 
     observed: str
@@ -24,7 +24,7 @@ class Cause:
 
     @classmethod
     def to_repeat(cls, observed: str) -> Cause:
-        """The machine's doing, or ours: the run is worth repeating."""
+        """A cause in the machine or in rosgrade: the run should be repeated."""
         return cls(observed, ours=True, disturbed=True)
 
     def finding(self, expected: str) -> Finding:
@@ -35,5 +35,5 @@ class Cause:
         return replace(found, disturbed=self.disturbed)
 
     def after(self, beginning: str) -> Cause:
-        """The same cause with something said before it."""
+        """The same cause with a text before it."""
         return replace(self, observed=f"{beginning}: {self.observed}")

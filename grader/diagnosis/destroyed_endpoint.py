@@ -13,9 +13,9 @@ from grader.recording.interaction import Service
 from grader.recording.model import Endpoint, Kind, Recording
 
 _HINT = (
-    "Keep it, and its node, until rclpy.spin() returns: look for destroy_publisher(), "
+    "Keep it and its node until rclpy.spin() returns. Look for destroy_publisher(), "
     "destroy_subscription(), destroy_service(), destroy() and destroy_node(), and for a node that "
-    "only a local variable keeps."
+    "is stored only in a local variable of a function that returns."
 )
 
 
@@ -62,7 +62,7 @@ def why_destroyed(
             return None
     when_s = recording.since_launch_s(last_ns)
     return Cause(
-        f"{seen}: {what} was destroyed {when_s:.2f} s after launch, while the process ran on",
+        f"{seen}: {what} was destroyed {when_s:.2f} s after launch, while the process still ran",
         _HINT,
         Evidence(moments=(Moment(f"{what.replace('`', '')} was destroyed", when_s),)),
     )

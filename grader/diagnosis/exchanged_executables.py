@@ -18,14 +18,14 @@ def why_exchanged(recording: Recording) -> Cause | None:
         name, _, executable = process.name.partition("/")
         package = recording.submission.package(name)
         other = package and _runs(package, executable)
-        # Where both run, each node is there, whatever started it.
+        # Where both run, each node is there all the same.
         if package and other and f"{name}/{other}" not in launched:
             target = dict(package.entry_points)[executable]
             place = SourceError(package.file("setup.py"), None, f"{executable} = {target}")
             return Cause(
-                f"in setup.py the executable {code(executable)} runs {code(target)}, as if it were "
-                f"{code(other)}",
-                "In console_scripts each line is name = module:function: let each name run its own "
+                f"in setup.py the executable {code(executable)} runs {code(target)}, the "
+                f"function of {code(other)}",
+                "Each line of console_scripts is name = module:function. Give each name its own "
                 "function.",
                 Evidence(places=(place,)),
             )

@@ -81,7 +81,7 @@ class NoAnswer(Symptom[Cause]):
     def evidence(self) -> Evidence:
         """When it was asked, and the place."""
         when_s = self.recording.since_launch_s(self.asked_ns)
-        moment = Moment("asked, not answered in time", when_s)
+        moment = Moment("call, not answered in time", when_s)
         return Evidence(moments=(moment,), places=(self.place,) if self.place else ())
 
 
@@ -166,10 +166,10 @@ def blocked_executor(symptom: NoAnswer) -> Cause | None:
     blocked = None if symptom.spins else symptom.while_busy
     if symptom.spins is False and blocked is None:
         blocked = Cause(
-            f"{symptom.what}: something blocks the executor; the node's parameter services answer "
-            "no call either",
-            f"{HINT} A call() of another service waits for an answer that the same executor would "
-            "have to take in: use call_async().",
+            f"{symptom.what}: something blocks the executor; the node's parameter services do "
+            "not answer either",
+            f"{HINT} A call() to another service waits for an answer that the same executor must "
+            "receive: use call_async().",
         )
     observed = f"{blocked.observed if blocked else ''}{in_brackets(symptom.place)}"
     return blocked and replace(blocked, observed=observed, evidence=symptom.evidence)
@@ -181,8 +181,8 @@ def callback_does_not_answer(symptom: NoAnswer) -> Cause:
     spins = ", although the node's executor spins" if symptom.spins else ""
     return Cause(
         f"{symptom.what}{in_brackets(symptom.place)}{spins}",
-        "Does the callback come to its end and return the response? A callback that waits for "
-        "another one of the same callback group waits for ever.",
+        "Does the callback reach its end and return the response? A callback that waits for "
+        "another callback of the same callback group waits for ever.",
         symptom.evidence,
     )
 
@@ -207,7 +207,7 @@ def why_taken(
     excess_s = (end_ns - begin_ns) / NS - within_s
     if excess_s < -_ROUNDING_S:
         ended = format_duration((end_ns - begin_ns) / NS)
-        return Cause.to_repeat(f"{what}: the run ended {ended} later, before that was due")
+        return Cause.to_repeat(f"{what}: the run ended {ended} later, before the answer was due")
     if stolen_s <= 0.0 or stolen_s < excess_s:
         return None
     return Cause.to_repeat(
@@ -223,9 +223,9 @@ def why_one_cpu(recording: Recording, what: str) -> Cause | None:
     if not (alone and one_cpu and declarations.traced(recording)):
         return None
     return Cause(
-        f"{what}: MultiThreadedExecutor() has as many threads as the machine has CPUs, and here "
-        "that is one",
-        "Say how many: MultiThreadedExecutor(num_threads=4).",
+        f"{what}: MultiThreadedExecutor() has as many threads as the machine has CPUs, and this "
+        "machine has one",
+        "Give the number of threads: MultiThreadedExecutor(num_threads=4).",
         ours=True,
     )
 

@@ -171,11 +171,11 @@ def why_not_met(recording: Recording, word: Word, name: str, what: str, asked_ns
     """Why something that was offered could not be asked."""
     items = offered(recording, word, name)
     return why_destroyed(recording, f"it {what}", f"the {word.noun} {code(name)}", items) or Cause(
-        f"the {word.noun} {code(name)} {what}: it was there, but no client with the usual QoS met "
-        "it",
-        f"Keep the {word.noun} and its node as long as the program runs, and leave its QoS as it "
-        "is.",
-        Evidence(moments=(Moment("given up", recording.since_launch_s(asked_ns)),)),
+        f"the {word.noun} {code(name)} {what}: it was there, but did not match a client with the "
+        "default QoS",
+        f"Keep the {word.noun} and its node as long as the program runs, and do not change its "
+        "QoS.",
+        Evidence(moments=(Moment("rosgrade gave up", recording.since_launch_s(asked_ns)),)),
     )
 
 
@@ -213,7 +213,7 @@ def other_interface(symptom: NoEndpoint) -> Cause | None:
     package, folder, short = symptom.types[0].split("/")
     return Cause(
         f"the {symptom.word.noun} {code(own.name)} has the type {code(own.type)}",
-        "A client and a server meet only if their types are the same: "
+        "A client and a server communicate only if they use the same type: "
         f"`from {package}.{folder} import {short}`.",
         symptom.evidence,
     )
@@ -238,7 +238,7 @@ def misspelt_name(symptom: NoEndpoint) -> Cause | None:
             match, why = item.name, ": upper and lower case differ"
         elif prefix != item.name:
             match, why = item.name, f": {code(prefix)} stands in front of the name"
-            hint += " Without `~/`, which puts the node's name in front, and without a namespace."
+            hint += " Leave out `~/`, which puts the node's name in front, and any namespace."
     match = match or nearest(wanted, [item.name for item in suspects])
     found = f"the node {symptom.word.does} {code(match or '')} instead of {code(wanted)}{why}"
     return Cause(found, hint, symptom.evidence) if match else None
@@ -285,9 +285,9 @@ def others_only(symptom: NoEndpoint) -> Cause:
     word, nodes = symptom.word, codes(node.name for node in symptom.recording.student_nodes)
     there = codes(item.name for item in symptom.there)
     same = codes(item.name for item in symptom.there if item.type in symptom.types)
-    has = f"{word.does} {there} only" if there else f"has no {word.noun} of its own"
+    has = f"created {word.noun}s only for {there}" if there else f"created no {word.noun}"
     return Cause(
-        f"the node {nodes} {has}" + (f"; the type is right on {same}" if same else ""),
+        f"{nodes} {has}" + (f"; the type is right on {same}" if same else ""),
         f"Call {symptom.create} in the node's constructor.",
         symptom.evidence,
     )

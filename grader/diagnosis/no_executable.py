@@ -51,15 +51,15 @@ def no_such_function(symptom: NoExecutable) -> Cause | None:
     points_to = dict(symptom.package.entry_points).get(symptom.name, "")
     entry = f"{symptom.name} = {points_to}" if points_to else symptom.name
     hint = (
-        "An entry of console_scripts is `name = module:function`: the module with its package in "
-        "front, the function as it is called there."
+        "An entry of console_scripts is `name = package.module:function`. Write the function as "
+        "the module spells it."
     )
     if target.message.endswith("/__init__.py"):
         hint = (
-            "find_packages() in setup.py leaves out a folder without __init__.py, which may be "
-            "empty: create it there."
+            "find_packages() in setup.py leaves out a folder without __init__.py. Create this "
+            "file there; it may be empty."
         )
-    seen = f"the entry point {code(entry)} leads nowhere: {target}"
+    seen = f"the entry point {code(entry)} does not work: {target}"
     return Cause(seen, hint, Evidence(places=(target,)))
 
 
@@ -73,7 +73,7 @@ def in_another_package(symptom: NoExecutable) -> Cause | None:
         if other.name != own.name and name in other.executables:
             return Cause(
                 f"it is in the package {code(other.name)}: `ros2 run {other.name} {name}`",
-                f"Move its entry of console_scripts, and the module behind it, to "
+                f"Move its entry in console_scripts and its module to the package "
                 f"{code(own.name)}.",
                 _at(other, "setup.py", "console_scripts"),
             )
@@ -101,9 +101,9 @@ def not_installed_by_cmake(symptom: NoExecutable) -> Cause | None:
     if package.build_type == "ament_python":
         return None
     match = nearest(name, package.executables)
-    there = f"installed is {code(match)}" if match else "it was not installed"
+    there = f"the build installed {code(match)}" if match else "it was not installed"
     if not match and package.executables:
-        there = f"installed are {codes(package.executables)}"
+        there = f"the build installed {codes(package.executables)}"
     return Cause(
         there,
         f"CMakeLists.txt needs `install(TARGETS {name} DESTINATION lib/${{PROJECT_NAME}})`, or "
@@ -132,8 +132,8 @@ def other_console_scripts(symptom: NoExecutable) -> Cause:
     if name in scripts:
         return Cause(
             f"setup.py defines {code(name)}, but the build did not install it",
-            "setup() must be given it in entry_points={'console_scripts': [...]}, and setup.cfg "
-            f"the folder: install_scripts=$base/lib/{symptom.package.name}.",
+            "Give it to setup() in entry_points={'console_scripts': [...]}, and write this line in "
+            f"setup.cfg: install_scripts=$base/lib/{symptom.package.name}.",
             symptom.setup_py,
         )
     match = nearest(name, scripts)

@@ -129,7 +129,7 @@ def no_history(symptom: NotLogged) -> Cause | None:
             f"{symptom.seen}: the messages were published before the subscription was there, and "
             f"it requests durability {durability} and reliability {reliability}. It matches the "
             "publisher, but gets only what is published from then on",
-            "A late joiner gets what a transient_local publisher has kept only if it asks for it: "
+            "A late subscription gets the kept messages only if it is transient_local too: "
             "give create_subscription a QoSProfile with "
             "durability=DurabilityPolicy.TRANSIENT_LOCAL and "
             "reliability=ReliabilityPolicy.RELIABLE.",
@@ -225,7 +225,7 @@ def only_some_logged(symptom: NotLogged) -> Cause | None:
     return Cause(
         f"{symptom.seen}, written {written} after launch",
         "Log in every call of the callback, or as often as is asked: an `if`, once=True, "
-        "skip_first=True and throttle_duration_sec=... leave some out.",
+        "skip_first=True and throttle_duration_sec=... leave lines out.",
         Evidence(
             moments=tuple(Moment(f"logged a message on {topic}", time_s) for time_s in times_s),
             log=tuple(line.text for echo in found for line in echo.lines)[:_LOG_LINES],
@@ -261,13 +261,13 @@ def other_values(symptom: NotLogged) -> Cause | None:
     values = listing(f"{code(path)} = {_rounded(item.values[path], decimals)}" for path in missing)
     lines = "\n".join(logged_text(one.text) for one in symptom.near)
     pair = exchanged(lines, item.values, decimals)
-    how = f", where {listing(map(code, pair))} are exchanged" if pair else ""
+    how = f", where {listing(map(code, pair))} are swapped" if pair else ""
     fields = listing(code(f"msg.{path}") for path in missing)
     return Cause(
         f"log lines follow messages on {code(symptom.topic)}, but none shows {values}: "
         f"{quote(line.text)}{how}",
         f"Log the fields of the message that the callback is given: {fields}. A callback must "
-        "return at once: after time.sleep() or a loop it is given old messages.",
+        "return at once: after time.sleep() or a loop it gets old messages.",
         symptom.evidence(line),
     )
 
@@ -280,9 +280,9 @@ def nothing_logged(symptom: NotLogged) -> Cause:
     return Cause(
         f"nothing is logged when messages come on {code(topic)}: the subscription is there, its "
         "type and its QoS match" + (f"; the process wrote {quote(lines[0].text)}" if lines else ""),
-        "Is the line reached, in the callback of this topic, that logs what the message says? What "
-        "debug() logs is not shown by default, an `except: pass` hides an error, and an `if` may "
-        "leave messages out.",
+        "Does the callback of this topic reach the line that logs the message? By default the "
+        "output of debug() is not shown, an `except: pass` hides an error, and an `if` may leave "
+        "messages out.",
         Evidence(
             moments=first_seen(recording, recording.carried(topic)),
             log=tuple(line.text for line in lines[:_LOG_LINES]),

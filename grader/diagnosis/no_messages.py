@@ -139,7 +139,7 @@ def why_not_delivered(recording: Recording, topic: str) -> Cause | None:
 
 
 def why_not_sent(recording: Recording, topic: str) -> Cause:
-    """Why a stimulus published nothing: no subscription of the student's could get it, or ours."""
+    """Why a stimulus published nothing; without another reason the run should be repeated."""
     return why_not_delivered(recording, topic) or Cause.to_repeat(
         f"nothing was sent on {code(topic)}"
     )
@@ -151,9 +151,9 @@ def why_unreadable(recording: Recording, topic: str) -> Cause | None:
     if not number:
         return None
     return Cause(
-        f"{counted(number, 'message')} on {code(topic)} cannot be read: what was published are "
-        "other bytes than a message of its type has",
-        "Give publish() a message object: bytes are published as they are.",
+        f"{counted(number, 'message')} on {code(topic)} cannot be read: the bytes that were "
+        "published are not a message of its type",
+        "Give publish() a message object, not bytes: it publishes bytes unchanged.",
         Evidence(
             moments=endpoints_seen(recording, recording.student_endpoints(Kind.PUBLISHER, topic))
         ),
@@ -179,9 +179,9 @@ def other_type(symptom: OnTopic) -> Cause | None:
     return Cause(
         f"{symptom.seen}: the {symptom.kind.value} on {code(symptom.topic)} has the type "
         f"{codes(found)}, {other}",
-        "A publisher and a subscription meet only if their types are the same: "
-        f"`from {package}.msg import {short}`. The definition of a type of your own must be the "
-        "one that was asked for: types, names, array bounds and order of its fields.",
+        "A publisher and a subscription communicate only if they use the same type: "
+        f"`from {package}.msg import {short}`. If you define the type yourself, its fields must be "
+        "as the task asks: types, names, array bounds and order.",
         Evidence(moments=endpoints_seen(symptom.recording, symptom.own)),
     )
 
@@ -208,7 +208,7 @@ def incompatible_qos(symptom: OnTopic) -> Cause | None:
         f"{symptom.seen}: the {symptom.kind.value}'s QoS does not match {other} on "
         f"{code(symptom.topic)} ({', '.join(reasons[0])})",
         "A subscription receives nothing from a publisher that offers less than it requests. A "
-        "number as QoS, such as 10, is reliable and volatile, and asks for nothing else.",
+        "number as QoS, such as 10, means reliable and volatile, and the default for the rest.",
         Evidence(
             moments=endpoints_seen(symptom.recording, symptom.own),
             tables=(compatibility.compatibility_table(*pairs[0]),),
@@ -241,8 +241,8 @@ def never_matched(symptom: NoMessages) -> Cause | None:
     ):
         return None
     return Cause.to_repeat(
-        f"the publisher on {code(symptom.topic)} was not matched by the probe in time, so a "
-        "message could be lost"
+        f"the subscription of rosgrade did not match the publisher on {code(symptom.topic)} in "
+        "time, so a message could be lost"
     )
 
 
@@ -277,6 +277,6 @@ def nothing_to_answer(symptom: NoMessages) -> Cause | None:
     causes = [why_not_delivered(symptom.recording, name) for name in symptom.asked]
     cause = causes[0] if causes and all(causes) else None
     return cause and cause.after(
-        f"{symptom.seen}, because what the node should answer, on {code(symptom.asked[0])}, "
-        "never reached it"
+        f"{symptom.seen}, because the messages that the node should answer, on "
+        f"{code(symptom.asked[0])}, never reached it"
     )

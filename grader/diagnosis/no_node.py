@@ -66,7 +66,7 @@ class OtherNode(Symptom[Cause]):
     @property
     def seen(self) -> str:
         """The symptom in words."""
-        return f"found the node {codes(self.names)}"
+        return f"found the node{'s' if len(self.names) > 1 else ''} {codes(self.names)}"
 
     @property
     def base(self) -> str:

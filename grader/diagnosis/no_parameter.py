@@ -99,7 +99,7 @@ def why_services_silent(recording: Recording, calls: Iterable[Call]) -> Cause | 
         return Cause(f"{service} could not be asked: {lost.error}", ours=True)
     return Cause(
         f"the node has no service {service}",
-        "Leave start_parameter_services as it is: the parameters of a node are read and set "
+        "Do not set start_parameter_services=False: the parameters of a node are read and set "
         "through its services.",
         Evidence(moments=(Moment("asked", recording.since_launch_s(lost.requested_ns)),)),
     )
@@ -117,8 +117,8 @@ def why_not_asked(recording: Recording, node: str, what: str) -> Cause:
         server, asked_ns, end_ns = last.service, last.requested_ns, last.answered_ns
         seen = f"the node's parameter service {code(server.rpartition('/')[2])} did not answer"
         hint = (
-            "A callback must return soon: no time.sleep() and no waiting in it. The node answers "
-            "only while its executor spins."
+            "A callback must return soon: do not sleep or wait in it. The node answers only while "
+            "its executor spins."
         )
         shown = Evidence(moments=(Moment("asked", recording.since_launch_s(asked_ns)),))
         ended = why_late(recording, SERVICE, server, asked_ns, end_ns, _ANSWER_S, seen, hint, shown)

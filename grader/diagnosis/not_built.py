@@ -17,10 +17,10 @@ from grader.submission.intake.paths import is_within
 from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
 
 _LOG_LINES = 15
-# Of a culprit's message, which may join several lines of the log.
+# Of the first error's message, which may join several lines of the log.
 _COMPARED = 60
 _ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
-# What colcon says of its own doings around the tool's output.
+# Lines of colcon itself around the tool's output.
 _CHATTER = re.compile(r"Starting +>>>|(Finished|Failed|Aborted) +<<<|Summary:|\s+\d+ packages? ")
 # What setuptools says of data_files, as `ros2 pkg create` writes them.
 _NO_MARKER = re.compile(r"can't copy 'resource/[\w-]+': doesn't exist")
@@ -62,7 +62,7 @@ def no_workspace(symptom: NoPackage) -> Cause | None:
         return None
     return Cause(
         problem or "no package.xml was found",
-        "Hand in the packages that are asked for, each of them once; colcon leaves out a "
+        "Hand in the packages that the task asks for, each of them once. colcon leaves out a "
         "folder with a file COLCON_IGNORE in it."
         if symptom.names
         else "Hand in the workspace, its src folder or the package itself: a ROS package is a "
@@ -141,9 +141,9 @@ def why_too_new(package: PackageRecord) -> Cause | None:
     if not package.newer_syntax:
         return None
     return Cause(
-        f"the Python here cannot read {package.newer_syntax[0]}",
-        "It is right in ROS 2 Jazzy, which has Python 3.12, and no point is lost by it. Tell "
-        "your instructor: it needs Python 3.12. Or do without this syntax.",
+        f"the Python of this machine cannot read {package.newer_syntax[0]}",
+        "It is right in ROS 2 Jazzy, which has Python 3.12, so you lose no points. Tell your "
+        "instructor that it needs Python 3.12, or do without this syntax.",
         ours=True,
     )
 
@@ -166,7 +166,7 @@ def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
     build = submission.build
     if build is None:
         return Cause("nothing was built, so this cannot be judged", ours=True)
-    # A package that is not among those that failed was built, whatever became of the others.
+    # A package that is not among the failed ones was built, even if others failed.
     if build.succeeded or (build.failed_packages and name not in build.failed_packages):
         return None
     return cause_of(NotBuilt(submission, name, build))
@@ -238,9 +238,9 @@ def why_lacking(submission: SubmissionRecord, name: str) -> Cause | None:
 
 def _not_here(lacking: list[str]) -> Cause:
     return Cause(
-        f"it needs {codes(lacking)} to build, which ROS 2 Jazzy has, but which is not installed "
-        "where this is graded",
-        "No point is lost by it. Tell your instructor: a full ROS 2 Jazzy builds it.",
+        f"it needs {codes(lacking)} to build: ROS 2 Jazzy has it, but it is not installed on the "
+        "machine that grades",
+        "You lose no points for it. Tell your instructor that a full ROS 2 Jazzy builds it.",
         ours=True,
     )
 
@@ -270,8 +270,8 @@ def _failed(build: BuildRecord, name: str) -> Cause:
     why = str(build.culprit) if build.culprit else ended[1] if ended else ""
     return Cause(
         f"`colcon build` failed: {why}" if why else "`colcon build` failed",
-        f"Create resource/{name}, an empty file by which ROS finds the package, and write the same "
-        "name in package.xml, setup.py, setup.cfg and for the folder of the Python module."
+        f"Create the empty file resource/{name}: ROS finds the package by it. Use the same name in "
+        "package.xml, setup.py, setup.cfg and for the folder of the Python module."
         if _NO_MARKER.search(why)
         else f"Run `colcon build --packages-select {name}` in the workspace and correct the first "
         "error that it prints.",
@@ -309,7 +309,7 @@ def _clean(build: BuildRecord) -> str:
 
 
 def _relevant(build: BuildRecord, name: str) -> tuple[str, ...]:
-    """What the build of the package wrote, up to what the culprit is blamed for, or its end."""
+    """The log of the package's build, up to its first error or to its end."""
     kept = [line for line in _written(build, name) if line.strip() and not _CHATTER.match(line)]
     if build.culprit is not None:
         message = build.culprit.message[:_COMPARED]

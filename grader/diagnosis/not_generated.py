@@ -236,7 +236,7 @@ def not_listed(symptom: NotGenerated) -> Cause | None:
     return symptom.cause(
         calls[0].line,
         f"does not list {code(file)}{there} in {_GENERATE}()",
-        f'Write "{file}" in {_GENERATE}(): the path from CMakeLists.txt.',
+        f'Write "{file}" in {_GENERATE}(): the path relative to CMakeLists.txt.',
     )
 
 
@@ -251,7 +251,7 @@ def undeclared_package(symptom: NotGenerated) -> Cause | None:
         if not symptom.finds(name):
             return symptom.cause(
                 calls[0].line,
-                f"does not find {code(name)}",
+                f"has no find_package() for {code(name)}",
                 f"Write `find_package({name} REQUIRED)` before {_GENERATE}().",
             )
         if name in used and name not in declared and not any("${" in one for one in declared):

@@ -104,9 +104,9 @@ def no_answer(symptom: NoMessages) -> Cause | None:
     )
     return why_raised(recording, seen, sent[0].stamp_ns) or Cause(
         seen,
-        "Is publish(msg) reached in the subscription's callback? An `except: pass` hides the error "
-        "that would tell why not, and a lock or a loop that never ends keeps it waiting. A "
-        "callback that begins with `async def` must await what it calls.",
+        "Is publish(msg) reached in the subscription's callback? An `except: pass` hides errors. A "
+        "lock or a loop that never ends stops the callback before publish(msg). A callback that "
+        "begins with `async def` must await the coroutines that it calls.",
         Evidence(
             moments=(Moment(f"sent on {name}", recording.since_launch_s(sent[0].stamp_ns)),),
             places=_interrupted(recording),
@@ -122,10 +122,10 @@ def no_timer(symptom: NoMessages) -> Cause | None:
     if not traced or timer or _heard(recording, symptom.topic):
         return None
     return Cause(
-        f"{_idle(symptom)}, and the process declared no timer that would call it",
+        f"{_idle(symptom)}, and the process declared no timer that would call publish()",
         "Is publish(msg) reached? Look for a condition before it, and for a loop that waits "
-        "for what never comes, such as subscriptions. A callback publishes only if something "
-        "calls it: self.create_timer(period_in_seconds, self.callback) does.",
+        "for something that never comes, such as a subscription. A callback is called only by a "
+        "timer or a subscription: self.create_timer(period_in_seconds, self.callback).",
         _idle_evidence(symptom),
     )
 
@@ -206,7 +206,7 @@ def _firing(recording: Recording) -> list[declarations.DeclaredTimer]:
 
 
 def _heard(recording: Recording, topic: str) -> str:
-    """What the node was sent, in words, but for what it answers elsewhere; empty without any."""
+    """The messages to the node in words, without those that it answers elsewhere; or empty."""
     topics = {item.topic for item in recording.student_endpoints(Kind.SUBSCRIPTION)}
     return listing(
         f"{counted(len(recording.carried(name)), 'message')} on {code(name)}"

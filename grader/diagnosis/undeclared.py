@@ -19,12 +19,12 @@ def why_undeclared(recording: Recording, what: str) -> Cause:
     compiled = any(item.build_type == "ament_cmake" for item in recording.submission.packages)
     launched = any("launch" in item.name.rpartition("/")[2] for item in recording.processes)
     if not declarations.traced(recording) and (compiled or launched):
-        return Cause(f"{seen}: only programs in Python declare what they create", ours=True)
+        return Cause(f"{seen}: rosgrade sees this in Python programs only", ours=True)
     return Cause(
-        f"{seen}: it was created past rclpy, in a program that was started without the "
+        f"{seen}: it was created without rclpy, or in a program that was started without the "
         "environment of the first, or after the file descriptors of rosgrade were closed",
-        "Create it by the method of rclpy's Node, in the program that `ros2 run` starts, and "
-        "leave its environment and the file descriptors that you did not open as they are.",
+        "Create it with the method of rclpy's Node, in the program that `ros2 run` starts. Keep "
+        "its environment, and close only the file descriptors that you opened.",
         Evidence(moments=(Moment("launched", 0.0),)),
     )
 
@@ -38,12 +38,12 @@ def why_never_appeared(recording: Recording, what: str) -> Cause:
         seen, names = f"the process joined ROS domain {others} and not its own", ["ROS_DOMAIN_ID"]
     if not names and was_held_up(recording):
         return Cause.to_repeat(f"{seen}, while the machine was busy")
-    changed = f": the program changed {', '.join(names)}, by which a node finds others"
+    changed = f": the program changed {', '.join(names)}, which nodes use to find each other"
     return Cause(
         seen + (changed if names else ""),
-        "A node must stay where the environment puts it: set no ROS_DOMAIN_ID, no domain_id, no "
-        "discovery server and no profile of the middleware, in the code too, and leave the names "
-        "of rclpy's methods alone.",
+        "A node must stay in the ROS domain that it is given. In the environment and in the code, "
+        "do not set ROS_DOMAIN_ID, domain_id, a discovery server or a profile of the middleware. "
+        "Do not replace rclpy's methods.",
         Evidence(moments=(Moment("launched", 0.0),)),
         # What was created right before the end may not have been seen yet.
         disturbed=not names,

@@ -74,8 +74,8 @@ def cancel_refused(symptom: NotCanceled) -> Cause | None:
         return None
     return Cause(
         f"the server refused to cancel {the_goal(symptom.goal)}",
-        "The ActionServer's cancel_callback decides: it returns CancelResponse.ACCEPT. Without "
-        "one rclpy refuses.",
+        "Give the ActionServer a cancel_callback that returns CancelResponse.ACCEPT. Without one "
+        "rclpy refuses.",
         symptom.evidence,
     )
 
@@ -94,8 +94,8 @@ def executor_busy_with_the_goal(symptom: NotCanceled) -> Cause | None:
     if not symptom.is_untaken:
         return None
     goal, recording = symptom.goal, symptom.recording
-    seen = f"{symptom.seen}: the server did not take in the request to cancel"
-    text = f"{seen}; its executor cannot while the execute callback runs"
+    seen = f"{symptom.seen}: the server did not handle the request to cancel"
+    text = f"{seen}: its executor is busy while the execute callback runs"
     busy = Cause(text, _TWO_THREADS, symptom.evidence)
     alone = why_one_cpu(recording, seen)
     if alone is not None or goal.result_ns is not None:
@@ -126,12 +126,12 @@ def ended_alone(recording: Recording, goal: Goal, evidence: Evidence) -> Cause:
     """A goal came to an end before the probe could end it."""
     lasted_s = ((goal.result_ns or 0) - (goal.answered_ns or goal.sent_ns)) / NS
     seen = (
-        f"{the_goal(goal)} {goal.status} {format_duration(lasted_s)} after it was accepted, before "
-        "it was to be ended"
+        f"{the_goal(goal)} {goal.status} {format_duration(lasted_s)} after it was accepted: too "
+        "early for this check"
     )
     return why_raised(recording, seen, goal.sent_ns) or Cause(
         seen,
         "The execute callback returns too early: it must work on the goal step by step, with a "
-        "pause between.",
+        "pause after each step.",
         evidence,
     )

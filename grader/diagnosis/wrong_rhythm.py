@@ -106,8 +106,8 @@ def some_left_out(symptom: WrongRhythm) -> Cause | None:
         return None
     return Cause(
         "messages are left out",
-        "Publish in every call of the callback, without a condition, and let no callback work or "
-        "sleep for longer than the period: the timer cannot call meanwhile.",
+        "Publish in every call of the callback, without a condition. No callback may work or "
+        "sleep for longer than the period: the timer has to wait for it.",
     )
 
 
@@ -118,8 +118,8 @@ def irregular(symptom: WrongRhythm) -> Cause | None:
         return None
     if symptom.timers_s:
         hint = (
-            "Publish in the timer's callback only, in every call, and let no callback work or "
-            "sleep for long: the timer cannot call meanwhile."
+            "Publish in the timer's callback only, in every call. No callback may work or sleep "
+            "for long: the timer has to wait for it."
         )
     else:
         hint = (
@@ -155,7 +155,7 @@ def timer_of_zero(symptom: WrongRhythm) -> Cause | None:
     return Cause(
         "messages come too often: the process declared a timer of 0 s, which fires again and "
         "again without a pause",
-        "Less than a second becomes 0 in whole numbers, as in 300 // 1000 or int(0.3). "
+        "A period below 1 s becomes 0 as an integer, as in 300 // 1000 or int(0.3). "
         f"{symptom.seconds_hint}",
     )
 
@@ -172,8 +172,8 @@ def right_timer_too_late(symptom: WrongRhythm) -> Cause | None:
         return Cause(
             f"{longer}: the process declared {len(right)} timers of {wanted}, as if the callback "
             "created a new one each time",
-            "Create one timer in the constructor: it goes on by itself, and keeps its period "
-            "whatever the callback needs.",
+            "Create one timer in the constructor: it calls again by itself, and keeps its period "
+            "however long the callback takes.",
         )
     waited = long_wait(symptom.recording, {node.name for node in symptom.recording.student_nodes})
     if symptom.verdict.regular and waited is not None and waited[1] < _AT_ONCE * wanted_s:
@@ -181,13 +181,13 @@ def right_timer_too_late(symptom: WrongRhythm) -> Cause | None:
             f"{longer}, although the executor is not blocked and the process declared a timer of "
             f"{wanted}",
             "Publish in every call of the timer's callback, and leave out timer.reset(), which "
-            "lets the period begin again.",
+            "restarts the period.",
         )
     return Cause(
         f"{longer}: the process declared a timer of {wanted}, but the executor does not call it "
         "in time",
-        "Keep callbacks short: no sleep, no loop that waits, no long computation in them, nor in "
-        "a loop around spin_once().",
+        "Keep callbacks short: no sleep, no loop that waits, no long computation. Keep a loop "
+        "around spin_once() short too.",
     )
 
 
@@ -204,8 +204,8 @@ def sleeping_loop(symptom: WrongRhythm) -> Cause | None:
     return Cause(
         f"{beginning}it looks like {format_duration(wanted_s)} of sleeping plus "
         f"{format_duration(median_s - wanted_s)} of work",
-        f"Use a timer: self.create_timer({wanted_s:g}, self.callback) keeps its period whatever "
-        "the callback needs.",
+        f"Use a timer: self.create_timer({wanted_s:g}, self.callback) keeps its period however "
+        "long the callback takes.",
     )
 
 

@@ -73,7 +73,7 @@ def not_a_number(symptom: WrongValue) -> str | None:
     if bad is None or not math.isfinite(bad.expected):
         return None
     what = "not a number" if math.isnan(bad.observed) else "infinite"
-    return f"{bad.field} is {what}: look for a division by zero, and a range that sees nothing"
+    return f"{bad.field} is {what}: look for a division by zero, and for a range of inf or nan"
 
 
 @explanation(WrongValue)

@@ -1,1 +1,1 @@
-"""What a check or an explanation says: findings with their evidence, and the words for values."""
+"""Results of checks and explanations: findings with their evidence, and words for values."""

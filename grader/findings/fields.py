@@ -34,7 +34,7 @@ FieldTolerance = Annotated[
 def unlike(
     value: Mapping[str, Any], wanted: Mapping[str, Any], tolerance: Tolerance
 ) -> tuple[Difference, ...]:
-    """The wanted fields that a value has not.
+    """The wanted fields that a value does not have.
 
     Raises:
         NoSuchField: It cannot have such a field.
@@ -100,8 +100,8 @@ def fields_hint(what: str, value: Mapping[str, Any], wrong: Sequence[str]) -> st
     """What to try where fields are wrong."""
     if all(_is_default(item) for _, item in _plain(value)):
         return (
-            f"Set the fields of the {what} in the callback, and return it: it came as a new one "
-            "is, with 0, false and '' everywhere."
+            f"Set the fields of the {what} in the callback, and return it. Now every field has "
+            "the value of a new one: 0, false or ''."
         )
     return f"Look where the callback sets {codes(wrong)} of the {what} that it returns."
 

@@ -1,4 +1,4 @@
-"""What a check says."""
+"""The finding: the result of a check, with its evidence."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ class Status(str, Enum):
 
     PASSED = "passed"
     FAILED = "failed"
-    """The student's: points are lost."""
+    """The fault is the student's: points are lost."""
     SKIPPED = "skipped"
     """A check that this one requires did not pass."""
     ERROR = "error"
-    """Ours or the machine's: the submission is not graded."""
+    """The fault is rosgrade's or the machine's: the submission is not graded."""
 
 
 @dataclass(frozen=True)
@@ -207,5 +207,5 @@ class Finding:
 
     @classmethod
     def to_repeat(cls, expected: str, observed: str) -> Finding:
-        """Not judged, by the machine's doing or ours: the run is worth repeating."""
+        """Not judged because of rosgrade or the machine: the run should be repeated."""
         return cls.error(expected, observed, disturbed=True)

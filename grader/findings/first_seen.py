@@ -1,6 +1,6 @@
-"""When nodes and endpoints of the student's were first seen, and until when was looked for more.
+"""Moments for evidence: when the student's nodes and endpoints were first seen, and the end.
 
-What is missing happened at no time; these moments say what there was instead.
+Something that is missing has no time; these moments show what there was instead.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ class NoSuchItem(NoSuchField):
 
 @dataclass(frozen=True)
 class Difference:
-    """A field, such as ``linear.x`` or ``data[2]``, that has not the expected value."""
+    """A field, such as ``linear.x`` or ``data[2]``, that does not have the expected value."""
 
     field: str
     expected: Any
@@ -215,7 +215,7 @@ def differences(
     rest_zero: bool,
     tolerance: Tolerance,
 ) -> tuple[Difference, ...]:
-    """Fields of a message that have not the expected value.
+    """Fields of a message that do not have the expected value.
 
     Args:
         rest_zero: Whether every field that is not expected to be something must be zero,

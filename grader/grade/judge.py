@@ -50,7 +50,7 @@ def grade(
     """Judge a submission, with its names in the places of the assignment's variables.
 
     A check whose requirement did not pass is skipped, unless that failed by a wrong name which the
-    runs put right. A check that raises is an error of ours and keeps its traceback.
+    runs put right. A check that raises an exception ends as an error and keeps the traceback.
 
     Args:
         recordings: By scenario id; empty where nothing could be launched.
@@ -102,7 +102,7 @@ def _counted(counts: Counts, findings: Sequence[Finding]) -> tuple[Status, float
 
 
 def _is_put_right(item: ScenarioFinding, recordings: Mapping[str, Recording]) -> bool:
-    """Whether nothing has to wait for a finding: it passed, or the runs put the name right."""
+    """Whether no check has to wait for a finding: it passed, or the runs put the name right."""
     rule = item.finding.remap
     runs = [run for name, run in recordings.items() if item.scenario in (None, name)]
     return item.finding.status is Status.PASSED or (
@@ -144,7 +144,7 @@ def _findings(
         return
     scenarios = [scenario.id for scenario in loaded.scenarios_of(bound)]
     if not scenarios:
-        # Without this a check of nothing would pass, and give its points to everybody.
+        # Else a check that judges nothing would pass, and every student would get its points.
         yield ScenarioFinding(None, _fault("there is no scenario that this check could judge"))
     for scenario in scenarios:
         recording = recordings.get(scenario)
@@ -213,8 +213,8 @@ def _recording_fault(
     if recording.ending is Ending.FAULT:
         return "the run was ended by a fault that left no message"
     if (recording.scenario, recording.submission.sha256) != (scenario, submission.sha256):
-        told = f"{recording.scenario!r} of {recording.submission.id!r}"
-        return f"the recording is of another run, {told}"
+        other = f"{recording.scenario!r} of {recording.submission.id!r}"
+        return f"the recording is of another run, {other}"
     return None
 
 
@@ -235,10 +235,10 @@ def _judge(
             doubtful = is_doubtful(subject, bound.parameters.doubt)
             finding = replace(finding, disturbed=doubtful or finding.disturbed)
     except Exception as error:
-        # Whatever a check raises is a bug in it, and must not cost the student anything.
-        told = "".join(traceback.format_exception(error))
-        said = f"{type(error).__name__}: {error}".rstrip(": ")
-        return ScenarioFinding(scenario, _fault(f"the check itself failed: {said}"), told)
+        # Any exception of a check is a bug in it, and must not cost the student points.
+        trace = "".join(traceback.format_exception(error))
+        message = f"{type(error).__name__}: {error}".rstrip(": ")
+        return ScenarioFinding(scenario, _fault(f"the check itself failed: {message}"), trace)
     if misuse:
         return ScenarioFinding(scenario, _fault(f"the check {bound.check.name!r} {misuse}"))
     return ScenarioFinding(scenario, finding)

@@ -1,4 +1,4 @@
-"""The model of a grade: what every check said of one submission, with its points."""
+"""The model of a grade: the results of all checks of one submission, with points."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SEVERITY = (Status.ERROR, Status.FAILED, Status.SKIPPED, Status.PASSED)
 
 @dataclass(frozen=True)
 class ScenarioFinding:
-    """A finding and what it was found in.
+    """A finding and the scenario that it is about.
 
     Attributes:
         scenario: Its id; None for the submission itself, and for a check that was skipped.
@@ -34,7 +34,7 @@ class ScenarioFinding:
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What one check said in all its scenarios.
+    """The result of one check in all its scenarios.
 
     Attributes:
         points: Earned, in [0, max_points].
@@ -120,7 +120,7 @@ class Grade:
         raise KeyError(check)
 
     def first_to_fix(self) -> CheckResult | None:
-        """The failed check on which most others depend, or None where none must be mended."""
+        """The failed check on which most others depend, or None where none needs a correction."""
         reasons = {result.id: result.reason for result in self.of(Status.FAILED)}
         first = first_to_fix(
             reasons,
@@ -173,8 +173,8 @@ class Grade:
 def reason(check: str, scenario: str | None, observed: str, evidence: Any) -> Hashable:
     """Why a check failed: equal for those that name the same mistake.
 
-    That is the same line of the student's code, in whichever run, or the same said of the same
-    moment of a run. What names neither, or only a file, is a mistake of its own.
+    That is the same line of the student's code, in any run, or the same text about the same
+    moment of a run. A finding that names neither, or only a file, is a mistake of its own.
 
     Args:
         evidence: Of a finding, or of a result that was read from a file.
@@ -194,8 +194,8 @@ def first_to_fix(
     """Find the failed check on which most others depend; of equals, the author's first.
 
     A node that crashed does not stay alive, and has no publisher either: of checks that failed
-    for the same reason the first stands for all, with whatever waits for any of them. What is
-    shown without points, and keeps nothing else waiting, is nothing that must be mended.
+    for the same reason the first stands for all, with the checks that wait for any of them. A
+    check without points that no other check waits for need not be corrected.
 
     Args:
         reasons: Why each check failed, in the author's order; for the same reason, equal.
@@ -203,7 +203,7 @@ def first_to_fix(
         without_points: Checks that are worth none.
 
     Returns:
-        The check, or None where none failed that must be mended.
+        The check, or None where none failed that needs a correction.
     """
 
     def others(check: str) -> int:

@@ -1,4 +1,4 @@
-"""Imports that only a run shows: of modules whose names the code puts together."""
+"""Imports that only a run shows, because the code computes the names of the modules."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from grader.submission.record import Import, PackageRecord, SubmissionRecord
 def with_runtime_imports(
     submission: SubmissionRecord, recordings: Iterable[Recording]
 ) -> SubmissionRecord:
-    """The same submission, with what its code imported in the runs beside what it names.
+    """The submission with the imports that the runs showed added to those that its code names.
 
-    What a library imports in its turn is not the student's to declare, and is left out.
+    Imports by a library are left out: the student need not declare them.
     """
     found = {
         Import(str(item.data["module"]), path, item.data["line"])

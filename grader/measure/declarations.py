@@ -15,7 +15,7 @@ from typing import Any
 from grader.measure.compatibility import STRENGTH
 from grader.recording.model import Declaration, Kind, Process, Qos, Recording
 
-# What is announced is announced again and again.
+# Announcements are repeated: only a machine that is busy for longer makes all of them get lost.
 _LOST_S = 0.5
 
 

@@ -1,4 +1,4 @@
-"""What happened to a run: what the scenario did to processes, limits, waits, disturbance."""
+"""Events of a run: actions of the scenario on processes, limits, waits, disturbance."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _ENDING = (
 
 @dataclass(frozen=True)
 class Breach:
-    """A limit of the sandbox that the student's processes reached, or what they must never do.
+    """A limit of the sandbox that the student's processes reached, or a forbidden action.
 
     Attributes:
         time_ns: When it was first seen.
@@ -52,13 +52,13 @@ class Breach:
 
     @property
     def violation(self) -> str:
-        """What the processes did, to follow who they are."""
+        """The forbidden action, as the end of a sentence about the processes."""
         if not self.allowed:
             return f"{self.taken}, which is never allowed"
         return f"took {self.taken}, {self.allowed} are allowed"
 
     def __str__(self) -> str:
-        """Say it in words."""
+        """Write it in words."""
         return f"its processes {self.violation}"
 
 
@@ -89,7 +89,7 @@ class Disturbance:
         waited_ns: How long the worst thread of the student waited for a CPU while it was ready
             to run (the kernel's run delay, /proc/PID/schedstat).
 
-    Of both only what others than the student's own processes can have taken.
+    Both without the time that the student's own processes took from each other.
     """
 
     time_ns: int

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 NO_SERVER = "no server"
-"""Error of a request to a server that was not there."""
+"""Error of a request to a missing server."""
 
 EXECUTOR_SERVICES = {
     "list_parameters": "rcl_interfaces/srv/ListParameters",

@@ -54,7 +54,7 @@ def read_recording(file: Path) -> Recording:
 
 
 def _reason(error: Exception) -> str:
-    # The readers of MCAP, its compressions and CDR raise whatever damage makes them raise.
+    # On a damaged file the readers of MCAP, its compressions and CDR raise errors of any kind.
     return str(error).partition("\n")[0] or type(error).__name__
 
 
@@ -136,10 +136,10 @@ def _message(schema: Schema, channel: Channel, record: Record) -> Message:
     try:
         value = _fields(decode(record.data))
     except NotImplementedError as error:
-        # A type that the library cannot read is no fault of who published it.
+        # A type that the library cannot read is not the fault of the publisher.
         raise ValueError(f"{channel.topic}: {error}") from error
     except Exception as error:
-        # What decodes CDR raises whatever comes of such bytes.
+        # On such bytes the CDR decoder raises errors of any kind.
         raise _Unreadable from error
     return Message(
         topic=channel.metadata.get(TOPIC, channel.topic),
@@ -153,7 +153,7 @@ def _message(schema: Schema, channel: Channel, record: Record) -> Message:
 
 @lru_cache(maxsize=64)
 def _decoder(name: str, encoding: str, definition: bytes) -> Callable[[bytes], Any]:
-    """What decodes the messages of a type; each recording of a class has the same ones."""
+    """The decoder of a type's messages; each recording of a class has the same types."""
     schema = Schema(id=0, name=name, encoding=encoding, data=definition)
     decode = DecoderFactory().decoder_for("cdr", schema)
     if decode is None:

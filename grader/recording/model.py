@@ -385,10 +385,10 @@ class Recording:
     def misdefined(self, topic: str) -> bool:
         """Whether the student publishes another definition of the type that the probe reads."""
         ends = [item for item in self.endpoints if item.topic == topic and item.type_hash]
-        ours = {(e.type, e.type_hash) for e in ends if e.owner is Owner.PROBE}
+        read = {(e.type, e.type_hash) for e in ends if e.owner is Owner.PROBE}
         theirs = (e for e in ends if e.owner is Owner.STUDENT and e.kind is Kind.PUBLISHER)
-        types = {name for name, _ in ours}
-        return any(e.type in types and (e.type, e.type_hash) not in ours for e in theirs)
+        types = {name for name, _ in read}
+        return any(e.type in types and (e.type, e.type_hash) not in read for e in theirs)
 
     def declared(self, kind: str) -> tuple[Declaration, ...]:
         """Declarations of a kind."""

@@ -47,8 +47,8 @@ def write_whole(file: Path, content: str | bytes) -> None:
         finally:
             draft.unlink(missing_ok=True)
     except OSError as error:
-        told = UsageError(f"{file} cannot be written: {_why(file, error)}")
-        raise machine_fault(error, file) or told from error
+        refusal = UsageError(f"{file} cannot be written: {_why(file, error)}")
+        raise machine_fault(error, file) or refusal from error
 
 
 def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:
@@ -71,14 +71,14 @@ def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None])
                     "overwritten"
                 )
         if any(_is_same(output, other) for other in written):
-            raise UsageError(f"{output}: is named for two outputs")
+            raise UsageError(f"{output}: is given for two outputs")
         written.append(output)
 
 
 def refuse_part(output: Path, folder: Path, what: str) -> None:
     """See that nothing is written into a folder that is read as a whole."""
     if Path(os.path.realpath(output)).is_relative_to(os.path.realpath(folder)):
-        raise UsageError(f"{output}: would be a part of {what}; name another folder")
+        raise UsageError(f"{output}: lies in {what}; use another folder")
 
 
 def _is_same(one: Path, other: Path) -> bool:
@@ -94,7 +94,7 @@ def _is_of(file: Path, folder: Path) -> bool:
     if not (file.is_file() and folder.is_dir()):
         return False
     inside = os.path.relpath(os.path.realpath(file), os.path.realpath(folder)).split("/")
-    # Reports are no part of what is graded, whatever stands in their place.
+    # Reports are no part of what is graded, even if other files are in their place.
     if inside[0] == ".." or "rosgrade-report" in inside:
         return False
     return _SOURCES.fullmatch(inside[-1]) is not None
@@ -105,18 +105,18 @@ def check_folder(folder: Path) -> None:
     other = _in_the_way(folder)
     if other is not None:
         named = "" if other == folder else f"{other} "
-        raise UsageError(f"{folder}: {named}is not a folder; name another place")
+        raise UsageError(f"{folder}: {named}is not a folder; use another place")
 
 
 def _in_the_way(folder: Path) -> Path | None:
-    """What is where a folder is needed."""
+    """The file that is in the place of a needed folder."""
     there = next((one for one in (folder, *folder.parents) if os.path.lexists(one)), None)
     return None if there is None or there.is_dir() else there
 
 
 def _why(file: Path, error: OSError) -> str:
     if error.errno == errno.EISDIR:
-        return "it is a folder; name a file"
+        return "it is a folder; give a file"
     other = _in_the_way(file.parent) if error.errno in (errno.ENOTDIR, errno.EEXIST) else None
     return f"{other} is not a folder" if other else error.strerror or str(error)
 
@@ -144,5 +144,5 @@ def write_folders(place: Path, files: Mapping[str, str]) -> None:
         finally:
             shutil.rmtree(draft, ignore_errors=True)
     except OSError as error:
-        told = UsageError(f"{error.filename2 or error.filename}: {error.strerror}")
-        raise machine_fault(error) or told from error
+        refusal = UsageError(f"{error.filename2 or error.filename}: {error.strerror}")
+        raise machine_fault(error) or refusal from error

@@ -22,16 +22,16 @@ _CELLS_PER_CPU = 24
 _STARTS_PER_CPU = 3.0
 """More than one, because a start also waits: for processes, and for DDS to discover them."""
 _BUSY_PER_CPU = 6.0
-"""Runnable threads of the machine for each CPU from which on no cell is let in."""
+"""Runnable threads for each CPU of the machine from which on no cell is let in."""
 _FREE_MEMORY = 0.125
 """Share of the memory that stays free; a cell of the course takes some 40 MB."""
 _LONGEST_START_S = 2.0
-"""What has not matched by then waits for something, and costs no CPU any more."""
+"""A node without a match by then waits for something, and takes no CPU any more."""
 _LOOK_AGAIN_S = 0.05
 
 
 class Admission:
-    """Admits cells; shared by everything that runs in one process of ours."""
+    """Admits cells; shared by all runs of this process."""
 
     def __init__(
         self, cells: int | None = None, starts: int | None = None, load: Load | None = None
@@ -39,7 +39,7 @@ class Admission:
         """Set the bounds.
 
         Args:
-            cells: Most cells at once, whatever the load; by default the load decides.
+            cells: Most cells at once; by default the load decides.
             starts: Most cells that start at once; by default three for each CPU.
         """
         cpus = cpu_count()
@@ -56,12 +56,12 @@ class Admission:
 
     @contextmanager
     def cell(self, *, alone: bool = False) -> Iterator[Ticket]:
-        """Wait for a place, first come, first served; one that must be ``alone`` goes first."""
+        """Wait for a place, first come, first served; a cell that must be ``alone`` goes first."""
         ticket = Ticket(self)
         with self.changed:
             (self._queue.appendleft if alone else self._queue.append)(ticket)
             try:
-                # Only the first one looks again: the others would be the load that they see.
+                # Only the first one looks at the load, to which all the others would add.
                 while self._queue[0] is not ticket or not self._is_free(alone):
                     is_first = self._queue[0] is ticket
                     self.changed.wait(_LOOK_AGAIN_S if is_first else None)

@@ -1,4 +1,4 @@
-"""What a cell is to do: one scenario, without points, checks or anything else."""
+"""The order for a cell: one scenario to run, without points and checks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from grader.run.process.process_sandbox import ProcessSandbox
 ORDER_FILE = "order.pickle"
 RECORDING_FILE = "recording.mcap"
 GO = b"go\n"
-"""What a cell that is ready waits for on its standard input."""
+"""The line on standard input that a ready cell waits for."""
 
 
 @dataclass(frozen=True)

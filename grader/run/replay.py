@@ -1,4 +1,4 @@
-"""A node on a domain of its own, given again what it was given in a recording.
+"""The replay of a recording: a node on a domain of its own gets the recorded messages again.
 
 For students at home: the node runs as they would run it, without a sandbox, and nothing is
 judged. It is a run like any other, whose only stimuli are the messages of the recording.
@@ -126,7 +126,7 @@ def replay(
     install: Path,
     type_support: Sequence[Path] = (),
 ) -> int:
-    """Replay, with everything that happens on standard output.
+    """Replay a recording, and print everything that happens.
 
     Returns:
         0 when it was played to its end, 1 when the node ended or never listened, 130 when it
@@ -176,7 +176,7 @@ class _Screen:
 
 
 def _tell(recording: Recording) -> int:
-    """Print the messages and how it ended; the exit code."""
+    """Print the messages and how it ended; return the exit code."""
     for topic in sorted({one.topic for one in recording.student_endpoints(Kind.PUBLISHER)}):
         messages = recording.on(topic)
         seconds: Counter[int] = Counter()
@@ -191,7 +191,7 @@ def _tell(recording: Recording) -> int:
         _say("rosgrade", f"the node has ended by itself (exit code {codes})")
     missed = [wait.what for wait in recording.waits if wait.met_ns is None]
     for what in missed:
-        _say("rosgrade", f"waited in vain for {what}")
+        _say("rosgrade", f"did not come in time: {what}")
     return 0 if recording.ending is Ending.UNTIL and not missed else 1
 
 

@@ -41,7 +41,7 @@ Progress = Callable[[str, Mapping[str, Any]], None]
 
 
 def scenario_seed(assignment: str, scenario: str, submission_sha256: str, base: int | None) -> int:
-    """Seed of a scenario, in [0, 2**63): of the submission's own, so that no number is known.
+    """Seed of a scenario, in [0, 2**63), from the submission's hash, so that none can be guessed.
 
     Args:
         base: A seed that the caller gave; replaces the submission.
@@ -193,7 +193,6 @@ def _stimuli(
     seed: int,
     drawn: Mapping[str, float],
 ) -> tuple[dict[str, Any], ...]:
-    """Make the orders."""
     from grader.assignment.stimuli.message import StimulusError
     from grader.assignment.stimuli.stimulus_model import Making
 
@@ -258,7 +257,7 @@ class Runner:
         alone: bool = False,
         remaps: Sequence[str] = (),
     ) -> None:
-        """Run one scenario and leave its recording.
+        """Run one scenario and write its recording.
 
         Args:
             install: The submission's install space (merged layout).
@@ -321,7 +320,7 @@ class Runner:
             server.close()
 
     def successor(self) -> Runner:
-        """End every cell, and hand what is warm on to a runner that begins anew.
+        """End every cell, and return a new runner that takes over the warm processes.
 
         This one can run nothing any more.
         """
@@ -382,7 +381,7 @@ class Runner:
             for launch in scenario.launch
         )
         imported = {item.module for package in submission.packages for item in package.ros_imports}
-        # A definition of ours comes before one of the student's.
+        # rosgrade's own definition comes before one of the student's.
         definitions = tuple(map(str, (*type_support, *ros.underlays, *ros.prefixes, install)))
         order = CellOrder(
             scenario=scenario.id,

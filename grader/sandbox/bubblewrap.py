@@ -20,9 +20,9 @@ UID = 61_000
 """The user that sandboxes run as where rosgrade runs as root; a free one (systemd, UIDs-GIDs)."""
 _BUILD_UIDS = 100
 _BUILDS = itertools.count()
-"""What the kernel counts for a user (see :mod:`grader.sandbox.limits`) is each build's own."""
+"""Each build runs as another user, for the kernel counts by user (see `grader.sandbox.limits`)."""
 PLAIN_ENVIRONMENT = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin"}
-"""Of bubblewrap itself: every process inside can read that of the sandbox's first process."""
+"""Environment of bubblewrap itself, which every process inside can read."""
 
 _STAGE = "/run/rosgrade"
 _FILTER_FD = 9
@@ -62,7 +62,7 @@ class Bind:
 
     @classmethod
     def same(cls, path: Path, *, writable: bool = False) -> Bind:
-        """What is seen at the same place as outside."""
+        """A folder or file at the same path as outside."""
         return cls(path, path, writable)
 
 
@@ -166,7 +166,7 @@ def launch(
 
 
 def build_uid() -> int:
-    """A user that hardly any other sandbox runs as at the moment, where we are root."""
+    """A user that hardly any other sandbox runs as at the moment, where rosgrade runs as root."""
     # The workers of a class are processes of their own, which all begin to count at 0.
     return UID + 1 + (os.getpid() + next(_BUILDS)) % _BUILD_UIDS
 
@@ -178,7 +178,7 @@ def give(path: Path, uid: int = UID) -> None:
 
 
 def take_back(path: Path) -> None:
-    """Make what a sandbox wrote ours again, and readable for the next one."""
+    """Take back the files that a sandbox wrote, and make them readable for the next one."""
     if os.geteuid() == 0:
         _chown(path, 0)
 

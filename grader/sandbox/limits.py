@@ -8,9 +8,8 @@ from dataclasses import dataclass
 MIB = 2**20
 OPEN_FILES = 1024
 _OWN_SHARE = 4
-"""What is on its way between processes (SCM_RIGHTS, unix(7)) counts for all that a user runs, and
-a process that may have more open may send more: a submission must not use up what the grader
-needs."""
+"""Descriptors in flight between processes (SCM_RIGHTS, unix(7)) count for all that a user runs, and
+a process that may have more open may send more: a submission must not use up the grader's."""
 _WANTED_FILES = 8 * OPEN_FILES
 _SIGNALS = 1024
 _CPU_GRACE_S = 10
@@ -23,7 +22,7 @@ class SandboxLimits:
 
     Attributes:
         open_files: Of all processes together, sockets and the like among them; the kernel holds
-            each process to it, or to a quarter of what we may have open.
+            each process to it, or to a quarter of what the grader itself may have open.
         address_bytes: Address space of one process. Reserving takes no memory, and every thread
             reserves some, so this is far more than the memory.
     """

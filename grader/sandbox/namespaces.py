@@ -53,7 +53,7 @@ _libc = ctypes.CDLL(None, use_errno=True)
 
 
 class Mounter:
-    """A process that keeps the right to mount, which the cell has not, until all is known."""
+    """A process that keeps the right to mount, which the cell gives up, until sizes are known."""
 
     def __init__(self) -> None:
         self._end, theirs = socket.socketpair()

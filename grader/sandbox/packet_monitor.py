@@ -1,4 +1,4 @@
-"""Listens on a network of one's own to what is sent to the middleware."""
+"""The monitor of packets to the middleware in a private network."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class PacketMonitor:
     """Packets to the ports of the middleware: what is not RTPS, and heartbeats of writers.
 
     Attributes:
-        heartbeats: Writer as hex -> the most messages that it said it keeps, and how many
-            heartbeats told of another newest message.
+        heartbeats: Writer as hex -> the largest number of messages in its heartbeats, and how
+            many heartbeats had another newest message.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""The Python environment of untrusted code: ROS and what builds packages, nothing of ours.
+"""The Python environment of untrusted code: ROS and the tools of builds, without rosgrade.
 
 rosgrade, its libraries and ROS's wheels share one environment. In a sandbox another one is
 mounted in its place, of the same files (hard links, or copies where links are not possible),
@@ -147,7 +147,7 @@ def prune(folder: Path, kept: int = KEPT) -> None:
             elif used_s < stale_s:
                 shutil.rmtree(path, ignore_errors=True)
     for _, path in sorted(trees, reverse=True)[kept:]:
-        # The file stays: a process that waits for its lock would hold one that is gone.
+        # The lock file stays: a process that waits for it would get a lock on a deleted file.
         lock = _open_lock(path)
         with contextlib.suppress(OSError):
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

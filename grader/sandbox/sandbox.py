@@ -35,9 +35,9 @@ from grader.sandbox.usage import (
 LAYERS = ("userns", "netns", "seccomp", "rlimits", "watchdog")
 
 TREES = Path("/run/python")
-"""Where a cell finds the Python environments of students."""
+"""Path of the students' Python environments in a cell."""
 ENVIRONMENT = Path("/run/environment")
-"""Where a cell finds the Python environment of ours."""
+"""Path of rosgrade's own Python environment in a cell."""
 CODE = (Path(grader.__file__).resolve().parent, Path(sim.__file__).resolve().parent)
 
 _CELL_UID, _BUILD_UID = 2000, 1000
@@ -52,7 +52,7 @@ _SITE = "lib/python3*/site-packages"
 
 @dataclass
 class Sandbox:
-    """Starts things in it; the Python environments of students are kept in rosgrade's cache."""
+    """Starts processes in a sandbox; students' Python environments are kept in rosgrade's cache."""
 
     cache: Path
     libraries: tuple[str, ...] = ()
@@ -62,7 +62,7 @@ class Sandbox:
 
     @property
     def description(self) -> str:
-        """For the report."""
+        """The sandbox in words, for the report."""
         return f"bwrap ({', '.join(LAYERS)})"
 
     def allowing(self, libraries: tuple[str, ...]) -> Sandbox:
@@ -100,7 +100,7 @@ class Sandbox:
         return (trees_folder(self.cache), *own)
 
     def watched(self) -> Callable[[], None]:
-        """What raises :class:`GraderFault` if the Python of students is damaged, or was since."""
+        """A function that raises :class:`GraderFault` if the students' Python was damaged."""
         tree = self._held_tree() if _in_environment() else None
 
         def check() -> None:
@@ -113,8 +113,8 @@ class Sandbox:
                     tree.discard()
                     self._tree = None
             raise GraderFault(
-                f"files of the students' Python were deleted in {tree.path.parent}, perhaps by "
-                "a clean-up; grade again, and they are made again"
+                f"files of the sandbox's Python were deleted in {tree.path.parent}, perhaps by a "
+                "clean-up. Grade again: rosgrade makes them again"
             )
 
         return check
@@ -137,8 +137,8 @@ class Sandbox:
         shown: Sequence[Bind] = (),
     ) -> list[str]:
         """The command line of a prefork server whose cells can go into namespaces of their own."""
-        # Students' interpreters start there as well, so Python is what they see of it; what runs
-        # for us finds ours beside.
+        # Students' interpreters start there as well, so Python's place shows their environment;
+        # rosgrade's processes find their own beside it.
         binds = self.student_view(ros)
         if _in_environment():
             binds.append(Bind(Path(sys.prefix), ENVIRONMENT))
@@ -229,7 +229,7 @@ def hide(binds: Sequence[Bind]) -> list[str]:
 
 
 def _beside(environment: Mapping[str, str]) -> dict[str, str]:
-    """Variables of a process of ours where another environment stands in the place of ours."""
+    """Variables by which rosgrade's processes find their environment at :data:`ENVIRONMENT`."""
     moved = {
         name: re.sub(rf"(^|:){re.escape(sys.prefix)}(?=/|:|$)", rf"\1{ENVIRONMENT}", value)
         for name, value in environment.items()

@@ -16,7 +16,7 @@ from typing import Any
 
 _INT = 0xFFFFFFFF
 _AIMED = {"ptrace": 1, "process_vm_readv": 0, "process_vm_writev": 0}
-"""Calls on another process, and which argument is its id; refused whatever that is."""
+"""Calls on another process, and which argument is its id; refused for every id."""
 _SIGNALLING = {
     **{"kill": 1, "tkill": 1, "rt_sigqueueinfo": 1},
     **{"tgkill": 2, "rt_tgsigqueueinfo": 2},
@@ -24,13 +24,13 @@ _SIGNALLING = {
 """Calls that send a signal to the process of their first argument, and where the signal is."""
 _UNHEARD_OF = (
     *("setns", "open_by_handle_at", "bpf", "reboot", "swapon", "swapoff"),
-    # Of asynchronous I/O the whole machine has a certain amount.
+    # Asynchronous I/O has one limit for the whole machine.
     "io_setup",
     *("init_module", "finit_module", "delete_module", "kexec_load", "kexec_file_load"),
 )
 """Calls that no node and no library of one has a use for."""
 COUNTED = ("inotify_init", "inotify_init1")
-"""Calls that make something of which all that a user runs has a certain number together."""
+"""Calls that make something for which all processes of a user share one limit."""
 MOST_COUNTED = 8
 _ENDING = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 # RLIMIT_CPU and F_SETSIG: asm-generic/resource.h, linux/fcntl.h. A program may also end with the
@@ -50,8 +50,8 @@ _WAYS: tuple[tuple[str, int, tuple[int, ...], int], ...] = (
     # Its signal is in memory, where a filter cannot look.
     ("timer_create", 0, (0,), 0),
 )
-"""Ways to kill or to stop a process within a sandbox, or to what looks like that: a call, the
-place of an argument, its values, and the bits of it that count."""
+"""Ways to kill or to stop a process within a sandbox, or to pretend that: a call, the index of an
+argument, its values, and the bits of it that count."""
 _LEADER = 2
 """What a sandbox is started with; of a build that is colcon."""
 INIT = 1
@@ -59,7 +59,7 @@ INIT = 1
 _REFUSED = (
     # Other processes.
     *("process_madvise", "kcmp", "pidfd_getfd", "perf_event_open", "userfaultfd"),
-    # Keys are shared by all of a user's processes, in whatever namespace.
+    # Keys are shared by all of a user's processes, in all namespaces.
     *("add_key", "request_key", "keyctl"),
     *("io_uring_setup", "io_uring_enter", "io_uring_register"),
     # Namespaces and mounts.
@@ -74,8 +74,8 @@ _REFUSED = (
     *("memfd_create", "memfd_secret", "shmget", "shmat", "shmctl", "semget", "semop"),
     *("msgget", "msgsnd", "mq_open"),
 )
-# A process on a CPU of its own choice takes time from its neighbours: it is told that it got what
-# it asked for.
+# A process on a CPU of its own choice takes time from its neighbours: these calls do nothing, and
+# report success.
 _PRETENDED = (
     *("sched_setaffinity", "sched_setscheduler", "sched_setparam", "sched_setattr"),
     *("ioprio_set",),
@@ -166,7 +166,7 @@ def guard_filter() -> bytes:
 
 @cache
 def guarded_calls() -> dict[str, int]:
-    """The numbers of the calls that :func:`guard_filter` tells of, and of ``seccomp`` itself."""
+    """The numbers of the calls that :func:`guard_filter` asks about, and of ``seccomp`` itself."""
     from pyseccomp import resolve_syscall, system_arch
 
     names = (*_AIMED, *_UNHEARD_OF, *COUNTED, *(name for name, *_ in _WAYS))

@@ -1,4 +1,4 @@
-"""What processes and folders take at the moment, and what processes took that have ended.
+"""Memory, files and CPU time of processes, also of ended ones, and the size of folders.
 
 What a process took is added to its parent's when the parent has waited for it, and to none if the
 parent ignores SIGCHLD (wait(2), "ERRORS"). So what each of them had when it was seen last is kept.
@@ -180,7 +180,7 @@ def folder_usage(folders: Iterable[Path], most_bytes: int, most_files: int) -> t
             with os.scandir(pending.pop()) as entries:
                 for entry in entries:
                     count += 1
-                    # Blocks of 512 bytes, whatever the file system's are: stat(2).
+                    # Blocks of 512 bytes on every file system: stat(2).
                     total += entry.stat(follow_symlinks=False).st_blocks * 512
                     if entry.is_dir(follow_symlinks=False):
                         pending.append(entry.path)

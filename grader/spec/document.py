@@ -76,7 +76,7 @@ def path(place: Place) -> str:
 
 
 class _Reader:
-    """Turns composed YAML nodes into plain data and remembers where each stood."""
+    """Turns composed YAML nodes into plain data and remembers the line of each."""
 
     def __init__(self) -> None:
         self.lines: dict[Place, int] = {}
@@ -165,7 +165,7 @@ def _syntax(error: yaml.YAMLError, text: str) -> Problem:
     if isinstance(error, yaml.MarkedYAMLError):
         context = error.context if error.context != "while scanning for the next token" else None
         message = ", ".join(filter(None, (context, error.problem)))
-        # What was never closed is mended where it was opened.
+        # A bracket or quote that was never closed is corrected where it was opened.
         unclosed = "end of stream" in message or "<stream end>" in message
         marks = (error.problem_mark, error.context_mark)
         mark = next(filter(None, reversed(marks) if unclosed else marks), None)

@@ -115,7 +115,7 @@ _BOUNDS = {
 
 
 def _shown(value: object) -> str:
-    """A value in the words of YAML."""
+    """A value as YAML writes it."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):

@@ -1,4 +1,4 @@
-"""Rules for names: ids of ours, Python's, and ROS's (REP-144, the ROS 2 topic name design).
+"""Rules for names: rosgrade's ids, Python's, and ROS's (REP-144, the ROS 2 topic name design).
 
 Sources: https://ros.org/reps/rep-0144.html,
 https://design.ros2.org/articles/topic_and_service_names.html,

@@ -19,7 +19,7 @@ from grader.spec.unit import (
 
 
 def refusal(text: str) -> PydanticCustomError:
-    """What a validator raises, with a text for the author of the YAML."""
+    """The error that a validator raises, with a text for the author of the YAML."""
     return PydanticCustomError("quantity", "{text}", {"text": text})
 
 

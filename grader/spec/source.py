@@ -25,7 +25,7 @@ class Model(BaseModel):
         extra="forbid",
         populate_by_name=True,
         protected_namespaces=(),
-        # Of the many models only a few are used in one command; the rest is never built.
+        # One command uses only a few of the many models; the others are never built.
         defer_build=True,
         allow_inf_nan=False,
     )

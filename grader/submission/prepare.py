@@ -109,7 +109,7 @@ def prepare(
 
 
 def refused(source: Path, error: SubmissionError) -> Prepared:
-    """What there is of something that cannot be read as a submission."""
+    """The record of something that cannot be read as a submission."""
     record = SubmissionRecord(submission_id(source), _hash(source), problem=str(error))
     return Prepared(record, None)
 
@@ -128,7 +128,7 @@ def _hash(source: Path) -> str:
     """Hash of what was refused; of a folder, names and sizes stand for what is in the files."""
     total = hashlib.sha256()
     if source.is_dir():
-        # Else one that has no files, or cannot be read, would be the same as an empty one.
+        # Else an unreadable submission, or one without files, would get the hash of an empty one.
         total.update(b"refused\0")
         for line in sorted(listing(source)):
             total.update(os.fsencode(line.rpartition("\0")[0]) + b"\0")
@@ -214,7 +214,7 @@ def _no_package(located: Located) -> str:
         "and folders with a COLCON_IGNORE do not count)"
     )
     if archives:
-        return f"{problem}; unpack {shown(archives[0])}, and hand in what is in it"
+        return f"{problem}; unpack {shown(archives[0])}, and hand in its content"
     if all(path.endswith(".py") for path in paths):
         return f"{problem}; hand in the whole package, not only its Python files"
     return problem

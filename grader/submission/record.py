@@ -316,4 +316,4 @@ def read_record(file: Path) -> SubmissionRecord:
     try:
         return _RECORD.validate_json(file.read_bytes())
     except (OSError, ValidationError) as error:
-        raise UsageError(f"{file}: is no record of a submission: {error}") from error
+        raise UsageError(f"{file}: is not the record of a submission: {error}") from error

@@ -11,7 +11,7 @@ ROSGRADE = Path(__file__).resolve().parent / "rosgrade"
 
 
 def main() -> int:
-    """Set rosgrade up and grade; 0 if there is a grade, whatever it is."""
+    """Set rosgrade up and grade; 0 if there is a grade, even without points."""
     made = subprocess.run([sys.executable, "-m", "grader.bootstrap"], cwd=ROSGRADE, check=False)
     if made.returncode:
         return made.returncode

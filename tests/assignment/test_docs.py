@@ -21,7 +21,7 @@ def test_the_files_in_docs_are_up_to_date(capsys: pytest.CaptureFixture[str]) ->
     assert docs.main(["--check"]) == 0, capsys.readouterr().err
 
 
-def test_a_stale_or_missing_file_is_told_and_mended(
+def test_a_stale_or_missing_file_is_reported_and_mended(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["--folder", str(tmp_path)]
@@ -88,7 +88,7 @@ def test_the_example_in_the_documentation_is_the_shipped_assignment() -> None:
     assert file.read_text(encoding="utf-8").strip() in docs.assignment_markdown()
 
 
-def test_the_page_of_the_recording_tells_of_every_part_of_it() -> None:
+def test_the_page_of_the_recording_describes_every_part_of_it() -> None:
     text = docs.recording_markdown()
     for one in (Recording, Message, Endpoint, Goal, Truth, Scene, Finding, Evidence):
         section = text.partition(f"\n## {one.__name__}\n")[2].partition("\n## ")[0]

@@ -1,4 +1,4 @@
-"""What the lessons with a robot draw from the seed: right and wrong are told apart by any of it."""
+"""Random values of the lessons with a robot: every seed distinguishes right from wrong."""
 
 from __future__ import annotations
 

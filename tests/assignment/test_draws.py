@@ -1,4 +1,4 @@
-"""What a lesson draws from the seed tells the classic mistakes apart, whatever the seed is.
+"""Random values of a lesson show the classic mistakes with every seed.
 
 Otherwise a wrong solution passes by luck now and then, and the grade hangs on the seed.
 """

@@ -1,4 +1,4 @@
-"""Fields that checks name: those that a message cannot have are told with their line."""
+"""Fields that checks name: those that a message cannot have are reported with their line."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ def found(mistakes: Callable[[str], list[str]], ros_with: Callable[..., None]) -
         ),
     ],
 )
-def test_a_field_that_a_message_does_not_have_is_told_with_its_line(
+def test_a_field_that_a_message_does_not_have_is_reported_with_its_line(
     found: Found, uses: str, parameters: str, said: str
 ) -> None:
     assert found(uses, parameters) == [f"25: checks[0].with.{said}"]

@@ -1,4 +1,4 @@
-"""Interfaces that an assignment names: those that do not exist are told with their line."""
+"""Interfaces that an assignment names: those that do not exist are reported with their line."""
 
 from __future__ import annotations
 
@@ -70,13 +70,13 @@ MISTAKES = [
     (
         {"judged": "geometry_msg/msg/Twist"},
         ["19: checks[0].with.type: there is no package 'geometry_msg': not in ROS, not in "
-         "interfaces/ beside the assignment, not among 'packages' nor what they have in 'depends'. "
+         "interfaces/ beside the assignment, and not in 'packages' or their 'depends'. "
          "Did you mean 'geometry_msgs'?"],
     ),
     (
         {"recorded": "bot_msgs/msg/BotStatus"},
-        ["10: scenarios[0].record[0].type: 'bot_msgs' is handed in, and the probe never imports "
-         "what a student wrote: our own copy of it must be in interfaces/bot_msgs beside the "
+        ["10: scenarios[0].record[0].type: students hand in 'bot_msgs', and rosgrade never "
+         "imports their code: put your own copy of it in interfaces/bot_msgs beside the "
          "assignment"],
     ),
     (
@@ -88,7 +88,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("named", "expected"), MISTAKES)
-def test_an_interface_that_does_not_exist_is_told_with_its_line(
+def test_an_interface_that_does_not_exist_is_reported_with_its_line(
     found: Found, ros_with: Callable[..., None], named: dict[str, str], expected: list[str]
 ) -> None:
     ros_with(DEFINITIONS)

@@ -91,7 +91,7 @@ def test_a_changed_module_is_another_assignment_and_is_read_again(lesson) -> Non
         ("", "there is no check 'mine.there'"),
     ],
 )
-def test_a_mistake_in_a_module_is_told_with_its_file_and_line(lesson, mine, told) -> None:
+def test_a_mistake_in_a_module_is_reported_with_its_file_and_line(lesson, mine, told) -> None:
     with pytest.raises(AssignmentError, match=told):
         load_assignment(lesson(mine=mine))
 

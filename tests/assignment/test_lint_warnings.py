@@ -1,4 +1,4 @@
-"""What is valid in an assignment, but looks like a slip."""
+"""What is valid in an assignment, but looks like a mistake."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def all_told(folder: Path, checks: str, depends: str = "") -> list[str]:
     return [one for one in lint_warnings(loaded, []) if not one.startswith("no mutant")]
 
 
-def test_a_dependency_that_is_a_slip_is_told_and_one_that_is_merely_unknown_is_not(
+def test_a_misspelt_dependency_is_reported_and_an_unknown_one_is_not(
     tmp_path: Path,
 ) -> None:
     check = "  - {id: some, uses: node.alive, points: 1}\n"

@@ -110,7 +110,7 @@ def test_a_loaded_assignment_has_its_checks_bound(write: Write, catalogue: Catal
         ),
     ],
 )
-def test_a_check_that_does_not_fit_is_told_with_its_line(
+def test_a_check_that_does_not_fit_is_reported_with_its_line(
     found: Found, check: str, said: str
 ) -> None:
     assert found(f"{HEAD}  - {check}\n") == [f"13: {said}"]
@@ -180,7 +180,7 @@ def test_checks_of_all_scenarios_need_the_same_programs_in_each(found: Found) ->
     other = "  - {id: other, launch: [{executable: sub}], timeout: 5 s}\nchecks:\n"
     two = GOOD.replace("[bot_pub]", "[bot_pub, sub]").replace("checks:\n", other)
     assert found(two) == [
-        "14: checks[0]: name the 'scenarios' that it judges, for they do not launch the same: "
+        "14: checks[0]: name the 'scenarios' that it judges: they launch different programs: "
         "'run' launches 'bot_pub', but 'other' 'sub'"
     ]
     assert found(two.replace("alive, points", "alive, scenarios: [run, other], points")) == []
@@ -192,7 +192,7 @@ def test_checks_of_all_scenarios_need_the_same_programs_in_each(found: Found) ->
 @pytest.mark.parametrize(
     ("key", "said"),
     [
-        ("robot: {pose: [0, 0, 0 deg]}", "robot: there is a simulated robot only in a 'world'"),
+        ("robot: {pose: [0, 0, 0 deg]}", "robot: a simulated robot needs a 'world'"),
         ("until: {at_rest: 1 s}", "until: 'at_rest' is about the simulated robot: 'world' is"),
         ("until: {any: [{travelled: 1 m}]}", "until: 'travelled' is about the simulated robot:"),
     ],
@@ -202,7 +202,7 @@ def test_what_is_about_the_robot_needs_a_world(found: Found, key: str, said: str
     assert told.startswith(f"12: scenarios[0].{said}")
 
 
-def test_limits_of_the_build_and_libraries_are_told_with_their_line(found: Found) -> None:
+def test_limits_of_the_build_and_libraries_are_reported_with_their_line(found: Found) -> None:
     begin = GOOD.index("scenarios:")
     line = GOOD[:begin].count("\n") + 1
     written = "build_limits: {memory: 3 s, wall_tme: 9 s}\nlibraries: [numpy, scipy==1.2]\n"
@@ -223,7 +223,7 @@ def test_checks_of_a_run_need_a_scenario(found: Found) -> None:
     ]
 
 
-def test_checks_that_wait_for_each_other_are_told_once_as_a_circle(found: Found) -> None:
+def test_checks_that_wait_for_each_other_are_reported_once_as_a_circle(found: Found) -> None:
     text = HEAD + "".join(
         f"  - {{id: {name}, points: 1, uses: node.alive, requires: [{required}]}}\n"
         for name, required in [
@@ -240,7 +240,7 @@ def test_checks_that_wait_for_each_other_are_told_once_as_a_circle(found: Found)
     ]
 
 
-def test_what_does_not_fit_is_told_once_the_form_is_right(found: Found) -> None:
+def test_what_does_not_fit_is_reported_once_the_form_is_right(found: Found) -> None:
     text = HEAD.replace("timeout: 5 s", "timeout: 5") + (
         "  - {id: a, uses: node.alife, points: 1, requires: [q]}\n"
         "  - {id: b, uses: node.alive, point: 1, scenarios: [run]}\n"

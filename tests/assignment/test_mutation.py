@@ -73,7 +73,7 @@ def test_what_a_build_left_in_the_reference_is_not_handed_in(
     assert files == ["node.py", "setup.py"]
 
 
-def test_all_mistakes_are_told_with_their_lines(tmp_path: Path, reference: Path) -> None:
+def test_all_mistakes_are_reported_with_their_lines(tmp_path: Path, reference: Path) -> None:
     folder = write(
         tmp_path,
         """\
@@ -102,8 +102,7 @@ variants:
         load_mutants(LESSON, folder, reference)
     file = folder / "mutants.yaml"
     assert str(caught.value).splitlines() == [
-        f"{file}:10: mutants[0].edits[1].replace: the text stands 0 times in "
-        "bot/setup.py, 1 is expected",
+        f"{file}:10: mutants[0].edits[1].replace: the text occurs 0 times in bot/setup.py, not 1",
         f"{file}:12: mutants[0].loses[0]: there is no check 'topics'. Did you mean 'topic'?",
         f"{file}:16: mutants[1].loses[0]: 'values' requires 'node', so it is skipped: leave it out",
         f"{file}:18: variants[0].id: 'a' stands twice (first in line 3)",
@@ -125,7 +124,7 @@ variants:
         ),
     ],
 )
-def test_a_mistake_in_the_form_is_told(
+def test_a_mistake_in_the_form_is_reported(
     tmp_path: Path, reference: Path, old: str, new: str, said: str
 ) -> None:
     with pytest.raises(AssignmentError) as caught:
@@ -138,14 +137,14 @@ def test_a_missing_file_is_wrong_use(tmp_path: Path, reference: Path) -> None:
         load_mutants(LESSON, tmp_path, reference)
 
 
-def test_a_missing_reference_is_told() -> None:
+def test_a_missing_reference_is_reported() -> None:
     with pytest.raises(UsageError, match="the assignment 'lesson' has no reference solution"):
         reference_of("lesson")
 
 
-def test_a_reference_that_changed_since_is_told(tmp_path: Path, reference: Path) -> None:
+def test_a_reference_that_changed_since_is_reported(tmp_path: Path, reference: Path) -> None:
     mutants = load_mutants(LESSON, write(tmp_path, GOOD), reference)
     (reference / "bot/bot/node.py").write_text("")
-    with pytest.raises(AssignmentError, match="'cmdvel' does not apply: the text stands 0 times"):
+    with pytest.raises(AssignmentError, match="'cmdvel' does not apply: the text occurs 0 times"):
         apply(mutants.mutants[0], reference, tmp_path / "one")
     assert not (tmp_path / "one").exists()

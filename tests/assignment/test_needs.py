@@ -72,7 +72,7 @@ def test_what_fits_is_accepted(found: Found, uses: str, parameters: str) -> None
     ("uses", "parameters", "expected"),
     [
         ("service.responds", "service: /enabel", r"asks '/enabel'\. Did you mean '/enable'\?"),
-        ("service.concurrent", "service: /enable, takes: 1 s", "never twice at once"),
+        ("service.concurrent", "service: /enable, takes: 1 s", "never calls it twice at once"),
         ("action.result", "action: /fib, within: 11 s", "waits only 10 s for an answer"),
         ("lifecycle.state", "node: other, states: [active]", "asks '/other/get_state'"),
         ("parameter.declared", "node: bto, name: x", r"Did you mean '/bot'\?"),

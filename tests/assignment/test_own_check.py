@@ -104,12 +104,14 @@ def test_loading_leaves_nothing_behind_in_the_folder(write: Write) -> None:
         ),
         ("checks.py:SETTING", "checks.py has no function 'SETTING'"),
         ("checks.py:nothing", "must take the recording as its first argument"),
-        ("checks.py:positional", "the argument 'a' cannot be given as a key of with"),
+        ("checks.py:positional", "the argument 'a' cannot be a key of 'with'"),
         ("checks.py:unclear", "its annotations cannot be read: name 'Missing' is not defined"),
         ("checks.py:words", "checks.py:words: it returns bool: a check returns a Finding"),
     ],
 )
-def test_what_cannot_be_loaded_is_told_at_its_line(write: Write, python: str, said: str) -> None:
+def test_what_cannot_be_loaded_is_reported_at_its_line(
+    write: Write, python: str, said: str
+) -> None:
     folder = write(yaml(python), checks=MINE)
     with pytest.raises(AssignmentError, match=re.escape(said)) as caught:
         load_assignment(folder, {})

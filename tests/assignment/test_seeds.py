@@ -1,4 +1,4 @@
-"""Verdicts do not hang on the seed: what is drawn at random tells the classic mistakes apart."""
+"""Verdicts do not depend on the seed: random values show the classic mistakes with each."""
 
 from __future__ import annotations
 

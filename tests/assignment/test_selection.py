@@ -114,8 +114,8 @@ def test_a_hidden_run_that_students_would_see_is_doubtful(tmp_path):
         ]
 
     assert told(tmp_path / "a", CHECKS) == [
-        "students see the run of the scenario 'hard', which only hidden checks name: the visible "
-        "check 'alive' names no scenarios, and so judges all"
+        "students see the run of the scenario 'hard', although only hidden checks name it: the "
+        "visible check 'alive' names no scenarios, so it judges all"
     ]
     named = CHECKS.replace("node.alive,", "node.alive, scenarios: [run],")
     assert told(tmp_path / "b", named) == []

@@ -96,11 +96,11 @@ def test_good_ones_are_read(found: Found, stimuli: str) -> None:
     assert found(stimuli) == []
 
 
-ONE_WAY = "give the messages in one way of message, messages, from, python"
+ONE_WAY = "give the messages by one of message, messages, from, python"
 FORM = [
-    ("      - {after: 1 s}\n", "14: .*its first key tells what it does: call, join, kill, publish"),
+    ("      - {after: 1 s}\n", "14: .*its first key must be one of call, join, kill, publish"),
     ("      - {pubish: /a, type: a/msg/B, message: {}}\n", "unknown key 'pubish'. Did you mean"),
-    (publish("after: 1 s"), f"14: .*{ONE_WAY}, but none of them is there"),
+    (publish("after: 1 s"), f"14: .*{ONE_WAY}, but none is given"),
     (publish("message: {}\nmessages: [{}]"), f"{ONE_WAY}, not message and messages"),
     (publish("messages: [{}, {}]"), "several messages need a pace: give 'every' or 'answer'"),
     (publish("message: {}\ncount: 3"), "several messages need a pace"),
@@ -110,15 +110,15 @@ FORM = [
 FIT = [
     ("      - {publish: /echo, type: std_msgs/msg/String, message: {}}\n", "'/echo' is recorded"),
     (publish("message: {}\nanswer: /ecko"), "17: .*does not record '/ecko'. Did you mean '/echo'"),
-    (publish("message: {}\nafter: 5 s"), "17: .*not before the timeout of 5 s"),
+    (publish("message: {}\nafter: 5 s"), "17: .*is too late: the timeout of 5 s"),
     (
         "      - {join: /echo, type: std_msgs/msg/String, name: late, after: 1 s}\n" * 2,
-        "15: .*'late' stands twice",
+        "15: .*the name 'late' is used twice",
     ),
     (
         publish("message: {}")
         + "      - {join: /chatter, type: std_msgs/msg/String, name: late, after: 1 s}\n",
-        "17: .*a late joiner would hear that",
+        "17: .*a late joiner would receive that",
     ),
     (
         "      - {kill: ecko, after: 1 s}\n",
@@ -147,7 +147,7 @@ VALUES = [
     ("message: {data: 1}", "std_msgs/msg/Float64MultiArray", "data: expected a list, not 1"),
     ("message: {data: [1, a]}", "std_msgs/msg/Float64MultiArray", r"data\[1\]: expected a number"),
     ("message: {few: [1, 2, 3]}", "bot_msgs/msg/Three", "few: expected at most 2 values, not 3"),
-    ("message: {'da ta': 1}", "std_msgs/msg/UInt8", "'da ta' is no field"),
+    ("message: {'da ta': 1}", "std_msgs/msg/UInt8", "'da ta' is not a field"),
 ]
 
 
@@ -200,7 +200,7 @@ FILES = [
     ("from: ../other.csv\nevery: 1 s", r"\.\./other.csv is not in the assignment's folder"),
     ("from: empty.csv\nevery: 1 s", "empty.csv has no message"),
     ("from: wrong.csv\nevery: 1 s", r"wrong.csv:2: the message .* has no field 'q'. It has: data"),
-    ("from: long.csv\nevery: 1 s", "long.csv:2: more values than the first row names"),
+    ("from: long.csv\nevery: 1 s", "long.csv:2: more values than fields in the first row"),
     ("from: latin.csv\nevery: 1 s", "latin.csv is not a CSV file: 'utf-8' codec can't decode"),
     ("from: bag.mcap", "bag.mcap: no MCAP file that can be read"),
     ("from: half.mcap", "half.mcap: no MCAP file that can be read"),
@@ -244,7 +244,7 @@ def test_a_file_that_is_wrong_is_named(found: Found, folder: Path, rest: str, wo
     [
         ("std_msgs/msg/UInt8", "data\n1\n256\n", r"n.csv:3: data: expected a whole number .*256"),
         ("std_msgs/msg/UInt8", "data\n\n1\nfive\n", r"n.csv:4: data: expected a number.*five"),
-        ("std_msgs/msg/Float64MultiArray", "data[1]\n1\n", r"data\[0\] is missing: items"),
+        ("std_msgs/msg/Float64MultiArray", "data[1]\n1\n", r"data\[0\] is missing: give the items"),
     ],
 )  # fmt: skip
 def test_a_cell_of_a_csv_file_that_does_not_fit_is_named_with_its_line(
@@ -315,11 +315,11 @@ def test_requests_that_fit_are_read(found: Found, stimulus: str) -> None:
             "either 'request' or 'requests'",
         ),
         ("- {call: enable, every: 1 s}", "expected 'list_parameters'"),
-        ("- {call: /e, type: std_srvs/srv/SetBool, after: 9 s}", "is not before the timeout of 5"),
+        ("- {call: /e, type: std_srvs/srv/SetBool, after: 9 s}", "is too late: the timeout of 5"),
         ("- {set_parameters: {}, node: bot}", "at least 1"),
-        ("- {set_parameters: {a: []}, node: bot}", "a list of one kind"),
-        ("- {set_parameters: {a: [1, x]}, node: bot}", "a list of one kind"),
-        ("- {set_parameters: {a: {b: 1}}, node: bot}", "expected a truth, a number, a text"),
+        ("- {set_parameters: {a: []}, node: bot}", "a list of one of these"),
+        ("- {set_parameters: {a: [1, x]}, node: bot}", "a list of one of these"),
+        ("- {set_parameters: {a: {b: 1}}, node: bot}", "expected true or false, a number, a text"),
         ("- {set_parameters: {a: $sped}, node: bot}", "Did you mean 'speed'"),
         ("- {set_parameters: {a: 1}, node: b-t}", "is not a node name"),
         (

@@ -93,7 +93,7 @@ class Targets:
         return source.replace("TARGETS = {}", f"TARGETS = {self.values!r}")
 
     def close(self) -> None:
-        """Nobody listens any more."""
+        """Close all listeners."""
         for listener in self._sockets:
             # Wakes the thread that waits for a connection.
             listener.shutdown(socket.SHUT_RDWR)

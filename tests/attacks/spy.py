@@ -1,7 +1,7 @@
 """What a hostile program tries to read, write and reach; runs as the node, as setup.py, as CMake.
 
-Each function tries one thing and returns what it got hold of; whatever it raises means that it
-was refused. `TARGETS` is filled in by the test: files and listeners that it made itself.
+Each function tries one thing and returns what it got hold of; any exception means that it was
+refused. `TARGETS` is filled in by the test: files and listeners that it made itself.
 """
 
 import ctypes

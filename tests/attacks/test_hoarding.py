@@ -1,4 +1,4 @@
-"""A user has some things once, whatever the sandbox: who hoards them takes nothing from others.
+"""Limits that all processes of a user share: a submission that hoards takes nothing from others.
 
 The class is graded as most shells start things, with 1024 open files; as root besides, where it
 can, as an ordinary user.
@@ -35,7 +35,7 @@ def bound() -> None:
 
 
 def as_a_user(folder: Path) -> list[str]:
-    """What to start a program with, so that it runs as no root; nothing where nobody else may."""
+    """What to start a program with, so that it does not run as root; empty where it need not."""
     drop = ["setpriv", f"--reuid={USER}", f"--regid={USER}", "--clear-groups"]
     tried = [*drop, sys.executable, "-c", "import os, sys; os.stat(sys.executable)"]
     if os.geteuid() != 0 or subprocess.run(tried, capture_output=True, check=False).returncode:

@@ -123,7 +123,7 @@ packet = b'RTPS\\2\\3\\1\\x0f' + writer[:12] + struct.pack('<BBH', 7, 1, len(bod
 for port in (7410, 7411):
     udp.sendto(packet, ('127.0.0.1', port))
 """
-# Nobody waits for them, so what they take is added to nobody's time.
+# Their parent does not wait for them, so what they take is added to no other process.
 RELAY = """\
 signal.signal(signal.SIGCHLD, signal.SIG_IGN)
 while True:
@@ -306,7 +306,7 @@ for _ in range(500):
     ear.sendto(b'not of any middleware', ear.getsockname())
 tempfile.TemporaryFile().write(bytes(2**20))
 """
-# In a socket that nobody reads, again and again: they count for all that a user runs.
+# In a socket that is never read, again and again: they count for all that a user runs.
 IN_FLIGHT = """\
 import socket, threading, time
 def hoard():
@@ -376,7 +376,7 @@ def unstarted(at_import: str, *named: str) -> Attack:
 ATTACKS = {
     "kills_everything": ended("os.kill(-1, signal.SIGKILL)\nos.kill(os.getpid(), 9)", "SIGKILL"),
     "kills_the_probe": ended(KILL_PROBE, f"sent SIGKILL to {HOLDER}"),
-    # It is over before anybody looks.
+    # It is over before the watchdog looks.
     "kills_the_probe_at_its_end": Attack(
         at_import="import atexit\natexit.register(lambda: os.kill(1, signal.SIGTERM))",
         lost=frozenset({"alive"}),
@@ -397,7 +397,7 @@ ATTACKS = {
     ),
     "fork_bomb": ended(BOMB, "sessions"),
     "heap": Attack(
-        # Pages that nobody touches: the limit is reached at once, however busy the machine is.
+        # Pages that are never touched: the limit is reached at once, however busy the machine is.
         "x = []\nwhile True:\n    x.append(bytes(2**24))",
         lost=frozenset({"messages"}),
         # A program that ran out of memory cannot always end itself.
@@ -497,7 +497,7 @@ ATTACKS = {
     "squats_the_probe_s_name": Attack(
         SQUAT,
         lost=frozenset({"untouched"}),
-        named=("is called `/rosgrade_probe`, as the node", "publishes on `/clock` and `/odom`"),
+        named=("is called `/rosgrade_probe`, like the node", "publishes on `/clock` and `/odom`"),
     ),
     "is_called_as_the_probe": Attack(name="rosgrade_probe", lost=frozenset({"node", "untouched"})),
     "floods_topics_and_rosout": Attack(
@@ -509,7 +509,7 @@ ATTACKS = {
     "announces_endless_samples": Attack(
         HEARTBEAT,
         lost=frozenset({"starts"}),
-        named=("keeps the middleware of the node that watches the run busy",),
+        named=("keep the middleware of the node that watches the run busy",),
     ),
     "burns_the_cpus_in_turns": ended(RELAY, "s of CPU time, 3 s are allowed"),
     "injection": ended(INJECTION, "RuntimeError"),
@@ -522,7 +522,7 @@ ATTACKS = {
     ),
     "build_fork_bomb": unbuilt(BOMB, "it started 64 processes"),
     "build_plants_links": unbuilt(PLANT, "'share/passwd', a link out to '/etc/passwd'"),
-    "build_digs_deep": unbuilt(DIG, "it made more than 100 folders in one another"),
+    "build_digs_deep": unbuilt(DIG, "it nested folders more than 100 deep"),
     "build_installs_outside": unbuilt(
         "import setuptools\n_s = setuptools.setup\ndef setup(**k):\n"
         "    k['data_files'].append(('/etc/cron.d', ['package.xml']))\n    _s(**k)\n"
@@ -683,7 +683,7 @@ def test_an_honest_grade_is_the_same_byte_for_byte(
 
 
 def test_nothing_is_left_running(graded: dict[str, Handed]) -> None:
-    # Whoever outlived its parent in a namespace is still a descendant of the one who made it.
+    # A process that outlived its parent in a namespace still descends from the namespace's maker.
     commands = descendants(os.getpid()).values()
     assert not [line for line in commands if re.search("86397|bot_pub|setup.py", line)]
 

@@ -153,7 +153,7 @@ def test_nothing_is_reached_by_setup_py_or_cmake(
 
 
 @pytest.mark.parametrize(("script", "status"), [(REPLACE_RECORD, Status.PASSED), (REDIRECT, Status.FAILED)])
-def test_nothing_of_ours_is_written_through_a_link_of_a_build(
+def test_rosgrade_writes_nothing_through_a_link_of_a_build(
     grading: Grading, targets: Targets, tmp_path: Path, script: str, status: Status
 ) -> None:
     cmake = CMAKE.replace("execute_process", "# ").replace("message(", "# (")

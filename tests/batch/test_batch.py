@@ -1,4 +1,4 @@
-"""The rows of a class: graded once each, whoever grades them and whatever becomes of it.
+"""The rows of a class: each is graded once, by every executor and with every outcome.
 
 What is handed in here cannot be built, so that nothing needs ROS.
 """
@@ -128,7 +128,7 @@ def test_of_the_same_submissions_either_may_be_named_to_be_graded_again(
         ("somebody else", "called somebody else."),
     ],
 )
-def test_who_is_to_be_graded_again_and_is_not_there_is_told_with_the_nearest(
+def test_an_unknown_name_to_grade_again_is_reported_with_the_nearest(
     course: Class, named: str, said: str
 ) -> None:
     rows = take_in(course.folder / "class", course.folder)
@@ -205,7 +205,7 @@ def test_a_full_disk_is_the_machine_s_and_says_what_to_do(course: Class) -> None
     assert "make room there" in fault
 
 
-def test_what_could_not_be_graded_is_told_on_the_row_of_its_twin_too(course: Class) -> None:
+def test_what_could_not_be_graded_is_reported_on_the_row_of_its_twin_too(course: Class) -> None:
     done = course.grade(FailingCrew(GraderFault("the disk is full")))
     assert {key: item.entry.fault for key, item in done.items()} == dict.fromkeys(
         ("ana", "ben", "cai"), "the disk is full"
@@ -227,7 +227,7 @@ def test_a_batch_of_another_assignment_replaces_no_grades(course: Class) -> None
     other = course.folder / "other"
     other.mkdir()
     (other / "assignment.yaml").write_text(YAML.replace("id: lesson", "id: other"))
-    with pytest.raises(UsageError, match="holds the grades of lesson; name a new folder"):
+    with pytest.raises(UsageError, match="holds the grades of lesson; use a new folder"):
         Batch(load_assignment(other), course.ledger, frozenset({"all"})).read(
             take_in(course.folder / "class", course.folder)
         )

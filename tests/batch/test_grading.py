@@ -222,7 +222,7 @@ def test_after_three_disturbed_runs_it_is_not_graded_and_costs_nothing(grade: Gr
     assert runner.alone == [False, True, True]
 
 
-def test_a_fault_of_ours_is_tried_again_and_then_an_error_by_name(grade: Grade) -> None:
+def test_a_fault_of_rosgrade_is_tried_again_and_then_an_error_by_name(grade: Grade) -> None:
     foreign = recording(faults=("not alone on ROS domain 7: /neighbour",))
     graded, _ = grade(foreign, recording())
     assert graded.grade.full_points
@@ -395,7 +395,7 @@ def test_what_cannot_be_judged_again_is_no_loss_of_points(
     assert row.in_doubt and row.gained == 0.0
 
 
-def test_what_cannot_be_read_again_keeps_its_grade_and_is_told(
+def test_what_cannot_be_read_again_keeps_its_grade_and_is_reported(
     grade: Grade, lesson: LoadedAssignment, tmp_path: Path
 ) -> None:
     first, _ = grade(recording())
@@ -417,7 +417,7 @@ def test_what_cannot_be_read_again_keeps_its_grade_and_is_told(
     assert ada.done.entry.problem == f"not judged again: {ada.problem}"
     assert not cai.problem and cai.done.fresh
     for row in (ben, dee):
-        assert row.problem == "there is no result of it; run the batch again"
+        assert row.problem == "it has no result; run the batch again"
         assert row.done.result is None
     assert not eli.problem and eli.done.entry.problem == "handed in nothing"
     assert ledger.read().entries[0].problem == ""

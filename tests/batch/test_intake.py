@@ -234,7 +234,7 @@ def test_github_classroom_repositories_go_to_their_logins(course: Path, staging:
 @pytest.mark.parametrize(
     ("folders", "owner"),
     [
-        # An exact name goes before whatever else may be meant.
+        # An exact name goes before every similar one.
         (["ada", "hw1-a-ada"], "ada"),
         (["hw1-ada", "hw1-a-ada"], "hw1-ada"),
         (["hw1-ada", "hw1-bob", "hw1-a-ada"], "hw1-ada"),
@@ -251,7 +251,7 @@ def test_github_classroom_repositories_go_to_their_logins(course: Path, staging:
         (["Lovelace, Ada"], "Lovelace, Ada"),
     ],
 )
-def test_nobody_is_given_by_a_guess_what_may_be_somebody_else_s(
+def test_no_submission_is_given_by_a_guess_to_a_student_whose_it_may_not_be(
     course: Path, staging: Path, folders: list[str], owner: str | None
 ) -> None:
     for name in folders:
@@ -270,7 +270,7 @@ def test_nobody_is_given_by_a_guess_what_may_be_somebody_else_s(
         assert name in rows["ada"].problem and "may be theirs" in rows["ada"].problem
 
 
-def test_what_the_names_of_one_submission_contradict_is_given_to_nobody(
+def test_a_submission_with_contradicting_names_is_given_to_no_student(
     course: Path, staging: Path
 ) -> None:
     archive(course / "lopezana_34_1_ws.zip")
@@ -317,7 +317,9 @@ def test_logins_that_differ_by_a_hyphen_are_two_students() -> None:
     assert not roster.problems
 
 
-def test_who_is_not_in_the_roster_is_graded_and_said(course: Path, staging: Path) -> None:
+def test_a_student_who_is_not_in_the_roster_is_graded_and_named(
+    course: Path, staging: Path
+) -> None:
     folder(course / "stranger")
     (row,) = take_in(course, staging, Roster(()))
     assert (row.key, row.problem) == ("stranger", "not in the roster")
@@ -334,7 +336,9 @@ def test_a_name_that_two_students_have_is_given_to_neither(course: Path, staging
         assert rows[key].problem == "handed in nothing; Ana Lopez may be theirs"
 
 
-def test_what_a_roster_names_is_whose_it_says(course: Path, staging: Path) -> None:
+def test_a_submission_in_a_roster_belongs_to_the_student_of_its_row(
+    course: Path, staging: Path
+) -> None:
     folder(course / "hw1-final")
     archive(course / "team.zip")
     archive(course / "Ana Lopez.zip")
@@ -385,7 +389,7 @@ def test_any_name_that_canvas_gives_is_a_row(course: Path, staging: Path, name: 
     assert row.key.isprintable() and row.key.endswith("_12")
 
 
-def test_files_of_canvas_that_cannot_be_read_are_told_on_their_row(
+def test_files_of_canvas_that_cannot_be_read_are_reported_on_their_row(
     course: Path, staging: Path
 ) -> None:
     (course / "ana_1_10_node.py").write_text("pass")
@@ -402,7 +406,9 @@ def test_files_of_canvas_that_cannot_be_read_are_told_on_their_row(
     assert rows["cai_3"].path is not None and not rows["cai_3"].fault
 
 
-def test_who_is_in_the_roster_twice_is_told_on_the_row(course: Path, staging: Path) -> None:
+def test_a_student_who_is_in_the_roster_twice_is_reported_on_the_row(
+    course: Path, staging: Path
+) -> None:
     folder(course / "ana")
     roster = parse_roster("login,name\nana,Ana\nben,Ben\nana,Ana\nben,Ben\nben,Ben\n", "r.csv")
     rows = {row.key: row for row in take_in(course, staging, roster)}
@@ -411,7 +417,7 @@ def test_who_is_in_the_roster_twice_is_told_on_the_row(course: Path, staging: Pa
     assert len(rows) == 2
 
 
-def test_a_number_behind_a_name_is_taken_from_nobody(course: Path, staging: Path) -> None:
+def test_a_numbered_name_stays_that_of_its_entry(course: Path, staging: Path) -> None:
     folder(course / "ana")
     archive(course / "ana.zip")
     archive(course / "ana (2).zip")
@@ -454,7 +460,7 @@ def test_one_submission_is_not_taken_for_a_class(course: Path, staging: Path) ->
         take_in(course, staging)
 
 
-def test_an_empty_class_is_said(course: Path, staging: Path) -> None:
+def test_an_empty_class_is_reported(course: Path, staging: Path) -> None:
     with pytest.raises(UsageError, match="holds no submission"):
         take_in(course, staging)
 
@@ -496,7 +502,7 @@ def test_a_team_s_repository_is_fetched_once(tmp_path: Path, staging: Path) -> N
     assert [row.problem for row in (ana, ben, cai)] == ["", "", "handed in nothing"]
 
 
-def test_a_path_that_no_file_can_have_is_told_on_its_row(tmp_path: Path, staging: Path) -> None:
+def test_a_path_that_no_file_can_have_is_reported_on_its_row(tmp_path: Path, staging: Path) -> None:
     folder(tmp_path / "here")
     named = {"ana": "here", "ben": "x" * 300, "cai": "a\0b"}
     roster = Roster(tuple(Student(2, login=who, submission=path) for who, path in named.items()))
@@ -539,7 +545,7 @@ def test_a_roster_in_an_unknown_encoding_is_refused(tmp_path: Path) -> None:
         read_roster(file)
 
 
-def test_a_quote_that_nothing_closes_swallows_nobody() -> None:
+def test_a_quote_that_nothing_closes_swallows_no_student() -> None:
     with pytest.raises(UsageError, match=r"r\.csv:3: is not CSV: is a quote \(\"\) missing\?"):
         parse_roster('login,name\nana,Ana\nben,"Ben\ncai,Cai\ndan,Dan', "r.csv")
 

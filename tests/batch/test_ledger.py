@@ -92,7 +92,7 @@ def test_two_batches_do_not_write_to_one_folder(tmp_path: Path) -> None:
 
 def test_a_folder_with_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("x")
-    with pytest.raises(UsageError, match="holds something else"), Ledger(tmp_path).opened():
+    with pytest.raises(UsageError, match="holds other files"), Ledger(tmp_path).opened():
         pass
     assert [item.name for item in tmp_path.iterdir()] == ["thesis.tex"]
 

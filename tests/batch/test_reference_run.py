@@ -91,7 +91,7 @@ def test_a_damaged_file_is_refused(tmp_path, content):
         read_references(loaded)
 
 
-def test_what_is_kept_is_told(tmp_path):
+def test_what_is_kept_is_named(tmp_path):
     loaded, recordings = make(tmp_path)
     told = keep_reference(loaded, grade(loaded, make_submission(), recordings), recordings)
     assert told.endswith(f"1 run of the reference kept in {tmp_path / REFERENCE_FILE}")

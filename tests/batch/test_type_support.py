@@ -33,9 +33,7 @@ def test_the_copy_is_that_of_the_reference() -> None:
         assert copy.read_bytes() == reference.read_bytes(), copy
 
 
-def test_what_somebody_has_deleted_is_built_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_was_deleted_is_built_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     built: list[Path] = []
     installation = RosInstallation("wheels", tmp_path / "python", (tmp_path,))
 

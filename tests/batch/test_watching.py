@@ -18,7 +18,7 @@ from tests.report.sample import full_points
 
 
 class Played:
-    """Grades when it is told to."""
+    """Grades when the test lets it."""
 
     def __init__(self, submission: Path) -> None:
         self.submission = submission
@@ -147,7 +147,7 @@ def test_the_end_ends_what_runs(watched: SimpleNamespace) -> None:
     assert watched.played.cancelled.is_set()
 
 
-def test_an_error_is_told_and_watching_goes_on(watched: SimpleNamespace) -> None:
+def test_an_error_is_reported_and_watching_goes_on(watched: SimpleNamespace) -> None:
     watched.played.error = UsageError("no such thing")
     next(watched.events)
     event = next(watched.events)

@@ -20,7 +20,7 @@ OFFLINE = (
     "--disable-component-update",
     "--disable-sync",
     "--no-first-run",
-    # Whatever is asked for by name is not found; only this machine itself is.
+    # No name is found but that of this machine itself.
     "--host-resolver-rules=MAP * ~NOTFOUND,EXCLUDE 127.0.0.1",
 )
 MISSING = "no Chromium here, so no page was looked at: sudo apt install chromium"

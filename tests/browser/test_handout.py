@@ -49,7 +49,7 @@ def test_the_page_of_a_watched_submission_follows_by_itself(
         expect(frame.locator(".score .value")).to_have_text("3.02")
         expect(page.get_by_role("status")).to_have_text("grading")
         write(full_points())
-        served.tell("3 of 3 points", "3 of 3 points: Publish", is_new=True)
+        served.show("3 of 3 points", "3 of 3 points: Publish", is_new=True)
         expect(frame.locator(".score .value")).to_have_text("3")
         expect(page.get_by_role("status")).to_have_text("3 of 3 points")
         expect(page).to_have_title("3 of 3 points: Publish")

@@ -30,7 +30,7 @@ def test_an_overview_is_accessible_quiet_and_fits(look, page_of_few, width, sche
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-def test_nothing_that_is_said_of_a_submission_or_a_check_is_cut_off(look, width):
+def test_no_text_about_a_submission_or_a_check_is_cut_off(look, width):
     note = "handed in twice: a.zip too; " * 5
     rows = [replace(row, note=note) for row in classroom(FEW)]
     page = look(render_overview(rows), width).page

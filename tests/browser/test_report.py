@@ -110,7 +110,9 @@ class TestReplay:
             assert 6 < inner["height"] < 40
             assert outer["x"] <= inner["x"] and outer["y"] <= inner["y"]
             assert inner["y"] < circle.bounding_box()["y"] + 2
-            assert "m from the goal (dashed: within 8 cm)" in side.locator(".told").text_content()
+            assert (
+                "m from the goal (dashed: within 8 cm)" in side.locator(".readout").text_content()
+            )
         found.page.locator(".replay").evaluate("(root) => root.scrollIntoView()")
         found.keep("replay-goal")
         assert found.complaints == []
@@ -120,7 +122,7 @@ class TestReplay:
         page = found.page
         page.locator(".replay input").focus()
         page.keyboard.press("End")
-        mine, theirs = page.locator(".replay .told").all_text_contents()
+        mine, theirs = page.locator(".replay .readout").all_text_contents()
         assert "It touches something." in mine and "Commanded 0.10 m/s" in mine
         assert "Commanded 0.00 m/s" in theirs and "true 0.00 m/s" in theirs
         said = page.locator(".replay .said-so-far").first.text_content()
@@ -194,7 +196,7 @@ def test_the_whole_report_is_printed(look, pages, tmp_path):
     found.page.emulate_media(media="print")
     assert found.page.locator(".replay").is_hidden()
     assert found.page.locator(".contents").is_hidden()
-    # Paper is white, whatever the screen is.
+    # Paper is white, also where the screen is dark.
     ink = found.page.evaluate("() => getComputedStyle(document.body).color")
     assert ink == "rgb(26, 32, 43)"
 

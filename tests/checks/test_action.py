@@ -81,7 +81,7 @@ def test_a_right_action_passes(check, run, parameters, observed):
             "result",
             acting(goal(accepted=None, error="no server"), services=()),
             RESULT,
-            "has no action of its own",
+            "created no action",
         ),
         ("feedback", acting(goal(feedback=())), FEEDBACK, "gave 0 messages of feedback"),
         ("feedback", acting(goal(feedback=())), FEEDBACK, "publish_feedback"),
@@ -113,7 +113,7 @@ def test_a_right_action_passes(check, run, parameters, observed):
             "cancels",
             acting(canceled(end_s=0.1, status="succeeded", **UNASKED)),
             FIB,
-            "succeeded 90 ms after it was accepted, before it was to be ended",
+            "succeeded 90 ms after it was accepted: too early for this check",
         ),
         ("preempts", preempting(status="succeeded", end_s=2.0), FIB, "worked on to its end"),
         ("preempts", preempting(end_s=None), FIB, "was still worked on at the end"),
@@ -127,7 +127,7 @@ def test_a_right_action_passes(check, run, parameters, observed):
         ),
     ],
 )
-def test_what_is_wrong_is_told(check, run, parameters, words):
+def test_what_is_wrong_is_reported(check, run, parameters, words):
     assert words in failing(f"action.{check}", run, **parameters)
 
 
@@ -156,14 +156,14 @@ def test_what_the_machine_or_the_probe_did_is_judged_in_another_run(check, run, 
     assert (finding.status, finding.disturbed) == (Status.ERROR, True)
 
 
-def test_what_was_not_aborted_is_not_said_to_be():
+def test_a_goal_that_was_not_aborted_is_not_called_aborted():
     run = acting(goal(status="succeeded"))
     found = failing("action.result", run, **{**RESULT, "status": "aborted"})
     assert "goal_handle.abort()" in found and "rclpy aborts" not in found
 
 
 def test_a_rate_needs_some_feedback():
-    with pytest.raises(ValueError, match="a rate needs at_least: 3"):
+    with pytest.raises(ValueError, match="'rate' needs 'at_least': 3"):
         judge("action.feedback", acting(goal()), **FIB, rate="10 Hz")
 
 
@@ -190,7 +190,7 @@ def test_an_exception_that_rclpy_caught_is_the_cause(check, run):
         ("preempts", preempting(end_s=None), "was still worked on at the end: the process"),
     ],
 )
-def test_a_server_that_dies_is_the_cause_whatever_the_machine_took(check, run, words):
+def test_a_server_that_ends_is_the_cause_even_on_a_busy_machine(check, run, words):
     run = replace(
         run, processes=(died(-6, 1.6),), ending=Ending.EXITED, stop_ns=at(1.6),
         disturbance=taken(1.5, 1.6, waited_s=0.02),

@@ -95,7 +95,7 @@ def test_what_needs_no_entry(unneeded):
         ),
     ],
 )
-def test_an_entry_that_does_not_help_is_told(dependencies, words):
+def test_an_entry_that_does_not_help_is_reported(dependencies, words):
     finding = judged(*dependencies)
     assert finding.status is Status.FAILED
     assert words in f"{finding.observed} | {finding.hint}"

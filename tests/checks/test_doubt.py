@@ -86,7 +86,7 @@ def test_silence_on_a_busy_machine_is_doubtful(
         ({"exit_code": -9, "stopped_by": "SIGKILL"}, False),
     ],
 )
-def test_a_signal_that_anybody_may_have_sent_must_come_twice(
+def test_a_signal_that_any_process_may_have_sent_must_come_twice(
     ended: dict[str, Any], doubtful: bool
 ) -> None:
     killed = recording(processes=(process(**{"exited_s": 1.2, "stopped_by": "itself", **ended}),))

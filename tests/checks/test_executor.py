@@ -87,7 +87,7 @@ class TestGood:
         assert finding.status is Status.PASSED
         assert "the process declared a timer and that its executor spins" in finding.observed
 
-    def test_what_a_process_says_of_itself_is_no_proof_where_it_left_nothing_to_ask(self):
+    def test_declarations_are_no_proof_where_a_process_left_nothing_to_call(self):
         unasked = recording(calls=())
         assert "has none of the services" in failing("executor.responsive", unasked)
         # Of what a busy machine loses nothing is known.
@@ -106,7 +106,7 @@ class TestGood:
         found = failing("executor.responsive", recording(services=(helper,)))
         assert "`/bot_publisher` has none of the services" in found
 
-    def test_a_second_node_that_nobody_spins_and_that_is_not_on_the_topic(self):
+    def test_a_second_node_without_a_spin_that_is_not_on_the_topic(self):
         settings = "/settings"
         run = recording(
             nodes=(node(), node(settings)),
@@ -130,7 +130,7 @@ class TestMostlyBusy:
         held = declared("held", 2.4, topic="/cmd_vel", waited_s=2.0, matched=False)
         run = replace(silent_run, declarations=(*silent_run.declarations, held))
         assert responsive(run).status is Status.PASSED
-        # Nobody is held for so long.
+        # No publisher is held for so long.
         lying = replace(run, declarations=(*silent_run.declarations, replace(held, time_ns=at(4))))
         assert responsive(lying).status is Status.FAILED
 
@@ -159,7 +159,7 @@ class TestBlocked:
         assert "answered 0 of 6 calls within 1 s" in found
         assert "while 12 messages were published" in found
         assert "rclpy.spin() was never called" in found
-        assert "let nothing before it wait or loop for ever" in found
+        assert "Nothing before it may wait or loop for ever" in found
 
     def test_the_line_of_the_loop_is_named(self):
         log = output(traceback("KeyboardInterrupt", source="time.sleep(0.3)", line=17))
@@ -172,7 +172,7 @@ class TestBlocked:
         traced = (*declarations(spin=False), spin)
         found = failing("executor.responsive", recording(calls=calls(None), declarations=traced))
         assert ": an executor spins, but" in found
-        assert "`/bot_publisher` was not given to it" in found
+        assert "`/bot_publisher` was not added to it" in found
 
     def test_a_loop_in_a_callback(self):
         found = failing("executor.responsive", recording(calls=calls(None)))

@@ -159,7 +159,7 @@ class TestPasses:
         both = {STATUS: (*start, *good.on(STATUS)[6:]), ODOM: SOURCES}
         assert verdict(recording(messages=both)).status is Status.PASSED
 
-    def test_whether_a_node_lags_is_not_said_where_the_machine_kept_it_waiting(self):
+    def test_no_lag_is_reported_where_the_machine_kept_the_node_waiting(self):
         late = run(lambda t: right(t - 0.8), times=TIMES[20:])
         assert verdict(late).status is Status.FAILED
         busy = recording(messages=late.messages, disturbance=taken(0.1, 4.0, waited_s=1.0))
@@ -193,9 +193,9 @@ class TestExplains:
             (lambda heading: -heading, "the yaw with the wrong sign"),
             (lambda heading: heading / 2, "half of the yaw"),
             (lambda heading: 2 * math.acos(math.cos(heading / 2)), "lost the sign"),
-            (lambda heading: math.atan(math.tan(heading)), "without its quadrant"),
-            (lambda _: 0.0, "the same number in every message"),
-            (lambda _: 0.5, "the same number in every message"),
+            (lambda heading: math.atan(math.tan(heading)), "in a wrong quadrant"),
+            (lambda _: 0.0, "no change from message to message"),
+            (lambda _: 0.5, "no change from message to message"),
             (lambda _: math.nan, "not a finite number"),
         ],
     )
@@ -268,7 +268,12 @@ class TestExplains:
     def test_values_that_never_change(self):
         found = failure(run(lambda _: right(FIRST_S)))
         assert "`pose.x` = 0 instead of" in found
-        assert found.count("the same number in every message") == 1
+        assert found.count("no change from message to message") == 1
+
+    def test_fields_that_are_wrong_in_the_same_way_are_explained_together(self):
+        found = failure(run(lambda t: status(9.0, math.degrees(place(t)[1]), 9.0)))
+        assert found.count("no change from message to message") == 1
+        assert "`speed` = 9" in found.partition(";")[0] and "the yaw in degrees" in found
 
     def test_values_that_lag_are_explained(self):
         found = failure(run(lambda t: right(t - 1.0), times=TIMES[20:]))

@@ -140,11 +140,11 @@ class TestFields:
             ("float64[", "float32[", "`float32[2] velocities` instead"),
             ("Pose2D", "Pose", "`geometry_msgs/Pose pose` instead of `geometry_msgs/Pose2D pose`"),
             ("geometry_msgs/", "", "A type without a package is sought in bot_msgs itself"),
-            ("uint8 model", "uint8 model\nbool on", "a field `bool on` too many"),
+            ("uint8 model", "uint8 model\nbool on", "a field `bool on` that is not asked for"),
             ("BURGER=1", "BURGER 1", "A constant has an equals sign"),
         ],
     )
-    def test_each_difference_is_told(self, old, new, words):
+    def test_each_difference_is_reported(self, old, new, words):
         found = self.fields(TEXT.replace(old, new))
         assert found.status is Status.FAILED
         assert words in f"{found.observed} | {found.hint}"
@@ -208,7 +208,7 @@ class TestConstants:
             ("BURGER=1", "BURGER 1", "no constant `uint8 BURGER=1`"),
         ],
     )
-    def test_each_difference_is_told(self, old, new, words):
+    def test_each_difference_is_reported(self, old, new, words):
         found = self.constants(TEXT.replace(old, new))
         assert found.status is Status.FAILED
         assert words in found.observed
@@ -227,15 +227,19 @@ class TestGenerated:
         [
             ("rosidl_generate_interfaces(", "rosidl_generate_interface(", "which does not exist"),
             (CMAKE[CMAKE.index("rosidl_gen") :], "ament_package()\n", "never calls rosidl_gen"),
-            ("find_package(rosidl_default_generators REQUIRED)\n", "", "does not find `rosidl_"),
+            (
+                "find_package(rosidl_default_generators REQUIRED)\n",
+                "",
+                "no find_package() for `rosidl_",
+            ),
             ('"msg/BotStatus.msg"', '"BotStatus.msg"', "BotStatus.msg`, but `BotS"),
             ('"msg/BotStatus.msg"', '"msg/Wheel.srv"', "does not list `msg/BotStatus.msg`, but"),
             ('  "msg/BotStatus.msg"\n', "", "does not list `msg/BotStatus.msg` in"),
             ("  DEPENDENCIES geometry_msgs\n", "", "does not name `geometry_msgs` under DEPEND"),
-            ("find_package(geometry_msgs REQUIRED)\n", "", "does not find `geometry_msgs`"),
+            ("find_package(geometry_msgs REQUIRED)\n", "", "no find_package() for `geometry_msgs`"),
         ],
     )
-    def test_what_cmake_lacks_is_told(self, old, new, words):
+    def test_what_cmake_lacks_is_reported(self, old, new, words):
         assert old in CMAKE
         finding = judge(
             "interface.generated", unbuilt(cmake=CMAKE.replace(old, new)), interface=INTERFACE

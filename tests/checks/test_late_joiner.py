@@ -60,7 +60,7 @@ def failure(run):
 def test_the_last_ten_messages_pass():
     finding = verdict(joined(10))
     assert finding.status is Status.PASSED
-    assert finding.observed == "it got 10 of the 12 messages before it"
+    assert finding.observed == "it got 10 of the 12 messages published before it"
     rows = finding.evidence.tables[0].rows
     assert [row[2] for row in rows] == ["no"] * 2 + ["yes"] * 10
 
@@ -77,9 +77,9 @@ def test_a_message_right_after_the_match_counts_for_nothing_of_the_past():
     assert "got 9 of the 12" in failure(joined(9, depth=9, joins=(late,)))
 
 
-def test_a_longer_queue_loses_and_is_told():
+def test_a_longer_queue_loses_points_and_is_reported():
     found = failure(joined(12, depth=100))
-    assert "it got 12 of the 12 messages before it: the publisher's depth is 100" in found
+    assert "it got 12 of the 12 messages published before it: the publisher's depth is 100" in found
     assert "depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL" in found
 
 
@@ -95,7 +95,9 @@ def test_publishers_that_were_destroyed_took_along_what_they_kept():
     gone = [replace(item, vanished_ns=item.appeared_ns + NS // 2) for item in own[:-1]]
     run = joined(1, endpoints=(*gone, own[-1], reader()))
     found = failure(run)
-    assert "lost with it, and 11 publishers were destroyed before it joined" in found
+    assert (
+        "11 publishers were destroyed before it joined, and what a publisher keeps is lost" in found
+    )
     assert "Call create_publisher once" in found
 
 
@@ -105,9 +107,9 @@ def test_a_publisher_that_was_out_of_sight_is_not_the_student_s_fault():
     assert verdict(run).status is Status.ERROR
 
 
-def test_a_shorter_queue_loses_and_is_told():
+def test_a_shorter_queue_loses_points_and_is_reported():
     found = failure(joined(9, depth=9))
-    assert "it got 9 of the 12 messages before it: the publisher's depth is 9" in found
+    assert "it got 9 of the 12 messages published before it: the publisher's depth is 9" in found
 
 
 def test_a_queue_that_nothing_declared():
@@ -122,7 +124,9 @@ def test_a_history_that_was_lost_is_not_the_student_s_fault():
 def test_a_lifespan_that_is_over():
     short = replace(LATCHED, lifespan_s=1.0)
     found = failure(joined(2, qos=short))
-    assert "it got 2 of the 12 messages before it: the publisher's lifespan is 1 s" in found
+    assert (
+        "it got 2 of the 12 messages published before it: the publisher's lifespan is 1 s" in found
+    )
     assert "Leave `lifespan` out" in found
 
 
@@ -147,7 +151,7 @@ def test_nothing_of_the_past():
     nothing = LAST_10 | {"last": 0}
     assert judge("qos.late_joiner", run, **nothing).status is Status.PASSED
     found = failing("qos.late_joiner", joined(10), **nothing)
-    assert "it got 10 of the 12 messages before it" in found
+    assert "it got 10 of the 12 messages published before it" in found
     assert "A volatile publisher keeps nothing" in found
 
 
@@ -182,7 +186,7 @@ def unheard(kept, published, **changes):
 def test_where_nothing_is_subscribed_before_the_messages_numbers_tell_how_many_came():
     finding = verdict(unheard(10, 12))
     assert finding.status is Status.PASSED
-    assert finding.observed == "it got 10 of the 12 messages before it"
+    assert finding.observed == "it got 10 of the 12 messages published before it"
     assert "got 9 of the 12 messages" in failure(unheard(9, 12, depth=9))
     assert "got 12 of the 12 messages" in failure(unheard(12, 12, depth=100))
 
@@ -190,7 +194,8 @@ def test_where_nothing_is_subscribed_before_the_messages_numbers_tell_how_many_c
 @pytest.mark.parametrize("published", [0, 1, 10])
 def test_a_publisher_that_waits_for_a_subscription_fails(published):
     found = failure(unheard(published, published))
-    assert f"before it, {published} message" in found
+    assert f"{published} message" in found
+    assert "published before it, while there was no subscription" in found
     assert "whether or not there is a subscription" in found
 
 

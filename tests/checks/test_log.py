@@ -248,7 +248,7 @@ class TestAnyRhythmIsRight:
         log = lines("1.83", [3.9])
         slow = front(log, calls=tuple(call(0.5 * n, 1.0, of=BOT) for n in range(1, 7)))
         assert "only 1 of 6 messages on `/scan`" in slow
-        assert "the node's parameter service waited 1 s and more" in slow
+        assert "the node's parameter service waited 1 s or more" in slow
         assert "time.sleep()" in slow
         lost = (*(call(0.5 * n, of=BOT) for n in range(2, 7)), call(0.5, None, of=BOT))
         assert "waited" not in front(log) and "waited" not in front(log, calls=lost)
@@ -292,7 +292,7 @@ class TestAnyRhythmIsRight:
         waiting = (call(1.1, 1.9, BOT), call(1.6, 1.4, BOT), call(2.1, 0.9, BOT))
         asleep = run(lines("1.37 -0.62", [1.0, 3.0]), messages=messages, calls=waiting)
         found = failing("log.follows", asleep, **asked)
-        assert "calls to the node's parameter service waited 1.4 s and more" in found
+        assert "calls to the node's parameter service waited 1.4 s or more" in found
         assert "A callback must return soon" in found and "Log in every call" not in found
         machine = run(
             lines("1.37 -0.62", [1.0, 3.0]), messages=messages,
@@ -320,9 +320,9 @@ class TestOtherValues:
         assert "none shows `pose.pose.position.x` = 1.37" in position(lines(text, ODOM_TIMES_S))
 
     @pytest.mark.parametrize("text", ["x = -0.62, y = 1.37", "x: -0.62\ny: 1.37"])
-    def test_that_they_are_exchanged_is_said(self, text):
+    def test_exchanged_names_are_reported(self, text):
         found = position(lines(text, ODOM_TIMES_S))
-        assert "`pose.pose.position.x` and `pose.pose.position.y` are exchanged" in found
+        assert "`pose.pose.position.x` and `pose.pose.position.y` are swapped" in found
 
     def test_a_right_line_beside_an_exchanged_one_counts(self):
         text = "x = -0.62, y = 1.37\nx = 1.37, y = -0.62"
@@ -333,9 +333,9 @@ class TestOtherValues:
         asked = {**FRONT, "fields": ["data"]}
         whole = run(lines("7", SCAN_TIMES_S), **scanned({"data": 765072}))
         finding = judge("log.follows", whole, **asked)
-        assert "messages on `/scan`, within 500 ms" in finding.expected
+        assert "on `/scan`, each within 500 ms" in finding.expected
         finding = judge("log.follows", run(), **FRONT)
-        assert "messages on `/scan`, to 2 decimals, within 500 ms" in finding.expected
+        assert "on `/scan` to 2 decimals, each within 500 ms" in finding.expected
 
     def test_what_is_written_at_ctrl_c_answers_no_message(self):
         log = lines("2.50", SCAN_TIMES_S) + output(traceback("KeyboardInterrupt"), time_s=4.25)
@@ -394,7 +394,7 @@ class TestWhatKeepsLinesBack:
         calls = (call(0.5, of=BOT), call(1.5, None, of=BOT), call(2.0, None, of=BOT))
         found = front(lines("1.37 -0.62", ODOM_TIMES_S), calls=calls)
         assert "something blocks the executor" in found
-        assert "from 1.50 s after launch on the node's parameter service answers no call" in found
+        assert "from 1.50 s after launch on the node's parameter service does not answer" in found
         assert "`while True`" in found
         busy = taken(1.0, 4.0, waited_s=2.0)
         assert "blocks the executor" in front(

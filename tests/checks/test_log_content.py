@@ -73,11 +73,11 @@ class TestContains:
         finding = judge("log.contains", run, pattern=r"x = \d+\.\d+$", at_most=1)
         assert finding.status is Status.PASSED
 
-    def test_another_level_is_told(self):
+    def test_another_level_is_reported(self):
         found = failing("log.contains", logging(logs("ready", level="WARN")), **READY)
         assert "`ready` is logged as WARN, not as INFO" in found
 
-    def test_what_is_only_printed_is_told(self):
+    def test_what_is_only_printed_is_reported(self):
         found = failing("log.contains", logging(output("ready", stream="stdout")), **READY)
         assert "`ready` is printed, not logged" in found
 
@@ -95,7 +95,7 @@ class TestContains:
         assert "the callbacks keep each other waiting" in found
         assert "get_logger" not in found
 
-    def test_an_empty_log_is_told(self):
+    def test_an_empty_log_is_reported(self):
         assert "the node logs nothing" in failing("log.contains", recording(), **READY)
 
     def test_too_many_lines_are_counted(self):

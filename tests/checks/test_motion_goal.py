@@ -190,7 +190,7 @@ def test_huge_commands_break_nothing(huge):
     assert math.isfinite(verdict.r2) and verdict.r2 < 0.9
 
 
-def test_the_gain_is_told():
+def test_the_gain_is_reported():
     run = run_to(GOAL, angular=1.7)
     finding = judge("motion.proportional", run, goal=yaml(GOAL), phase="align")
     assert finding.status is Status.PASSED
@@ -319,7 +319,7 @@ class TestMistakes:
 
     def test_the_same_speed_all_the_way(self):
         said = failing("motion.slows_down", run_to(GOAL, constant=0.1))
-        assert "0.1 m/s at the end, 0.1 m/s at most" in said
+        assert "0.1 m/s at the end; the largest is 0.1 m/s" in said
         assert "linear.x = gain * distance" in said
 
     @pytest.mark.parametrize(
@@ -394,30 +394,30 @@ class TestMistakes:
         run = replace(run, log=output(interrupted, time_s=30.0))
         said = failing("motion.path_length", run, goal=yaml(GOAL), most="40 %")
         assert f"a callback was at {SOURCE}:14 when it was interrupted" in said
-        assert "compute one command for each" in said
+        assert "Compute one command for each message" in said
 
     def test_turns_a_little_too_little(self):
         run = run_to(GOAL, straight=0.08)
         said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.1 m", heading="0.03 rad")
-        assert "within the tolerance" in said and "print yaw" in said
+        assert "below the tolerance" in said and "Print yaw" in said
 
     def test_ends_a_little_before_the_goal(self):
         run = run_to(GOAL)
         said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.03 m", heading="0.1 rad")
-        assert "cm from the goal" in said and "smaller than the tolerance" in said
+        assert "cm from the goal" in said and "below the tolerance" in said
 
     @pytest.mark.parametrize(
         ("goal", "words"),
         [
             ((GOAL[1], GOAL[0], GOAL[2]), "x and y swapped"),
             ((GOAL[0], -GOAL[1], GOAL[2]), "the sign of y changed"),
-            ((GOAL[0], GOAL[1], math.radians(GOAL[2])), "taken for degrees"),
+            ((GOAL[0], GOAL[1], math.radians(GOAL[2])), "or were in degrees"),
             ((GOAL[0], GOAL[1], 0.0), "as if the goal's heading were 0"),
-            ((GOAL[0], GOAL[1], -GOAL[2]), "its sign changed"),
+            ((GOAL[0], GOAL[1], -GOAL[2]), "heading with the wrong sign"),
             ((0.4, 0.2, 0.0), "came to rest at (0.3"),
         ],
     )
-    def test_another_goal_is_told(self, goal, words):
+    def test_another_goal_is_reported(self, goal, words):
         run = run_to((*goal[:2], wrap(goal[2])))
         assert words in failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
 
@@ -425,21 +425,21 @@ class TestMistakes:
         start = (0.4, -0.3, 1.0)
         run = run_to((start[0] + GOAL[0], start[1] + GOAL[1], GOAL[2]), start)
         said = failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
-        assert "counted from where the robot started" in said
+        assert "measured from where the robot started" in said
 
-    def test_a_robot_that_is_too_slow_is_told(self):
+    def test_a_robot_that_is_too_slow_is_reported(self):
         run = run_to(GOAL, linear=0.02, seconds=20)
         assert (
-            "if it is on its way, it is too slow"
+            "if it drives to the goal, it is too slow"
             in failing("motion.reaches", run, goal=yaml(GOAL), **REACHES).lower()
         )
 
-    def test_a_robot_that_never_stops_turning_is_told(self):
+    def test_a_robot_that_never_stops_turning_is_reported(self):
         run = run_to(GOAL, align_law=lambda _: 0.5, straight=0.0, seconds=30)
         said = failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
         assert "still turns at 0.5 rad/s" in said or "not at rest" in said
         said = failing("motion.settles", run, within="20 s")
-        assert "after 29.99 s not at rest when the observation ends" in said
+        assert "after 29.99 s it is not at rest when the observation ends" in said
 
     def test_straight_past_the_goal_is_no_second_phase(self):
         """It drives 5 cm past the goal at (0.6, 0) and aligns there."""
@@ -457,7 +457,7 @@ class TestMistakes:
     def test_a_detour_is_measured(self):
         run = run_to((-0.8, 0.1, 0.0), angular=0.5, linear=0.3, seconds=60)
         said = failing("motion.path_length", run, goal=yaml((-0.8, 0.1, 0.0)), most="20 %")
-        assert "longer" in said and "Look at its heading on the way" in said
+        assert "longer" in said and "turn to the goal at once" in said
 
     def test_a_callback_that_sleeps_while_the_robot_turns(self):
         student, until_s = Student(GOAL), [0.0]
@@ -535,11 +535,11 @@ def test_drive_plain_silence_says_why():
             assert "the robot never moved" in failing(name, run, **parameters)
 
 
-def test_a_robot_that_turns_the_long_way_and_never_rests_is_told_to_normalise_the_error():
+def test_a_robot_that_turns_the_long_way_and_never_rests_gets_the_advice_to_normalise_the_error():
     run = run_to(BEHIND, seconds=30.0, wrap=lambda error: error)
     finding = judge("motion.path_length", run, goal=yaml(BEHIND), position="8 cm", most="180 %")
     assert finding.status is Status.FAILED
-    assert "turned away from the goal through half a turn, 10 times" in finding.observed
+    assert "turned away from the goal, the long way round, 10 times" in finding.observed
     assert "atan2(sin(e), cos(e))" in finding.hint
 
 
@@ -549,9 +549,9 @@ def test_a_robot_that_turns_the_long_way_and_never_rests_is_told_to_normalise_th
         # (w, x, y, z) taken for (x, y, z, w): of a robot on the ground that is always 0.
         (lambda _: 0.0, "as if yaw were always 0", "x, y, z, w"),
         (math.degrees, "as if yaw were in degrees", "radians"),
-        (lambda yaw: yaw / 2, "as if yaw were half of what it is", "2 * atan2(z, w)"),
+        (lambda yaw: yaw / 2, "as if yaw were half of the true yaw", "2 * atan2(z, w)"),
         (lambda yaw: math.sin(yaw / 2), "as if yaw were z of the quaternion", "half the angle"),
-        (lambda yaw: -yaw, "with its sign changed", "Counter-clockwise"),
+        (lambda yaw: -yaw, "with the wrong sign", "Counter-clockwise"),
     ],
 )
 @pytest.mark.parametrize("style", [{}, {"wrap": lambda error: error}, {"spin": 1.0}])
@@ -563,7 +563,7 @@ def test_a_yaw_that_was_read_wrongly_is_named(yaw, words, hint, style):
     assert hint in finding.hint
 
 
-def test_a_robot_that_turns_on_and_on_is_told_to_look_at_its_yaw():
+def test_a_robot_that_turns_on_and_on_gets_the_advice_to_look_at_its_yaw():
     """Its commands follow nothing, and say nothing of what it took for its yaw."""
     run = run_to((0.6, 0.4, 1.0), law=lambda error: 0.5 + 0.1 * math.sin(20.0 * error))
     finding = judge("motion.reaches", run, goal=yaml((0.6, 0.4, 1.0)), **REACHES)
@@ -574,4 +574,4 @@ def test_a_yaw_that_knows_half_of_the_circle_is_named():
     goal = (-0.6, 0.15, 0.0)
     run = run_to(goal, yaw=lambda yaw: math.asin(math.sin(yaw)))
     finding = judge("motion.reaches", run, goal=yaml(goal), **REACHES)
-    assert "as if yaw were never beyond -90° and 90°" in finding.observed
+    assert "as if yaw were always between -90° and 90°" in finding.observed

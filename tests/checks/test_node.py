@@ -59,7 +59,7 @@ class TestExists:
         assert "`/bot_publisher` is there, but `/pub` publishes on `/cmd_vel`" in found
 
     @pytest.mark.parametrize("topic", ["/cmd_vel", "/elsewhere"])
-    def test_it_publishes_itself_or_nobody_does(self, topic):
+    def test_it_publishes_itself_or_nothing_does(self, topic):
         run = recording(endpoints=(endpoint(topic), reader()))
         assert judge("node.exists", run, name=NODE, publishes="/cmd_vel").status is Status.PASSED
 
@@ -105,7 +105,7 @@ class TestExists:
         ("name", "hint"),
         [
             ("Twist", "import it at the top of the file: `from geometry_msgs.msg import Twist`"),
-            ("rclpy", "`import rclpy`. Otherwise it is used"),
+            ("rclpy", "`import rclpy`. Otherwise it is misspelt"),
         ],
     )
     def test_an_undefined_name_of_ros_comes_with_its_import(self, name, hint):
@@ -169,7 +169,7 @@ class TestExists:
         run = nodeless(declarations=(declared("started"), declared("init")))
         assert "called rclpy.init() but created no node" in failing("node.exists", run, name=NODE)
 
-    def test_without_a_tracer_nothing_is_said_of_init(self):
+    def test_without_a_tracer_init_is_not_mentioned(self):
         found = failing("node.exists", nodeless(declarations=()), name=NODE)
         assert "ran until the end, but created no node" in found
         assert "never called" not in found
@@ -187,7 +187,7 @@ class TestExists:
         run = nodeless(declarations=(*said, declared("node", node=NODE)))
         busy = replace(run, disturbance=taken(0.1, 1.0, waited_s=2.0))
         found = failing("node.exists", busy, name=NODE)
-        assert "the program changed ROS_DISCOVERY_SERVER, by which a node finds others" in found
+        assert "changed ROS_DISCOVERY_SERVER, which nodes use to find each other" in found
 
     @pytest.mark.parametrize(
         ("actual", "words"),
@@ -263,7 +263,7 @@ class TestAlive:
         assert finding.status is Status.FAILED
         assert str(breach) in finding.observed and finding.hint
 
-    def test_a_node_that_runs_until_sigint_passes_whatever_its_exit_code(self):
+    def test_a_node_that_runs_until_sigint_passes_with_any_exit_code(self):
         for exit_code in (0, 1, -2, 130):
             run = recording(processes=(process(exit_code=exit_code),))
             assert judge("node.alive", run, name=NODE).status is Status.PASSED
@@ -396,7 +396,7 @@ class TestEnds:
         run = recording(processes=(process(exit_code=1),), log=log)
         assert judge("node.ends", run, within="2 s").status is Status.PASSED
 
-    def test_ending_too_late_is_told(self):
+    def test_ending_too_late_is_reported(self):
         run = recording(processes=(process(exited_s=7.7, stop_s=3.2),), end_s=7.7)
         found = failing("node.ends", run, within="2 s")
         assert "needed 3.2 s to end after SIGINT" in found
@@ -476,7 +476,7 @@ class TestKilledByTheScenario:
     def test_only_the_end_of_its_second_life_counts(self):
         assert judge("node.ends", self.run(), within="1 s").status is Status.PASSED
 
-    def test_a_restart_that_dies_is_told(self):
+    def test_a_restart_that_dies_is_reported(self):
         killed = self.run().processes[0]
         run = self.run(processes=(killed, died(1, exited_s=3.0)))
         assert "exit code 1" in failing("node.alive", run)

@@ -107,7 +107,7 @@ class TestBuilds:
         assert "notes" not in finding.observed
         assert finding.evidence.log[-1] == "NameError: name 'x' is not defined"
 
-    def test_the_error_of_a_package_that_it_waits_for_is_told(self):
+    def test_the_error_of_a_package_that_it_waits_for_is_reported(self):
         other = SourceError("src/notes/setup.py", 1, "RuntimeError: not finished")
         log = "Starting >>> notes\nRuntimeError: not finished\nFailed   <<< notes\n"
         finding = self.found(build=failed_build("notes", NAME, culprit=other, log=log))
@@ -122,7 +122,7 @@ class TestBuilds:
             "NameError: name 'x' is not defined",
         )
 
-    def test_the_log_ends_where_the_culprit_is_blamed(self):
+    def test_the_log_ends_at_the_first_error(self):
         noise = "subprocess.CalledProcessError: Command '...' returned non-zero exit status 1."
         log = LOG.replace("defined\nFailed", f"defined\n{noise}\nFailed")
         finding = self.found(build=failed_build(NAME, log=log, culprit=CULPRIT))
@@ -198,7 +198,7 @@ class TestBuilds:
         passed = judge("package.builds", submission(*alone, build=only), package=NAME)
         assert passed.status is Status.PASSED
 
-    def test_what_rests_on_a_mistake_is_told_to_mend_that(self):
+    def test_a_failure_that_follows_from_a_mistake_names_that_mistake(self):
         log = f"{NEEDS_NAV2.format('other')}Failed   <<< other [1s]\n"
         log += "Starting >>> wrong\nFailed   <<< wrong [1s]\n"
         build = failed_build(NAME, "other", "wrong", log=log, lacking=("nav2_msgs",))
@@ -215,7 +215,7 @@ class TestBuilds:
         finding = judge("package.builds", submission(package(), build=build), package=NAME)
         assert finding.status is Status.FAILED
 
-    def test_what_another_package_lacks_excuses_nobody(self):
+    def test_what_another_package_lacks_is_no_excuse(self):
         log = f"{NEEDS_NAV2.format('other')}Failed   <<< other [1s]\n{LOG}"
         build = failed_build("bot_publisher", "other", log=log, lacking=("nav2_msgs",))
         subject = submission(package(), package("other"), build=build)
@@ -256,7 +256,7 @@ class TestBuilds:
         error = SourceError("src/bot_publisher/setup.py", None, said)
         subject = submission(package(), build=failed_build(NAME, culprit=error))
         finding = judge("package.builds", subject, package=NAME)
-        assert finding.hint.startswith(f"Create resource/{NAME}, an empty file")
+        assert finding.hint.startswith(f"Create the empty file resource/{NAME}:")
 
     def test_a_syntax_error_in_a_file_that_is_not_needed(self):
         unused = SourceError("src/bot_publisher/bot_publisher/old.py", 9, "SyntaxError: ':'")
@@ -280,7 +280,7 @@ class TestBuilds:
         )
         assert judge("package.builds", subject, package=NAME).status is Status.PASSED
 
-    def test_a_build_that_did_not_run_is_told(self):
+    def test_a_build_that_did_not_run_is_reported(self):
         assert self.found(build=None).status is Status.ERROR
 
     def test_without_a_package_that_is_the_cause(self):

@@ -63,7 +63,7 @@ class TestDeclared:
             ({"speed": 0.5}, {"node": "bot"}, "found the node `/bot_publisher`"),
         ],
     )
-    def test_what_is_declared_otherwise_is_told(self, values, wanted, words):
+    def test_what_is_declared_otherwise_is_reported(self, values, wanted, words):
         assert words in failing("parameter.declared", read(**values), **{**SPEED, **wanted})
 
     def test_a_node_that_does_not_answer(self):
@@ -133,12 +133,12 @@ class TestSet:
             (
                 setting(7.0, 0.5, accepted=False),
                 {"value": 7.0, "accepted": False, "reason": "positive"},
-                "the reason says nothing",
+                "the reason is empty",
             ),
-            (setting(0.9, 0.5), {"value": 0.9}, "it was accepted, but is 0.5 then"),
+            (setting(0.9, 0.5), {"value": 0.9}, "it was accepted, but its value is 0.5 afterwards"),
         ],
     )
-    def test_another_answer_is_told(self, run, wanted, words):
+    def test_another_answer_is_reported(self, run, wanted, words):
         assert words in failing("parameter.set", run, **SPEED, **wanted)
 
     def test_a_value_that_was_never_tried(self):
@@ -173,14 +173,14 @@ class TestTakesEffect:
         [
             (moving(0.5), DATA, "after it was set a message has data = 0.5 instead of 0.9"),
             (moving(0.5), DATA, "The message is as it was before"),
-            (moving(0.7), DATA, "Look what the node makes of `speed` where it publishes"),
+            (moving(0.7), DATA, "Look at how the node uses `speed` where it publishes"),
             (moving(0.5, after=0.5, accepted=False, reason="no"), DATA, "was refused: no"),
             (moving(0.9), PERIOD, "messages come every 100 ms"),
             (moving(0.9, until_s=2.0), DATA, "0 messages in the"),
             (moving(0.9, until_s=2.0), DATA, "Publish in every call of the callback"),
         ],
     )
-    def test_what_does_not_change_is_told(self, run, wanted, words):
+    def test_what_does_not_change_is_reported(self, run, wanted, words):
         assert words in failing("parameter.takes_effect", run, **SPEED, **wanted)
 
     def test_an_attempt_that_is_refused_later_changes_nothing(self):
@@ -226,7 +226,7 @@ class TestLifecycle:
     def test_a_transition_that_failed(self):
         run = states("unconfigured", "unconfigured", success=False)
         found = failing("lifecycle.state", run, **self.WANTED)
-        assert "at the call 2 of get_state it is unconfigured" in found
+        assert "at call 2 of get_state it is unconfigured" in found
         assert "after the transition configure failed" in found
         assert "TransitionCallbackReturn.SUCCESS" in found
 
@@ -235,7 +235,7 @@ class TestLifecycle:
         found = failing("lifecycle.state", run, **self.WANTED)
         assert "it is inactive" in found and "TransitionCallbackReturn" not in found
 
-    def test_a_node_without_states_is_told(self):
+    def test_a_node_without_states_is_reported(self):
         run = states("unconfigured", services=())
         assert "is no lifecycle node" in failing("lifecycle.state", run, **self.WANTED)
 

@@ -125,7 +125,7 @@ class TestDepth:
         assert finding.status is Status.PASSED
         assert "declared by the process" in finding.observed
 
-    def test_another_depth_is_told(self):
+    def test_another_depth_is_reported(self):
         run = recording(declarations=declarations(depth=1))
         found = failing("qos.depth", run, topic="/cmd_vel", depth=10)
         assert "depth 1, declared by the process" in found

@@ -85,7 +85,7 @@ def test_the_student_s_subscription_is_the_one_that_requests():
         **peer("subscription", reliability="best_effort", durability="transient_local",
                expect="refuse"),
     )  # fmt: skip
-    assert "no policy of what is offered is weaker" in found
+    assert "no policy that is offered is weaker" in found
 
 
 class TestTheBestAvailable:
@@ -107,7 +107,7 @@ class TestTheBestAvailable:
     def test_it_matches_every_peer(self):
         found = self.volatile_refused(self.run({"durability": "best_available"}))
         assert found.status is Status.FAILED
-        assert "asks for the best available durability" in found.observed
+        assert "requests the best available durability" in found.observed
         assert "here transient_local" in found.observed
 
     def test_another_policy_refuses_all_the_same(self):

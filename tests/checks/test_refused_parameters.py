@@ -19,7 +19,7 @@ PEER = {**TOPIC, "kind": "publisher"}
     ("check", "parameters", "words"),
     [
         ("messages.count", TOPIC, "say how many"),
-        ("messages.count", {**TOPIC, "exactly": 1, "at_most": 2}, "exactly stands alone"),
+        ("messages.count", {**TOPIC, "exactly": 1, "at_most": 2}, "'exactly' cannot be used with"),
         (
             "messages.count",
             {**TOPIC, "at_least": 3, "at_most": 2},
@@ -27,7 +27,7 @@ PEER = {**TOPIC, "kind": "publisher"}
         ),
         ("messages.sequence", COUNTED, "either 'values' or 'step'"),
         ("messages.sequence", {**COUNTED, "values": [1], "step": 1}, "either 'values' or 'step'"),
-        ("messages.sequence", {**COUNTED, "values": [1], "start": 1}, "'start' goes with 'step'"),
+        ("messages.sequence", {**COUNTED, "values": [1], "start": 1}, "'start' needs 'step'"),
         ("messages.follows", {**FOLLOWING, "fields": {"x": "sine(x)"}}, "is not a field"),
         ("timing.period", {**TOPIC, "period": "300"}, "has no unit"),
         ("timing.period", {**TOPIC, "period": "0.3 m"}, "unit of length"),

@@ -1,4 +1,4 @@
-"""Whatever a student's services, actions and loggers answer, no check breaks on it."""
+"""No check breaks on any answer of a student's services and actions, or on any log."""
 
 from dataclasses import replace
 

@@ -55,7 +55,7 @@ def test_a_value_may_be_a_comparison_and_the_field_an_expression():
         ((0, 0, 0, 0), {"step": 1}, "the value never changes"),
         ((0, 2, 4, 6), {"step": 1}, "it begins with 0 and grows by 2 from message to message"),
         ((1, 2, 3, 4), {"step": 1, "start": 0}, "it begins with 1"),
-        ((0, 1, 2, 0, 1), {"step": 1}, "it begins anew with message 4"),
+        ((0, 1, 2, 0, 1), {"step": 1}, "it goes back to the first value in message 4"),
         ((0, 1, 1, 2, 3), {"step": 1}, "1 instead of 2 in message 3 of 5"),
         ((1, 2, 4), {"values": [1, 2, 3]}, "4 instead of 3 in message 3 of 3"),
         (("a", "c"), {"values": ["a", "b"]}, "'c' instead of 'b' in message 2 of 2"),

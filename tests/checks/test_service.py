@@ -54,7 +54,7 @@ class TestExists:
     def test_parameter_services_are_not_offered_as_what_there_is(self):
         run = serving(services=(service("/bot_publisher/get_parameters"),))
         found = failing("service.exists", run, **ENABLE)
-        assert "`/bot_publisher` has no service of its own" in found
+        assert "`/bot_publisher` created no service" in found
         assert "self.create_service(Type, 'enable', self.callback)" in found
 
 
@@ -71,7 +71,7 @@ class TestResponds:
         finding = judge("service.responds", run, **TRUE, request={"data": True})
         assert finding.status is Status.PASSED
 
-    def test_of_a_long_request_only_what_is_not_zero_is_told(self):
+    def test_of_a_long_request_only_fields_that_are_not_zero_are_shown(self):
         zeros = {"header": {"stamp": {"sec": 0}, "frame_id": ""}, "d": [], "k": [0.0] * 9}
         request = {**zeros, "width": 640, "rectify": False, "height": 480}
         run = serving(asked(request=request, response={"success": False}))
@@ -90,11 +90,11 @@ class TestResponds:
             (asked(response={"success": False, "message": "x"}), "success = false instead of true"),
             (asked(), "message = 'enabled' without “range”"),
             (asked(response=REFUSED), "sets `success` of the response"),
-            (asked(response={"success": False, "message": ""}), "as a new one is"),
+            (asked(response={"success": False, "message": ""}), "the value of a new one"),
             (asked(answer_s=1.5), "was not answered for 1.5 s"),
         ],
     )
-    def test_a_wrong_or_late_answer_is_told_with_the_request(self, call, words):
+    def test_a_wrong_or_late_answer_is_reported_with_the_request(self, call, words):
         assert words in failing("service.responds", serving(call), **TRUE, **RANGE)
 
     def test_the_process_died_of_the_call(self):
@@ -113,7 +113,7 @@ class TestResponds:
             (
                 (),
                 (declared("started"), declared("node", node=NODE), SPIN_OF_OTHERS),
-                "was not given to it",
+                "was not added to it",
             ),
             ([call(1.5 + 0.5 * n, None) for n in range(4)], (), "something blocks the executor"),
             ([call(1.5 + 0.5 * n) for n in range(4)], (), "although the node's executor spins"),
@@ -130,11 +130,11 @@ class TestResponds:
         finding = judge("service.responds", run, **TRUE)
         assert (finding.status, finding.disturbed) == (Status.ERROR, True)
 
-    def test_an_answer_that_was_not_due_yet_costs_nobody_a_point(self):
+    def test_an_answer_that_was_not_due_yet_costs_no_point(self):
         run = serving(asked(4.4, None))
         finding = judge("service.responds", run, **TRUE, within="1 s")
         assert finding.status is Status.ERROR
-        assert "the run ended 100 ms later, before that was due" in finding.observed
+        assert "the run ended 100 ms later, before the answer was due" in finding.observed
 
     def test_an_interface_that_is_not_installed_is_our_error(self):
         run = serving(asked(answer_s=None, error="the interface x/srv/Y is not installed"))
@@ -157,7 +157,7 @@ class TestConcurrent:
         assert judge("service.concurrent", run, **SLOW).status is Status.PASSED
         one_after_another = {**SLOW, "calls": "one_after_another"}
         found = failing("service.concurrent", run, **one_after_another)
-        assert "both were worked on at the same time" in found
+        assert "both were processed at the same time" in found
 
     def test_calls_worked_on_one_after_another_pass(self):
         run = serving(asked(1.0, 0.4), asked(1.001, 0.8))

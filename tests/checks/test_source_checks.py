@@ -127,7 +127,7 @@ class TestDocstrings:
         finding = judge("source.docstrings", files(node=text), **PACKAGE)
         assert finding.status is Status.PASSED
 
-    def test_each_lack_is_told_with_its_line(self):
+    def test_each_lack_is_reported_with_its_line(self):
         text = "class A:\n    # A comment.\n    def go(self):\n        return 1\n"
         finding = judge("source.docstrings", files(node=text), **PACKAGE)
         assert [str(place) for place in finding.evidence.places] == [

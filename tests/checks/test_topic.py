@@ -87,7 +87,7 @@ class TestPublished:
     def test_a_message_of_the_simulator_proves_nothing(self):
         simulator = endpoint(node="/simulator", owner=Owner.PROBE)
         run = recording(endpoints=(simulator, reader()), declarations=())
-        assert "has no publisher of its own" in failing("topic.published", run, topic="/cmd_vel")
+        assert "created no publisher" in failing("topic.published", run, topic="/cmd_vel")
 
     def test_relative_names_are_refused_in_the_assignment(self):
         with pytest.raises(ValueError, match="'cmd_vel' is relative"):
@@ -101,13 +101,13 @@ class TestPublished:
             (
                 endpoint("/bot_publisher/cmd_vel"),
                 "/cmd_vel",
-                "Without `~/`, which puts the node's name in front",
+                "Leave out `~/`, which puts the node's name in front",
             ),
             (endpoint("/robot/cmd_vel"), "/cmd_vel", "`/robot` stands in front of the name"),
             (
                 endpoint("/robot/cmd_vel", node="/robot/bot_publisher"),
                 "/cmd_vel",
-                "without a namespace",
+                "and any namespace",
             ),
             (
                 endpoint(kind=Kind.SUBSCRIPTION),
@@ -119,16 +119,16 @@ class TestPublished:
                 "/cmd_vel",
                 "self.create_publisher(Twist, 'cmd_vel', 10)",
             ),
-            (OWN[0], "/cmd_vel", "the node `/bot_publisher` has no publisher of its own"),
+            (OWN[0], "/cmd_vel", "`/bot_publisher` created no publisher"),
             (endpoint("/turtle1/drive"), "/cmd_vel", "the type is right on `/turtle1/drive`"),
             (
                 endpoint("/chatter", type="std_msgs/msg/String"),
                 "/cmd_vel",
-                "publishes on `/chatter` only",
+                "created publishers only for `/chatter`",
             ),
         ],
     )
-    def test_what_is_there_instead_is_told(self, there, topic, words):
+    def test_what_is_there_instead_is_reported(self, there, topic, words):
         assert words in failing("topic.published", with_endpoints(there), topic=topic)
 
     def test_a_death_before_the_publisher_was_created(self):
@@ -144,7 +144,7 @@ class TestPublished:
         run = with_endpoints(endpoint("/cmdvel"), processes=(died(1),), ending=Ending.EXITED)
         assert "`/cmdvel` instead" in failing("topic.published", run, topic="/cmd_vel")
 
-    def test_a_topic_of_a_process_that_lives_is_no_misspelling_of_the_dead_one_s(self):
+    def test_a_topic_of_a_running_process_is_no_misspelling_of_one_of_an_ended_process(self):
         run = with_endpoints(
             endpoint("/cmd_vel_raw"),
             processes=(process(), died(1, name="bot/driver")),
@@ -179,7 +179,7 @@ class TestSubscribed:
     @pytest.mark.parametrize(
         ("there", "words"),
         [
-            (OWN[0], "has no subscription of its own"),
+            (OWN[0], "created no subscription"),
             (endpoint("/scan"), "publishes on `/scan`, but has no subscription of that name"),
             (
                 endpoint("/scann", kind=Kind.SUBSCRIPTION),
@@ -187,14 +187,12 @@ class TestSubscribed:
             ),
         ],
     )
-    def test_what_is_there_instead_is_told(self, there, words):
+    def test_what_is_there_instead_is_reported(self, there, words):
         assert words in failing("topic.subscribed", with_endpoints(there), topic="/scan")
 
     def test_messages_of_others_on_the_topic_prove_no_subscription(self):
         run = recording(endpoints=(reader(),))
-        assert "has no subscription of its own" in failing(
-            "topic.subscribed", run, topic="/cmd_vel"
-        )
+        assert "created no subscription" in failing("topic.subscribed", run, topic="/cmd_vel")
 
 
 class TestType:

@@ -53,7 +53,7 @@ def course(tmp_path: Path) -> Path:
     return made
 
 
-def test_a_class_is_graded_and_nobody_is_forgotten(
+def test_a_class_is_graded_and_no_student_is_forgotten(
     rosgrade: Rosgrade, tmp_path: Path, course: Path
 ) -> None:
     handed_in(course, "ana")

@@ -52,7 +52,9 @@ def test_the_browser_of_the_user_gets_the_address(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("browser", ["exit 3", None])
-def test_the_address_is_told_where_no_browser_starts(tmp_path: Path, browser: str | None) -> None:
+def test_the_address_is_printed_where_no_browser_starts(
+    tmp_path: Path, browser: str | None
+) -> None:
     ended = opened(tmp_path, browser and f"{script(tmp_path, browser)} %s")
     assert ended.returncode == 0
     assert ended.stderr == (
@@ -60,7 +62,7 @@ def test_the_address_is_told_where_no_browser_starts(tmp_path: Path, browser: st
     )
 
 
-def test_a_browser_that_stays_holds_up_nobody(tmp_path: Path) -> None:
+def test_a_browser_that_stays_does_not_hold_up_the_command(tmp_path: Path) -> None:
     browser = script(tmp_path, f"echo $$ > {tmp_path}/pid; exec sleep 50 >/dev/null 2>&1")
     ended = opened(tmp_path, f"{browser} %s")
     try:

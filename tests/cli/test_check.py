@@ -84,7 +84,7 @@ def test_only_one_check_and_what_it_requires_is_judged(rosgrade: Rosgrade, tmp_p
         ({"a/package.xml": "<package", "notes.txt": ""}, "a/package.xml"),
     ],
 )
-def test_what_is_no_package_is_graded_with_nothing_and_says_why(
+def test_a_submission_without_a_package_gets_no_points_and_a_reason(
     rosgrade: Rosgrade, tmp_path: Path, files: dict[str, str], said: str
 ) -> None:
     submission = tmp_path / "submission"
@@ -132,7 +132,7 @@ def test_an_interrupted_check_leaves_nothing_behind(number: signal.Signals, tmp_
     check.send_signal(number)
     _, told = check.communicate(timeout=60)
     assert check.returncode == 130, told
-    assert "rosgrade: interrupted: what still runs is ended" in told
+    assert "rosgrade: interrupted: ending what still runs" in told
     assert "Traceback" not in told
     assert not (tmp_path / "rosgrade-report" / "result.json").exists()
     assert not list(tmp_path.glob("rosgrade-scratch-*"))

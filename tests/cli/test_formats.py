@@ -230,4 +230,4 @@ def test_a_gradebook_that_is_none_is_named(rosgrade: Rosgrade, tmp_path: Path) -
 def test_a_file_for_one_report_is_refused_for_a_class(rosgrade: Rosgrade, tmp_path: Path) -> None:
     ended = rosgrade("report", batch(tmp_path), "--junit", tmp_path / "x.xml")
     assert ended.returncode == 2
-    assert "name a report's own folder" in ended.stderr
+    assert "give the folder of one report" in ended.stderr

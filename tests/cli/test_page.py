@@ -41,11 +41,11 @@ def test_the_page_around_it_may_only_talk_to_this_server(page: ReportPage) -> No
     assert '<iframe src="report.html"' in html
 
 
-def test_every_new_grade_is_told(page: ReportPage) -> None:
-    page.tell("8.5 of 10 points", "a < b", is_new=True)
-    state = {"version": 1, "told": "8.5 of 10 points", "title": "a < b"}
+def test_every_new_grade_is_shown(page: ReportPage) -> None:
+    page.show("8.5 of 10 points", "a < b", is_new=True)
+    state = {"version": 1, "text": "8.5 of 10 points", "title": "a < b"}
     assert json.loads(get(page, "/state").read()) == state
-    page.tell("grading what was saved", "…")
+    page.show("grading the saved files", "…")
     assert json.loads(get(page, "/state").read())["version"] == 1
 
 

@@ -56,7 +56,7 @@ def grade_a_class(progress: Progress) -> None:
         progress.note("eve handed in nothing")
 
 
-def test_where_lines_stay_each_step_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:
+def test_where_lines_stay_each_step_is_printed_once(capsys: pytest.CaptureFixture[str]) -> None:
     say_everything(Progress())
     out, err = capsys.readouterr()
     assert out == ""
@@ -68,7 +68,7 @@ def test_where_lines_stay_each_step_is_told_once(capsys: pytest.CaptureFixture[s
     )
 
 
-def test_where_lines_stay_every_submission_of_a_class_is_told_with_the_rate(
+def test_where_lines_stay_every_submission_of_a_class_is_printed_with_the_rate(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     grade_a_class(Progress())
@@ -81,7 +81,7 @@ def test_where_lines_stay_every_submission_of_a_class_is_told_with_the_rate(
     assert re.fullmatch(r"rosgrade: 4 of 5: dan: 9 .* \(\d+ a minute, 0 s left\)", lines[3])
 
 
-def test_quiet_says_only_what_must_not_be_missed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_quiet_prints_only_what_must_not_be_missed(capsys: pytest.CaptureFixture[str]) -> None:
     say_everything(Progress(quiet=True, verbose=True))
     grade_a_class(Progress(quiet=True))
     assert capsys.readouterr() == ("", "rosgrade: eve handed in nothing\n")

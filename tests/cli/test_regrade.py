@@ -128,7 +128,7 @@ def test_an_assignment_that_is_not_where_it_was_is_asked_for(
         ended = rosgrade(command, path)
         assert ended.returncode == 2
         assert (
-            f"was graded with the assignment 'lesson' in {lesson}, which is not there any more"
+            f"was graded with the assignment 'lesson' in {lesson}, which does not exist any more"
             in (ended.stderr)
         )
         assert f"name its folder: `rosgrade {command} {path} FOLDER`" in ended.stderr or (
@@ -185,7 +185,7 @@ def test_no_export_overwrites_what_it_reads(rosgrade: Rosgrade, out: Path, lesso
     ):
         ended = rosgrade("export", *arguments)
         assert ended.returncode == 2, arguments
-        assert "this command reads" in ended.stderr or "would be a part of" in ended.stderr
+        assert "this command reads" in ended.stderr or "lies in" in ended.stderr
     assert [file.read_bytes() for file in (gradebook, result)] == before
     assert sorted(item.name for item in lesson.iterdir()) == ["assignment.yaml"]
 
@@ -221,7 +221,7 @@ def test_no_other_command_overwrites_what_it_reads(
         assert ended.returncode == 2, (arguments, ended.stderr)
         assert any(
             said in ended.stderr
-            for said in ("this command reads", "would be a part of", "named for two outputs")
+            for said in ("this command reads", "lies in", "given for two outputs")
         ), (arguments, ended.stderr)
     assert {file: file.read_bytes() for file in before} == before
     assert [item.name for item in folder.iterdir()] == ["package.xml"]
@@ -240,7 +240,7 @@ def test_a_report_replaces_no_recordings_or_install_space_of_others(
     arguments = ("check", lesson, tmp_path / "work", "--report", tmp_path / "mine", *options)
     ended = rosgrade(*arguments, "--sandbox", "none")
     assert ended.returncode == 2
-    assert "is not of a report, and is left as it is" in ended.stderr
+    assert "does not belong to a report, so it stays" in ended.stderr
     assert mine.read_text() == "mine"
 
 

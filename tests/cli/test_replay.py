@@ -33,7 +33,7 @@ def test_a_recording_that_names_no_assignment_asks_for_it(
     write_robot_run(tmp_path / "run.mcap")
     ended = rosgrade("replay", "run.mcap", REFERENCE)
     assert ended.returncode == 2
-    assert "it does not say for which assignment; name it" in ended.stderr
+    assert "the assignment is not stored here; name it too" in ended.stderr
 
 
 @pytest.mark.ros

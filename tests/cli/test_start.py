@@ -97,7 +97,7 @@ def test_a_new_assignment_tells_right_from_wrong(rosgrade: Rosgrade) -> None:
     counts = [line.split()[2:5] for line in ended.stderr.splitlines() if " graded: " in line]
     assert counts and [int(one) for one, _, _ in counts] == [*range(1, int(counts[0][2]) + 1)]
     assert "2 of 2 right solutions with full points" in ended.stdout
-    assert "8 of 8 mutants judged as they must: mutation score 100 %" in ended.stdout
+    assert "8 of 8 mutants judged as expected: mutation score 100 %" in ended.stdout
 
 
 def test_the_handout_is_written_as_a_page(rosgrade: Rosgrade, tmp_path: Path) -> None:

@@ -68,13 +68,13 @@ def test_signals_that_the_caller_has_blocked_hold_nothing_up(tmp_path: Path) -> 
     assert ended.returncode == 0, ended.stderr
 
 
-def test_output_that_is_lost_on_a_full_disk_is_told(tmp_path: Path) -> None:
+def test_output_that_is_lost_on_a_full_disk_is_reported(tmp_path: Path) -> None:
     ended = shell(tmp_path, f"{ROSGRADE} list >/dev/full")
     assert ended.returncode == 3
     assert "standard output cannot be written: No space left on device" in ended.stderr
     assert "Traceback" not in ended.stderr
 
 
-def test_what_nobody_reads_to_the_end_is_no_fault(tmp_path: Path) -> None:
+def test_output_that_is_not_read_to_the_end_is_no_fault(tmp_path: Path) -> None:
     ended = shell(tmp_path, f"{ROSGRADE} schema | head -1")
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "{\n", "")

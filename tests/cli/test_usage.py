@@ -72,18 +72,18 @@ def test_the_submissions_of_a_class_are_named_by_their_folder(rosgrade: Rosgrade
     ended = rosgrade("batch", "timed_publisher", "class/ana", "class/ben", "--out", "results")
     assert ended.returncode == 2
     told = " ".join(ended.stderr.split())
-    assert "batch takes one folder, not 2 submissions: name the folder of all" in told
+    assert "batch takes one folder, not 2 submissions: give their folder" in told
 
 
 @pytest.mark.parametrize("command", ["check", "watch", "batch"])
-def test_who_names_the_submission_first_is_told_the_order(
+def test_a_submission_in_front_of_the_assignment_is_refused_with_the_right_order(
     rosgrade: Rosgrade, tmp_path: Path, command: str
 ) -> None:
     (tmp_path / "mine").mkdir()
     more = ("--out", "results") if command == "batch" else ()
     ended = rosgrade(command, "mine", "timed_publisher", *more)
     assert ended.returncode == 2
-    assert "an assignment comes first: timed_publisher mine" in ended.stderr
+    assert "Give the assignment first: timed_publisher mine" in ended.stderr
 
 
 def test_a_submission_that_does_not_exist_is_named(rosgrade: Rosgrade) -> None:
@@ -115,12 +115,12 @@ def test_another_distribution_in_the_shell_is_not_the_student_s_fault(
     assert "ROS 2 humble is sourced" in ended.stderr
 
 
-def test_a_file_in_the_place_of_the_report_is_told_before_anything_is_graded(
+def test_a_file_in_the_place_of_the_report_is_reported_before_anything_is_graded(
     rosgrade: Rosgrade, tmp_path: Path
 ) -> None:
     (tmp_path / "mine").touch()
     (tmp_path / "class").mkdir()
-    said = "mine: is not a folder; name another place"
+    said = "mine: is not a folder; use another place"
     for arguments in (
         ("check", "timed_publisher", ROOT / "reference" / "timed_publisher", "--report", "mine"),
         ("batch", "timed_publisher", "class", "--out", "mine", "--sandbox", "none"),
@@ -139,7 +139,7 @@ def test_a_library_that_is_not_there_is_a_doubt(rosgrade: Rosgrade, tmp_path: Pa
     assert "'scypi', which is not installed here. Did you mean 'scipy'?" in ended.stderr
 
 
-def test_every_assignment_of_ours_is_valid(rosgrade: Rosgrade) -> None:
+def test_every_assignment_of_rosgrade_is_valid(rosgrade: Rosgrade) -> None:
     names = [folder.name for folder in sorted((ROOT / "assignments").iterdir())]
     ended = rosgrade("validate", *names, columns=300)
     assert ended.returncode == 0, ended.stderr
@@ -165,13 +165,13 @@ def test_the_schemas_are_json_schemas(rosgrade: Rosgrade, document: str) -> None
 
 
 @pytest.mark.parametrize("jobs", ["0", "-1", "1.5", "²", "many"])
-def test_a_number_of_jobs_that_is_none_is_told(
+def test_a_number_of_jobs_that_is_none_is_reported(
     rosgrade: Rosgrade, tmp_path: Path, jobs: str
 ) -> None:
     place = lesson(tmp_path)
     ended = rosgrade("batch", place, tmp_path, "--out", tmp_path / "out", f"--jobs={jobs}")
     assert ended.returncode == 2
-    assert "must be auto or a number from 1 on" in ended.stderr and "Traceback" not in ended.stderr
+    assert "must be auto, or 1 or more" in ended.stderr and "Traceback" not in ended.stderr
 
 
 PRESSED = """

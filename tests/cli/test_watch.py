@@ -61,7 +61,7 @@ def test_a_save_is_graded_again_and_ctrl_c_leaves_nothing(tmp_path: Path) -> Non
         read_until(watch.stdout, "run: starting bot_publisher/bot_pub")
         node.write_text(node.read_text().replace("PERIOD_S = 2.5", "PERIOD_S = 0.4"))
         told = read_until(watch.stdout, "Ctrl-C ends")
-        assert "saved meanwhile: beginning anew" in told
+        assert "saved again: starting over" in told
         lost = POINTS["period"]
         assert f"✗ failed  was passed  A message comes every 300 ms  0 / {lost:g}" in told
         assert f"Score: {10 - lost:g} of 10 points, before 10" in told

@@ -1,4 +1,4 @@
-"""What the student's code destroyed is a finding, by name; what we or the machine ended is not."""
+"""What the student's code destroyed is a finding, by name; what the scenario ended is not."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ LISTENER = endpoint("/chatter", kind=Kind.SUBSCRIPTION, type="std_msgs/msg/Strin
 LATENCY = {"stimulus": "/chatter", "topic": "/cmd_vel", "most": "100 ms"}
 LOGGED = {"topic": "/chatter", "fields": ["data"], "at_least": 2, "sent": "after_launch"}
 FIRST_TEN = sent(every(-0.5 / 10, 10, -0.1))
-WORDS = "was destroyed 0.90 s after launch, while the process ran on"
+WORDS = "was destroyed 0.90 s after launch, while the process still ran"
 
 
 def gone(item, time_s=0.9):
@@ -59,7 +59,7 @@ def test_a_subscription_that_was_destroyed_after_what_was_sent_before_the_launch
     assert f"the subscription to `/chatter` {WORDS}" in found
 
 
-def test_a_publisher_that_was_destroyed_before_somebody_joined():
+def test_a_publisher_that_was_destroyed_before_a_late_joiner():
     run = recording(
         endpoints=(gone(endpoint(qos=LATCHED), 4.0), reader()),
         joins=(replace(join(4.2), matched_ns=None),),
@@ -97,7 +97,7 @@ def test_what_vanished_with_its_process_was_not_destroyed():
     run = deaf(sent={"/chatter": ()}, processes=(died(-11, 0.9),))
     found = failing("timing.latency", replace(run, messages={}), **LATENCY)
     assert "SIGSEGV" in found
-    assert "while the process ran on" not in found
+    assert "while the process still ran" not in found
 
 
 def test_what_the_scenario_ended_was_not_destroyed():

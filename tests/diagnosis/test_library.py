@@ -37,8 +37,8 @@ def test_a_library_is_named_with_those_that_are_there(message: str) -> None:
     hint = library_hint(message, run())
     assert hint is not None
     assert "Is `pandas` spelt right?" in hint
-    assert "has the standard library, ROS 2 and `numpy` and `scipy`." in hint
-    # It may be what the handout asks for, so nobody is told to do without it.
+    assert "has Python's standard library, ROS 2 and `numpy` and `scipy`." in hint
+    # It may be what the handout asks for, so no advice is to do without it.
     assert "do without" not in hint
     assert "ask your instructor to allow it" in hint
 
@@ -53,7 +53,7 @@ def test_a_library_is_named_with_those_that_are_there(message: str) -> None:
         "something else",
     ],
 )
-def test_a_slip_in_a_name_of_the_student_s_or_of_ros_is_another_matter(message: str) -> None:
+def test_a_misspelt_name_of_the_student_s_or_of_ros_is_another_matter(message: str) -> None:
     assert library_hint(message, run()) is None
 
 

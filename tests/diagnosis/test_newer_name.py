@@ -1,4 +1,4 @@
-"""Right code is not told to be wrong where the Python or numpy here is not Jazzy's."""
+"""Right code is not called wrong where the Python or numpy here is not Jazzy's."""
 
 from __future__ import annotations
 

@@ -15,8 +15,11 @@ CMAKE = {"build_type": "ament_cmake", "entry_points": ()}
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"missing_targets": (("bot_pub", TARGET),)}, "`bot_pub = bot_publisher.node:main` leads"),
-        ({"missing_targets": (("bot_pub", TARGET),)}, "nowhere: src/bot_publisher/setup.py:22"),
+        (
+            {"missing_targets": (("bot_pub", TARGET),)},
+            "bot_publisher.node:main` does not work",
+        ),
+        ({"missing_targets": (("bot_pub", TARGET),)}, "work: src/bot_publisher/setup.py:22"),
         (
             {"missing_targets": (("bot_pub", SourceError("setup.py", 22, NO_INIT)),)},
             "find_packages() in setup.py leaves out a folder without",
@@ -31,13 +34,13 @@ CMAKE = {"build_type": "ament_cmake", "entry_points": ()}
         ({"entry_points": ()}, "setup.py defines no console_scripts"),
         ({"entry_points": ()}, "'bot_pub = bot_publisher.<your module>:main'"),
         ({}, "the build did not install it"),
-        ({**CMAKE, "executables": ("bot_publ",)}, "installed is `bot_publ`"),
-        ({**CMAKE, "executables": ("x", "y")}, "installed are `x` and `y`"),
+        ({**CMAKE, "executables": ("bot_publ",)}, "installed `bot_publ`"),
+        ({**CMAKE, "executables": ("x", "y")}, "installed `x` and `y`"),
         (CMAKE, "it was not installed"),
         (CMAKE, "install(TARGETS bot_pub DESTINATION lib/${PROJECT_NAME})"),
     ],
 )
-def test_what_is_wrong_is_told_with_what_to_write(changes, words):
+def test_what_is_wrong_is_reported_with_what_to_write(changes, words):
     record = submission(package(**{"executables": (), **changes}))
     cause = why_no_executable(record, "bot_publisher", "bot_pub")
     assert words in f"{cause.observed} | {cause.hint}"

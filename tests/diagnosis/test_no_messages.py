@@ -58,7 +58,7 @@ def why(run):
     return found
 
 
-NEVER = "because what the node should answer, on `/chatter`, never reached it: "
+NEVER = "because the messages that the node should answer, on `/chatter`, never reached it: "
 
 
 class TestNeverReached:
@@ -88,7 +88,7 @@ class TestNotAnswered:
         found = why(asked(listener(), times_s=every(0.3, 5)))
         assert "although 5 messages on `/chatter` reached the node" in found
         assert "Is publish(msg) reached in the subscription's callback?" in found
-        assert "a lock or a loop that never ends" in found
+        assert "A lock or a loop that never ends" in found
 
     def test_an_exception_that_was_survived(self):
         log = output(traceback("ValueError: no", source="self.publisher.publish(1)"), time_s=1.5)
@@ -128,7 +128,7 @@ class TestNotAnswered:
         told = (*declarations(timer_s=None, spin=False), spinning(tells_added=True))
         run = asked(listener(), times_s=every(0.3, 5), declarations=told)
         found = why(run)
-        assert f"an executor spins, but `{NODE}` was not given to it" in found
+        assert f"an executor spins, but `{NODE}` was not added to it" in found
         assert "executor.add_node(node)" in found
 
     def test_a_node_that_an_executor_has(self):

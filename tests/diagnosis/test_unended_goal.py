@@ -26,13 +26,13 @@ class TestBusyExecutor:
             ),
         ],
     )
-    def test_it_is_told_by_a_late_answer(self, late):
-        assert "its executor cannot while" in failing("action.cancels", acting(late), **FIB)
+    def test_it_is_recognised_by_a_late_answer(self, late):
+        assert "its executor is busy while" in failing("action.cancels", acting(late), **FIB)
 
     def test_it_is_the_students_on_any_machine_unless_that_took_all_the_time(self):
         run = acting(self.BLOCKED, calls=(), disturbance=taken(2.0, 2.1, waited_s=0.037))
         found = failing("action.cancels", run, **FIB)
-        assert "its executor cannot while" in found and "spins" not in found
+        assert "its executor is busy while" in found and "spins" not in found
         starved = acting(self.BLOCKED, calls=(), disturbance=taken(2.0, 2.1, waited_s=3.0))
         assert judge("action.cancels", starved, **FIB).status is Status.ERROR
 

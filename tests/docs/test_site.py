@@ -1,4 +1,4 @@
-"""The documentation site builds strictly and loads nothing from anybody else."""
+"""The documentation site builds strictly and loads nothing from other sites."""
 
 from __future__ import annotations
 

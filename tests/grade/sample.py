@@ -1,4 +1,4 @@
-"""Assignments and recordings made by hand; their checks say what they are told to say."""
+"""Assignments and recordings made by hand, with checks whose findings the test gives."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FAIL = Finding.failed("a node /bot_publisher", "no node at all", "Call rclpy.spi
 
 @dataclass(frozen=True)
 class Told:
-    """A check that says what it is told to.
+    """A check whose findings the test gives.
 
     Attributes:
         says: A finding, a finding for each scenario, an exception to raise, or anything else.

@@ -32,7 +32,7 @@ def judge(*checks, scenarios=("listen",), submission=None, recordings=None):
 
 
 def drive(seconds):
-    """A robot that stands there, told about every second."""
+    """A robot at rest, with a step of truth every second."""
     return tuple(
         Truth(LAUNCHED_NS + k * NS, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, None) for k in range(seconds)
     )
@@ -56,7 +56,7 @@ class TestRequirements:
         result = judge(Told("topic", requires=("node",)), Told("node"), Told("alone"))
         assert list(statuses(result)) == ["topic", "node", "alone"]
 
-    def test_a_check_behind_an_error_is_skipped_and_the_student_is_told_it_is_not_his(self):
+    def test_a_check_behind_an_error_is_skipped_and_says_it_is_not_the_student_s_fault(self):
         result = judge(Told("node", Finding.error("", "")), Told("topic", requires=("node",)))
         assert statuses(result) == {"node": "error", "topic": "skipped"}
         assert not result.graded

@@ -1,4 +1,4 @@
-"""What holds for every grade, whatever the checks say."""
+"""What holds for every grade, for any findings."""
 
 from hypothesis import given
 from hypothesis import strategies as st

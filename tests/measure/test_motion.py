@@ -161,7 +161,7 @@ class TestUntouched:
         run = recording(nodes=(node(), node("/a/rosgrade_probe")))
         assert "`/a/rosgrade_probe`" in failing("topic.untouched", run)
 
-    def test_nobody_is_praised_for_being_absent(self):
+    def test_a_run_without_a_node_fails(self):
         failing("topic.untouched", nodeless())
 
 

@@ -28,5 +28,5 @@ def test_a_publisher_with_the_same_name_of_type_and_another_hash(changes, expect
     assert recording(endpoints=ends).misdefined("/cmd_vel") is expected
 
 
-def test_without_a_reader_of_ours_nothing_is_compared() -> None:
+def test_without_a_subscription_of_the_probe_nothing_is_compared() -> None:
     assert not recording(endpoints=(replace(endpoint(), type_hash=OTHER),)).misdefined("/cmd_vel")

@@ -36,7 +36,7 @@ def twist(linear: float, angular: float = 0.0) -> bytes:
 
 
 def write_robot_run(file: Path, **changes: object) -> Recording:
-    """A run of two seconds: a robot drives ahead on what it is told on ``/cmd_vel``."""
+    """A run of two seconds: a robot drives ahead by commands on ``/cmd_vel``."""
     recording = dataclasses.replace(
         Recording(
             scenario="run",

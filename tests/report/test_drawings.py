@@ -50,11 +50,9 @@ class TestPlot:
         assert said in figure.caption
         assert marks(figure.wide, "out") == 1
 
-    def test_values_that_cannot_be_drawn_are_told(self):
+    def test_values_that_cannot_be_drawn_are_reported(self):
         figure = draw_plot(make_plot([300.0, math.nan, math.inf], None), "p")
-        assert figure.caption == (
-            "Period of /cmd_vel: 1 value, 2 without a finite value not drawn."
-        )
+        assert figure.caption == ("Period of /cmd_vel: 1 value, 2 not finite and not drawn.")
 
     def test_of_a_flood_every_extreme_stays(self):
         y = [300.0 + (i % 7) for i in range(50_000)]
@@ -67,7 +65,7 @@ class TestPlot:
         st.lists(st.tuples(st.floats(), st.floats()), max_size=30),
         st.none() | st.tuples(st.floats(), st.floats()),
     )
-    def test_whatever_the_values_the_drawing_is_whole_and_finite(self, points, band):
+    def test_a_drawing_of_any_values_is_whole_and_finite(self, points, band):
         x, y = tuple(p[0] for p in points), tuple(p[1] for p in points)
         figure = draw_plot(make_plot(y, band, x), "p")
         assert is_finite(figure.wide) and is_finite(figure.narrow)
@@ -140,7 +138,7 @@ class TestTimeline:
         ):
             assert text in description(svg)
 
-    def test_a_publisher_that_was_held_until_it_was_matched_is_said_to_be(self):
+    def test_a_publisher_that_was_held_until_it_was_matched_is_marked_as_held(self):
         held = Declaration(at(0.5), PROCESS, "held", {"topic": "/cmd_vel", "waited_s": 0.184})
         figure = draw_timeline(make_run(declarations=(held,)), (), "t")
         assert "4 messages, held 0.18 s" in words(figure.wide)

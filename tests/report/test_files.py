@@ -34,7 +34,7 @@ def test_the_old_file_stays_when_the_new_one_cannot_be_written(tmp_path):
 @pytest.mark.parametrize("inside", [".", "a", "a/b"])
 def test_a_file_where_a_folder_is_needed_is_named(tmp_path, inside):
     (tmp_path / "report").write_text("a file")
-    with pytest.raises(UsageError, match="is not a folder; name another place"):
+    with pytest.raises(UsageError, match="is not a folder; use another place"):
         check_folder(tmp_path / "report" / inside)
     (tmp_path / "gone").symlink_to("nowhere")
     with pytest.raises(UsageError, match="gone: is not a folder"):
@@ -92,7 +92,7 @@ def test_an_output_of_an_earlier_run_is_replaced_also_within_a_submission(tmp_pa
     page = tmp_path / "rosgrade-report" / "report.html"
     write_whole(page, "handed in, and replaced all the same")
     refuse_inputs([page.parent, page], [tmp_path])
-    with pytest.raises(UsageError, match="is named for two outputs"):
+    with pytest.raises(UsageError, match="is given for two outputs"):
         refuse_inputs([tmp_path / "a", tmp_path / "b" / ".." / "a"], [])
 
 

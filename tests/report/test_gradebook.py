@@ -92,7 +92,7 @@ def test_a_student_is_found_by_what_canvas_knows(name):
     assert [problem.partition(":")[0] for problem in filled.problems] == ["Ng, Wei (90212)"]
 
 
-def test_a_quote_that_never_ends_is_told():
+def test_a_quote_that_never_ends_is_reported():
     with pytest.raises(UsageError, match=r"gb\.csv: is not CSV: field larger"):
         read_canvas('Student,ID,Section\n"' + "x," * 100_000, "gb.csv")
 
@@ -108,7 +108,7 @@ TWICE = EXPORT.replace("Final Score", "ROS 2 Publisher (5)").replace("(read only
         ("90211", EXPORT.replace(",10,", ",(read only),"), TITLE, "Canvas skips the column"),
         ("90211", TWICE, "ROS 2 Publisher", r"several times: .*\(48211\), ROS 2 Publisher \(5\)"),
         *(
-            ("90211", EXPORT, title, "Canvas drops a column called")
+            ("90211", EXPORT, title, "Canvas drops the column")
             for title in ("Final Score", "Current Points", "Override Grade", "My Unposted finals")
         ),
     ],
@@ -145,7 +145,7 @@ def test_results_of_two_assignments_are_not_mixed():
         ),
     ],
 )
-def test_the_points_of_canvas_are_kept_and_what_is_odd_is_told(export, column, doubts):
+def test_the_points_of_canvas_are_kept_and_what_is_odd_is_reported(export, column, doubts):
     filled = fill([row("90212")], export, column)
     assert rows(filled.text)[1][-1] in ("10", "3,00", "3")
     assert [told[: len(doubt)] for told, doubt in zip(filled.doubts, doubts, strict=True)] == doubts
@@ -159,7 +159,7 @@ def test_identity_is_kept_and_others_are_not_touched():
     assert student == ["Ng, Wei", "90212", "s1002", "wng", "Sec 1, =x", "3"]
 
 
-def test_whoever_has_no_score_is_listed_with_the_reason():
+def test_a_student_without_a_score_is_listed_with_the_reason():
     filled = fill(
         [
             row("90211", lost_points),
@@ -245,7 +245,7 @@ def test_no_zero_is_written_for_what_was_never_run_unless_the_instructor_says_so
 
 def test_students_of_the_gradebook_without_any_row_handed_in_nothing():
     filled = fill([row("90212")])
-    # The test student is nobody, and who is excused owes nothing.
+    # The test student is no person, and an excused student owes nothing.
     (problem,) = filled.problems
     assert problem == "Lopez, Ana (90211): handed in nothing, so the cell is left as it is"
 

@@ -111,7 +111,7 @@ def test_gradescope_hides_what_the_author_hides(visibility):
     assert data["stdout_visibility"] == "hidden"
 
 
-def test_limits_and_remarks_are_told_in_the_output():
+def test_limits_and_remarks_are_in_the_output():
     data = rendered(reached_limits)
     assert (
         "**Limits of the sandbox that were reached**\n\n"
@@ -123,7 +123,7 @@ def test_limits_and_remarks_are_told_in_the_output():
     assert data["score"] == sum(test["max_score"] for test in data["tests"])
 
 
-def test_limits_of_a_run_that_only_hidden_checks_judge_are_not_told():
+def test_limits_of_a_run_that_only_hidden_checks_judge_are_left_out():
     checks = [
         Told("seen", scenarios=("listen",)),
         Told("other", scenarios=("secret",), visibility="hidden"),

@@ -144,7 +144,7 @@ SAYS = {"listen": FAIL, "renamed": Finding.passed("`x`", "a ` and nothing else")
                 "ROS distribution jazzy",
                 "ab" * 32,
                 "cd" * 32,
-                "listen 7 2.00 s 2.1 ms everything that was waited for had been seen",
+                "listen 7 2.00 s 2.1 ms everything that the scenario waits for was seen",
                 "recordings/listen.mcap",
             ],
         ),
@@ -155,7 +155,7 @@ SAYS = {"listen": FAIL, "renamed": Finding.passed("`x`", "a ` and nothing else")
         (
             not_graded,
             [
-                "Not graded Something of the grader or of the machine failed",
+                "Not graded Something failed in the grader or the machine",
                 "This is not a fault of the submission.",
                 "the check itself failed: KeyError: 'depth' the host took 212 ms",
                 "Traceback (most recent call last):",

@@ -107,7 +107,7 @@ def test_points_are_properties_of_the_suite_and_its_time_has_no_offset():
     assert (properties["score"], properties["max_score"]) == ("3.02", "7")
 
 
-def test_limits_and_remarks_are_told_once_and_cost_nothing():
+def test_limits_and_remarks_are_reported_once_and_cost_nothing():
     root = ET.fromstring(rendered(reached_limits))
     (said,) = root.iter("system-out")
     lines = said.text.splitlines()

@@ -66,7 +66,7 @@ def test_what_a_student_reads_first():
 
 def test_what_is_not_graded_has_no_score():
     text = rendered(not_graded())
-    assert text.startswith("## timed_publisher: Not graded\n\nSomething of the grader")
+    assert text.startswith("## timed_publisher: Not graded\n\nSomething failed in the grader")
     assert "| ! error | The queue depth is 10 | ? / 1 |" in text
 
 
@@ -86,7 +86,7 @@ def test_a_literal_text_shows_as_it_is(text):
     assert shown(f"- {literal(line)}").replace("\N{WORD JOINER}", "") == line
 
 
-def test_nobody_and_no_issue_is_called():
+def test_no_user_is_mentioned_and_no_issue_is_linked():
     assert "@ada" not in literal("ask @ada or ada@example.org")
     assert not re.search(r"#\d|GH-\d", literal("#1, ros2/rclpy#983 and GH-7"))
 
@@ -124,7 +124,7 @@ def test_a_block_of_code_ends_where_it_should(lines):
     ]
 
 
-def test_limits_that_were_reached_and_what_is_worth_knowing_are_told_and_are_text():
+def test_limits_that_were_reached_and_what_is_worth_knowing_are_shown_as_text():
     reached = Breach(at(0.8), "disk", "all space in <b>@home</b>", "64 MiB")
     text = rendered(full_points(breaches=(reached,), environment={"other_domains": "<b>7</b>"}))
     assert "**Limits of the sandbox that were reached**" in text

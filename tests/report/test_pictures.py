@@ -70,7 +70,7 @@ class TestPath:
         away_m = math.dist((stopped.truth[-1].x_m, stopped.truth[-1].y_m), (0.4, 0.1))
         told = figure.caption.partition("It ended ")[2].partition(" from the goal")[0]
         assert told == (f"{away_m:.3g} m" if away_m >= 0.1 else f"{away_m * 100:.3g} cm")
-        assert "the dashed circle is what is near enough, 8 cm." in figure.caption
+        assert "the dashed circle is the tolerance, 8 cm." in figure.caption
 
     def test_a_robot_that_stands(self):
         run = drive(lambda _: None, world="{segments: [[1, -1, 1, 1]]}", seconds=1.0)
@@ -149,7 +149,7 @@ class TestCallbacks:
 
     @given(st.lists(st.builds(Span, st.text(max_size=9), st.floats(), st.floats(), st.booleans())))
     @settings(max_examples=60, deadline=None)
-    def test_whatever_was_reported_the_drawing_is_finite(self, spans):
+    def test_a_drawing_of_any_reports_is_finite(self, spans):
         figure = draw_callbacks(spans, "c")
         assert figure is None or is_finite(figure.wide)
 
@@ -168,7 +168,7 @@ class TestCases:
 
     @given(st.lists(st.none() | st.floats()), st.floats(1e-12, 1e12))
     @settings(max_examples=60, deadline=None)
-    def test_whatever_the_errors_the_drawing_is_finite(self, errors, limit):
+    def test_a_drawing_of_any_errors_is_finite(self, errors, limit):
         cases = Cases("t", "e (deg)", limit, tuple(Case("c", "g", error) for error in errors))
         assert is_finite(draw_cases(cases, "c").wide)
 

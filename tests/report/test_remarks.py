@@ -1,4 +1,4 @@
-"""What is told of a run although it costs nothing."""
+"""Remarks on a run, which cost no points."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_an_ordinary_run_is_not_worth_a_word() -> None:
     [
         (
             {"environment": {"remaps": "/cmdvel:=/cmd_vel"}},
-            "wrong names were put right in this run",
+            "this run corrected wrong names",
             "`/cmdvel:=/cmd_vel`",
         ),
         (
@@ -65,7 +65,7 @@ def test_an_ordinary_run_is_not_worth_a_word() -> None:
         (
             {"nodes": (Node("/ns/rosgrade_probe", Owner.STUDENT, 1), PROBE)},
             "a node of the submission is called `/ns/rosgrade_probe`",
-            "as the node that watches the run",
+            "like the node that watches the run",
         ),
         (
             {"messages": {"/cmd_vel": messages(4000, 3000.0)}},
@@ -74,7 +74,7 @@ def test_an_ordinary_run_is_not_worth_a_word() -> None:
         ),
     ],
 )
-def test_what_is_conspicuous_is_told_in_one_sentence(values, begins, ends) -> None:
+def test_what_is_conspicuous_is_reported_in_one_sentence(values, begins, ends) -> None:
     (said,) = remarks(run(**values))
     assert said.startswith(begins) and said.endswith(ends)
 
@@ -90,7 +90,7 @@ def test_who_writes_to_the_tracer_s_pipe_is_named_once() -> None:
 def test_who_speaks_for_the_robot_is_named_once_with_all_topics() -> None:
     both = tuple(endpoint(topic, Owner.STUDENT, Kind.PUBLISHER) for topic in ("/odom", "/clock"))
     (said,) = remarks(run(endpoints=both))
-    assert said == "the node `/bot` publishes on `/clock` and `/odom`, as a robot does"
+    assert said == "the node `/bot` publishes on `/clock` and `/odom`, which robots do"
 
 
 def test_a_topic_that_the_assignment_asks_for_is_no_robot_s() -> None:
@@ -99,9 +99,9 @@ def test_a_topic_that_the_assignment_asks_for_is_no_robot_s() -> None:
     assert remarks(run(endpoints=(endpoint("/odom", Owner.STUDENT, Kind.SUBSCRIPTION),))) == ()
 
 
-def test_output_beyond_what_is_kept_and_another_domain_are_told() -> None:
+def test_output_beyond_what_is_kept_and_another_domain_are_reported() -> None:
     process = Process("bot/bot", 7, 1, 2, 0, "SIGINT", 0.1, dropped_bytes=1)
     assert remarks(run(processes=(process,), environment={"other_domains": "5"})) == (
         "the submission joined another ROS domain: 5",
-        "`bot/bot` printed more than is kept, by 1 byte",
+        "`bot/bot` printed 1 byte more than rosgrade keeps",
     )

@@ -100,7 +100,7 @@ def test_a_run_is_in_the_result():
     }
 
 
-def test_a_check_of_several_scenarios_tells_the_one_that_decided_and_the_others():
+def test_a_check_of_several_scenarios_names_the_one_that_decided_and_the_others():
     says = {"a": PASS, "b": FAIL, "c": PASS}
     (check,) = written(judged([Told("node", says)], tuple(says)))["checks"]
     assert (check["scenario"], check["observed"]) == ("b", "no node at all")

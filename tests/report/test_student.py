@@ -192,5 +192,5 @@ def test_a_result_without_hidden_checks_is_its_own_copy():
         ([Told("a", points=0), Told("b", FAIL, points=0)], "1 check failed."),
     ],
 )
-def test_the_headline_announces_hidden_checks_and_worries_nobody_without_reason(checks, said):
+def test_the_headline_announces_hidden_checks_only_where_there_are_some(checks, said):
     assert headline(for_student(judged(checks).result)) == said

@@ -84,7 +84,7 @@ Worth knowing
     assert limits.endswith("  note      10 more: see the report\n\nScore: 3 of 3 points\n")
 
 
-def test_a_remark_on_several_runs_is_told_once():
+def test_a_remark_on_several_runs_is_shown_once():
     run = make_run(environment={"other_domains": "7"})
     runs = {"listen": run, "far": replace(run, scenario="far")}
     sample = judged([Told("node")], ("listen", "far"))
@@ -94,7 +94,7 @@ def test_a_remark_on_several_runs_is_told_once():
     )
 
 
-def test_what_is_the_same_in_several_scenarios_is_said_once():
+def test_what_is_the_same_in_several_scenarios_is_shown_once():
     evidence = Evidence(log=("killed",))
     same = Finding.failed("a period of 300 ms", "a median of 322 ms", "Use a timer.", evidence)
     says = {"near": same, "far": replace(same, observed="a median of 310 ms"), "late": same}
@@ -115,7 +115,7 @@ def test_what_was_not_graded_has_no_score():
     text = not_graded().printed()
     assert "Score" not in text
     assert "! error" in text and "? / 1" in text
-    assert "Not graded. Something of the grader or of the machine failed" in text
+    assert "Not graded. Something failed in the grader or the machine" in text
 
 
 def test_a_terminal_gets_colours_unless_they_are_unwanted(monkeypatch):

@@ -19,7 +19,7 @@ LIMIT_S = 10.0
 
 
 class Visitor(threading.Thread):
-    """Takes a place, says so, and keeps it until it is told to go."""
+    """Takes a place, says so, and keeps it until the test lets it go."""
 
     def __init__(self, admission: Admission, *, alone: bool = False, starts: bool = True) -> None:
         super().__init__(daemon=True)

@@ -110,25 +110,25 @@ def test_a_wait_is_a_disturbance_only_as_far_as_others_had_the_cpus(
 
 @pytest.mark.parametrize(("own_ms", "others_ms"), [(20, 100), (60, 100), (90, 10)])
 def test_a_cell_that_is_flooded_is_no_disturbance(own_ms: int, others_ms: int) -> None:
-    """The student has one of two CPUs, and somebody the other one."""
+    """The student has one of two CPUs, and others have the other one."""
     after = CpuTimes(100 * MS, 100 * MS, 0, own_ns=own_ms * MS)
     assert interval(CpuTimes(0, 0, 0), after, cpus=2).others_ns == others_ms * MS
 
 
-def test_a_process_that_takes_its_time_with_it_makes_nobody_owe_anything() -> None:
+def test_a_process_that_takes_its_time_with_it_adds_to_no_account() -> None:
     ended = interval(CpuTimes(0, 500 * MS, 0), CpuTimes(100 * MS, 0, 0), cpus=2)
     assert ended.others_ns == 200 * MS
 
 
 @pytest.mark.parametrize("cpus", [2, 4])
 def test_what_is_hidden_is_not_taken_for_the_machine_s(cpus: int) -> None:
-    """Two processes were there, and ended with nobody to wait for them."""
+    """Two processes were there, and ended without a parent that waited for them."""
     after = CpuTimes(100 * MS, 40 * MS, 0, orphans=2)
     others_ms = interval(CpuTimes(0, 0, 0), after, cpus).others_ns / MS
     assert others_ms == max(0, cpus * 100 - 40 - 2 * 100)
 
 
-def test_a_relay_of_processes_that_nobody_waits_for_is_no_disturbance() -> None:
+def test_a_relay_of_processes_without_a_parent_s_wait_is_no_disturbance() -> None:
     script = """
 import os, signal, time
 signal.signal(signal.SIGCHLD, signal.SIG_IGN)

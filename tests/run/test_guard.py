@@ -1,4 +1,4 @@
-"""A guard in this process: what it is told of, and what it says of that."""
+"""A guard in this process: the calls that it is asked about, and its words for them."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_a_process_id_counts_by_the_bits_that_the_kernel_looks_at() -> None:
     assert violation_of("kill", ((1 << 32) + INIT, 9, 0, 0, 0, 0)) is not None
 
 
-def test_what_a_process_asks_for_is_refused_and_told(guard: Guard) -> None:
+def test_what_a_process_asks_for_is_refused_and_noted(guard: Guard) -> None:
     source = (
         "import ctypes\n"
         "libc = ctypes.CDLL(None, use_errno=True)\n"
@@ -93,7 +93,7 @@ def test_a_process_may_do_what_it_likes_with_its_own(guard: Guard) -> None:
 
 def test_who_stands_guard_is_not_under_it(guard: Guard) -> None:
     run(guard, "")
-    # No such command: whoever asks, it comes to nothing.
+    # No such command: it has no effect.
     assert ctypes.CDLL(None).syscall(CALLS["bpf"], -1, 0, 0) == -1
     assert guard.violations == ()
 
@@ -113,7 +113,7 @@ def test_who_stands_guard_is_not_under_it(guard: Guard) -> None:
         ("import fcntl; fcntl.fcntl(0, fcntl.F_GETFD)", False),
     ],
 )
-def test_every_way_to_kill_a_process_from_within_is_told(
+def test_every_way_to_kill_a_process_from_within_is_noted(
     guard: Guard, source: str, told: bool
 ) -> None:
     command = [sys.executable, "-S", "-c", source]

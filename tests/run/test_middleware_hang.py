@@ -82,7 +82,7 @@ def order(scenario: Scenario) -> CellOrder:
 
 
 @pytest.mark.parametrize("name", list_assignments())
-def test_no_check_takes_a_run_that_hung_for_a_fault_of_ours(name: str) -> None:
+def test_no_check_takes_a_run_that_hung_for_a_fault_of_rosgrade(name: str) -> None:
     loaded = load_assignment(name)
     # Each by itself, not skipped for what another one would say before it.
     alone = [

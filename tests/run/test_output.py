@@ -1,4 +1,4 @@
-"""Output is drained whatever is written, and what is kept stays within bounds."""
+"""All output is drained, and what is kept stays within bounds."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_the_first_and_the_last_lines_are_kept() -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.binary(max_size=20_000), max_size=8))
-def test_whatever_is_written_is_read_within_bounds(chunks: list[bytes]) -> None:
+def test_any_output_is_read_within_bounds(chunks: list[bytes]) -> None:
     lines = read(*chunks, limit=10_000)
     # A line may exceed the bound alone, but never the longest line.
     assert sum(len(line.text) for line in lines) <= 5_000 + max(5_000, 8192)

@@ -1,4 +1,4 @@
-"""The process that forks cells: it may die, and what it holds is nobody else's."""
+"""The process that forks cells: it may end at any time, and no cell inherits what it holds."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_the_end_does_not_wait_for_a_cell_that_hangs(boxed: bool, sandbox: Sandb
 
 
 @pytest.mark.slow
-def test_a_cell_that_hangs_does_not_outlive_long_whoever_could_kill_it() -> None:
+def test_a_cell_that_hangs_does_not_long_outlive_its_grader() -> None:
     prefork_server = PreforkServer(ros.find())
     cell = CellProcess(prefork_server)
     hung = process_of(cell, prefork_server)
@@ -110,13 +110,13 @@ def test_no_cell_is_made_where_files_of_the_students_python_were_deleted(
     check()
     assert prefork_server.is_alive
     next(sandbox.python_tree.glob("lib/python3*/site-packages/rclpy/node.py")).unlink()
-    with pytest.raises(GraderFault, match="files of the students' Python were deleted"):
+    with pytest.raises(GraderFault, match="files of the sandbox's Python were deleted"):
         check()
     assert not prefork_server.is_alive
     prefork_server.close()
 
 
-def test_whoever_installs_a_package_meanwhile_spoils_no_run(
+def test_the_installation_of_a_package_meanwhile_spoils_no_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sandbox: Sandbox
 ) -> None:
     course = assignment(until={"messages": 3})

@@ -45,7 +45,7 @@ WORDS = ["a", "b", "c", "d"]
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """The recording of a node that was told four words, and its install space."""
+    """The recording of a node that was sent four words, and its install space."""
     folder = tmp_path_factory.mktemp("replay")
     course = assignment(
         record=[{"topic": "/echo", "type": "std_msgs/msg/String"}],
@@ -118,7 +118,7 @@ def test_ctrl_c_ends_the_node_and_leaves_nothing(run: tuple[Path, Path], tmp_pat
 
 
 @pytest.mark.ros
-def test_a_node_that_never_listens_is_told(run: tuple[Path, Path], tmp_path: Path) -> None:
+def test_a_node_that_never_listens_is_reported(run: tuple[Path, Path], tmp_path: Path) -> None:
     file, _ = run
     place = install(tmp_path, "import time\nprint('no robot today', flush=True)\n")
     player = replay(file, place, tmp_path)

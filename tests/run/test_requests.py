@@ -88,7 +88,7 @@ def test_calls_parameters_and_logs_of_one_node(run_node: RunNode) -> None:
         ("log.contains", {"text": "enable", "level": "INFO", "at_least": 3, "at_most": 3}),
     ]:
         finding = judge(name, recording, **parameters)
-        # A busy machine may have disturbed it, which is told and costs nobody a point.
+        # A busy machine may have disturbed it, which is reported and costs no point.
         assert finding.status is Status.PASSED or finding.disturbed, finding
     records = [line for line in recording.log if line.stream == "rosout"]
     assert {(line.process, line.level) for line in records} == {("bot", "INFO")}

@@ -73,7 +73,7 @@ def test_the_robot_stops_where_the_node_stops_it(run_node: RunNode, world: str) 
     assert recording.scene.command_topic == "/cmd_vel"
 
 
-def test_what_the_sensors_said_is_recorded(run_node: RunNode, world: str) -> None:
+def test_the_messages_of_the_sensors_are_recorded(run_node: RunNode, world: str) -> None:
     recording = run_node(driver(), record=[], world=world, until={"elapsed": "2 s"}, timeout="15 s")
     scans = recording.on("/scan")
     assert len(scans) == pytest.approx(10, abs=2)

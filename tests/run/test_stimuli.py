@@ -139,7 +139,7 @@ def test_messages_of_files_reach_the_node_in_their_order_and_at_their_times(
     assert heard["/count"] == [7, -1, 2**63 - 1]
     for topic, due_s in (("/chatter", times_s), ("/numbers", [0.0, 0.2, 0.4])):
         stamps = [one.stamp_ns for one in recording.sent[topic]]
-        # A late cell is no test of ours; nothing comes before its time, but for how late the
+        # A late cell is not tested here; nothing comes before its time, but for how late the
         # first one was.
         gaps = [(stamp - stamps[0]) / 1e9 - due for stamp, due in zip(stamps, due_s, strict=True)]
         assert min(gaps) > -0.2
@@ -220,5 +220,5 @@ def test_calls_keep_their_own_rhythm_beside_that_of_the_messages(run_node: RunNo
     recording = run_node(TICKING, **echoing(stimuli=[stimulus], until={"messages": 11}))
     asked = [call.requested_ns for call in recording.calls]
     gaps_s = [(other - one) / 1e9 for one, other in pairwise(asked)]
-    # Whoever waits for the next message calls every 300 ms, unless the machine holds him up too.
+    # A caller that waits for the next message calls every 300 ms, unless the machine is busy.
     assert 0.22 < median(gaps_s) < 0.29 + recording.stolen_s(asked[0], asked[-1])

@@ -89,7 +89,7 @@ def test_a_process_that_multiprocessing_spawns_is_heard(tmp_path: Path) -> None:
     assert child in [line["pid"] for line in lines if line["kind"] == "started"]
 
 
-def test_what_the_code_itself_imports_is_told_where_it_needs_it(tmp_path: Path) -> None:
+def test_what_the_code_itself_imports_is_declared_where_it_needs_it(tmp_path: Path) -> None:
     folder = tmp_path / "install" / "lib" / "package"
     folder.mkdir(parents=True)
     for name in ("one", "two", "three", "four", "five"):
@@ -106,7 +106,7 @@ def test_what_the_code_itself_imports_is_told_where_it_needs_it(tmp_path: Path) 
 
 
 def run_traced(program: str, *paths: Path) -> str:
-    """What the tracer says of a program, a file or its text, which must end well."""
+    """The declarations of a traced program, a file or its text, which must end well."""
     read, write = os.pipe()
     environment = {
         **os.environ,

@@ -23,7 +23,7 @@ for _ in range(5):
                 pass
             os._exit(0)
     try:
-        # Both are gone then, whoever takes their time.
+        # Both have ended then, and their parent has their time or none has it.
         os.wait(), os.wait()
     except ChildProcessError:
         pass
@@ -46,7 +46,7 @@ def test_what_a_child_took_that_was_waited_for_is_its_parent_s() -> None:
         assert (looked(*there).ticks, looked(*there).ended) == (0, 0)
 
 
-def test_what_a_child_took_that_nobody_waited_for_is_kept() -> None:
+def test_what_a_child_took_without_a_parent_s_wait_is_kept() -> None:
     before, after = {PARENT: Taken(5, 7), CHILD: Taken(30, 10)}, {PARENT: Taken(5, 7)}
     account = looked(before, before, before, after)
     assert account.ticks == 0
@@ -56,7 +56,7 @@ def test_what_a_child_took_that_nobody_waited_for_is_kept() -> None:
     assert (account.ticks, account.ended) == (40, 0)
 
 
-def test_where_everybody_was_read_whoever_is_missing_has_ended() -> None:
+def test_a_process_that_is_missing_in_a_complete_look_has_ended() -> None:
     account = looked({PARENT: Taken(5, 0), CHILD: Taken(30, 0), OTHER: Taken(0, 0)})
     account.look({PARENT: Taken(5, 0)}, complete=True)
     assert (account.ticks, account.ended) == (30, 2)
@@ -115,7 +115,7 @@ def test_the_time_of_children_counts_whether_they_are_waited_for_or_not(action: 
         # The time between two looks; all have ended when it writes a line.
         while not select.select([parent.stdout], [], [], 0.02)[0]:
             account.used_s(usage_of([parent.pid]))
-        # Who is missing twice has ended for certain.
+        # A process that is missing twice has ended for certain.
         account.used_s(usage_of([parent.pid]))
         stolen_s = account.used_s(usage_of([parent.pid]))
         parent.communicate(b"\n")

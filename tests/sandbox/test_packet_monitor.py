@@ -66,6 +66,6 @@ def test_heartbeats_tell_what_a_writer_of_a_program_keeps() -> None:
     message += heartbeat(builtin, 1, 9) + heartbeat(own, 13, 12) + heartbeat(own, 4, 4, ">")
     writer = (prefix + own).hex()
     assert list(heartbeats(message)) == [(writer, 3, 12), (writer, 4, 4)]
-    # Anybody may send anything.
+    # Every process may send anything.
     assert not list(heartbeats(message[:40]))
     assert not list(heartbeats(message[:20] + bytes(30)))

@@ -29,7 +29,7 @@ def test_root_goes_on_as_nobody_before_bubblewrap(monkeypatch: pytest.MonkeyPatc
     assert command[-5:] == ["--ro-bind", "/run/rosgrade/0", "/root/a", "--", "true"]
 
 
-def test_code_of_ours_is_covered_where_it_would_be_shown() -> None:
+def test_rosgrade_s_code_is_covered_where_it_would_be_shown() -> None:
     import grader
 
     code = Path(grader.__file__).resolve().parent
@@ -55,7 +55,7 @@ def test_a_missing_program_is_named_with_its_package(monkeypatch: pytest.MonkeyP
     assert trial.try_sandbox() == Trial("bwrap is not installed", "sudo apt install bubblewrap")
 
 
-def test_everybody_may_read_the_students_python_whatever_the_umask(tmp_path: Path) -> None:
+def test_every_user_may_read_the_students_python_under_any_umask(tmp_path: Path) -> None:
     before = os.umask(0o077)
     try:
         tree = student_prefix(tmp_path).path
@@ -66,7 +66,7 @@ def test_everybody_may_read_the_students_python_whatever_the_umask(tmp_path: Pat
     assert all(path.stat().st_mode & 0o444 == 0o444 for path in (tree / "bin").iterdir())
 
 
-def test_the_student_s_python_holds_ros_and_nothing_of_ours(tmp_path: Path) -> None:
+def test_the_student_s_python_holds_ros_and_not_rosgrade(tmp_path: Path) -> None:
     tree = student_prefix(tmp_path).path
     (site,) = tree.glob("lib/python3*/site-packages")
     there = {path.name for path in site.iterdir()}
@@ -77,15 +77,15 @@ def test_the_student_s_python_holds_ros_and_nothing_of_ours(tmp_path: Path) -> N
     assert not list(tree.parent.glob(".unfinished*"))
 
 
-def test_a_python_that_somebody_tidied_up_is_found_out_and_made_anew(tmp_path: Path) -> None:
+def test_a_python_with_deleted_files_is_noticed_and_made_anew(tmp_path: Path) -> None:
     sandbox = Sandbox(tmp_path)
     check = sandbox.watched()
     check()
     (site,) = sandbox.python_tree.glob("lib/python3*/site-packages")
     (site / "rclpy" / "node.py").unlink()
-    with pytest.raises(GraderFault, match="files of the students' Python were deleted"):
+    with pytest.raises(GraderFault, match="files of the sandbox's Python were deleted"):
         check()
-    # Whoever ran beside it is not blamed either, although a whole one is there by now.
+    # A run beside it is not blamed either, although a whole environment is there by now.
     (site,) = sandbox.python_tree.glob("lib/python3*/site-packages")
     assert (site / "rclpy" / "node.py").is_file()
     with pytest.raises(GraderFault):
@@ -97,7 +97,7 @@ def test_a_damaged_python_or_filter_is_made_anew(tmp_path: Path) -> None:
     sandbox = Sandbox(tmp_path)
     damaged = next(sandbox.python_tree.glob("lib/python3*/site-packages/rclpy/node.py"))
     whole = damaged.read_bytes()
-    # As a file of its own: the environment of ours has the same by a hard link.
+    # As a file of its own: rosgrade's environment has the same by a hard link.
     damaged.unlink()
     damaged.write_bytes(bytes(len(whole)))
     file = sandbox.filter_file(b"a program")
@@ -129,7 +129,7 @@ def trees(folder: Path, ages_s: dict[str, float]) -> None:
         os.utime(folder / name, (now_s - age_s, now_s - age_s))
 
 
-def test_what_only_rosgrade_needs_is_told_from_what_a_student_may_import() -> None:
+def test_what_only_rosgrade_needs_is_distinguished_from_what_a_student_may_import() -> None:
     modules = ["jinja2", "scipy", "numpy", "math", "yaml", "rclpy", "nobody_has_this"]
     assert unlisted(modules, ()) == ("jinja2", "scipy")
     assert unlisted(modules, ("SciPy",)) == ("jinja2",)

@@ -41,7 +41,7 @@ def test_the_defaults_are_those_of_turtlebot3_in_gazebo() -> None:
     assert not topics.clock.enabled
 
 
-def test_everything_can_be_said_in_yaml() -> None:
+def test_everything_can_be_set_in_yaml() -> None:
     options = read(
         """
 robot: {model: waffle, pose: [1, 20 cm, 90 deg], command_timeout: 500 ms}

@@ -59,7 +59,7 @@ def test_a_wrong_separation_scales_turns() -> None:
     assert pose.yaw_rad == pytest.approx(1.0 / (1.0 + 0.05 * errors[2]))
 
 
-def test_slip_grows_with_the_square_root_of_the_way() -> None:
+def test_wheel_slip_grows_with_the_square_root_of_the_way() -> None:
     ends = [
         believed(odometry(Pose(0.0, 0.0, 0.0), seed, drift={"slip": "10 mm"}), [(0.04, 0.0)] * 100)
         for seed in range(300)

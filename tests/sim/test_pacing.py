@@ -24,7 +24,7 @@ def test_missed_steps_are_all_due_but_not_all_at_once() -> None:
     assert pacer.due(-1000) == 0
 
 
-def test_what_is_late_is_told() -> None:
+def test_what_is_late_is_reported() -> None:
     pacer = Pacer(0)
     assert pacer.lateness(STEP_NS + LATE_NS) is None
     assert pacer.lateness(STEP_NS + LATE_NS + 1) == Lateness(1, 1, LATE_NS + 1)

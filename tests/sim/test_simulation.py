@@ -149,7 +149,7 @@ def test_the_robot_obeys_its_own_drives_at_their_times() -> None:
     assert asked == [(0.0, 0.0)] * 10 + [(0.0, 1.0)] * 40 + [(0.1, 0.0)] * 50
 
 
-def test_with_a_timeout_the_robot_stops_and_it_is_told_once() -> None:
+def test_with_a_timeout_the_robot_stops_and_it_is_reported_once() -> None:
     subject = simulation(robot={"command_timeout": "500 ms"})
     steps = run(subject, 300, lambda i: Twist(0.1, 0.0) if i in (0, 30) else None)
     told = [
@@ -168,7 +168,7 @@ def test_with_a_timeout_the_robot_stops_and_it_is_told_once() -> None:
     "command",
     [Twist(math.nan, 0.0), Twist(0.0, math.nan), Twist(math.inf, 0.0), Twist(0.1, -math.inf)],
 )
-def test_a_command_that_is_not_finite_stops_the_robot_and_is_told(command: Twist) -> None:
+def test_a_command_that_is_not_finite_stops_the_robot_and_is_reported(command: Twist) -> None:
     subject = simulation()
     run(subject, 100, lambda i: Twist(0.2, 1.0) if i == 0 else None)
     step = subject.advance(command)
@@ -181,7 +181,7 @@ def test_a_command_that_is_not_finite_stops_the_robot_and_is_told(command: Twist
     assert run(subject, 50, lambda _: Twist(0.1, 0.0))[-1].twist == Twist(0.1, 0.0)
 
 
-def test_beginning_and_end_of_a_contact_are_told() -> None:
+def test_beginning_and_end_of_a_contact_are_reported() -> None:
     world = parse_world("segments: [[0.3, -1, 0.3, 1]]")
     subject = simulation(world)
     steps = run(subject, 300, {0: Twist(0.2, 0), 200: Twist(-0.2, 0)}.get)
@@ -222,7 +222,7 @@ def test_a_robot_inside_a_wall_is_refused() -> None:
 
 
 @pytest.mark.parametrize("drift", [{}, {"slip": "1 mm"}])
-def test_a_push_moves_the_robot_on_its_way_and_odometry_tells_of_it(drift: dict[str, str]) -> None:
+def test_a_push_moves_the_robot_on_its_way_and_odometry_shows_it(drift: dict[str, str]) -> None:
     push = {"after": "20 cm", "ahead": "-10 cm", "turn": "30 deg", "lasts": "500 ms"}
     ahead = {"robot": {"pushes": [push]}, "odometry": {"drift": drift}}
     steps = run(simulation(**ahead), 400, lambda i: Twist(0.1, 0.0) if i == 0 else None)

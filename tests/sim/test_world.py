@@ -1,4 +1,4 @@
-"""World files: what they mean, and what is said about mistakes."""
+"""World files: what they mean, and the messages about mistakes."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def test_quantities_are_read_in_si(text: str | float, dimension: Dimension, si: 
     [
         (5, Dimension.TIME, "5 has no unit: write for example '5 s'"),
         ("5", Dimension.ANGLE, "'5' has no unit: write for example '5 rad'"),
-        # Somebody means 5 %, and would tolerate 500 %.
+        # Its author means 5 %, and would tolerate 500 %.
         (5, Dimension.RATIO, "5 has no unit: did you mean '5 %'?"),
         (1, Dimension.RATIO, "1 has no unit: did you mean '1 %'?"),
         ("5 m", Dimension.TIME, "'m' is a unit of length, but a time is needed here (s, ms, "),

@@ -1,4 +1,4 @@
-"""Every mistake in a YAML file is told with its line, in the words of somebody who writes YAML."""
+"""Every mistake in a YAML file is reported with its line, in words for an author of YAML."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_a_good_assignment_is_read() -> None:
         ("~", "checks[0]: expected keys and values, not nothing"),
     ],
 )
-def test_a_mistake_in_a_check_is_told_in_words(written: str, said: str) -> None:
+def test_a_mistake_in_a_check_is_reported_in_words(written: str, said: str) -> None:
     assert entry(written) == [f"assignment.yaml:13: {said}"]
 
 
@@ -101,7 +101,7 @@ def test_a_key_unlike_any_other_lists_what_is_allowed() -> None:
     )
 
 
-def test_all_mistakes_are_told_at_once_in_the_order_of_their_lines() -> None:
+def test_all_mistakes_are_reported_at_once_in_the_order_of_their_lines() -> None:
     text = """\
 rosgrade: 2
 id: lesson
@@ -194,7 +194,7 @@ _KEYS = ("rosgrade", "id", "title", "packages", "scenarios", "checks", "chekcs")
 
 
 @given(st.dictionaries(st.sampled_from(_KEYS), _value))
-def test_whatever_is_written_each_mistake_has_a_line(data: dict[str, Any]) -> None:
+def test_in_any_document_each_mistake_has_a_line(data: dict[str, Any]) -> None:
     text = json.dumps(data, indent=1)
     for mistake in mistakes(text):
         assert mistake.startswith("assignment.yaml:")

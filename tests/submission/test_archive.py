@@ -176,7 +176,7 @@ def test_a_rare_compression_is_refused(tmp_path: Path) -> None:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_LZMA) as archive:
         archive.writestr("a.py", b"x" * 1000)
-    assert "rare method" in refusal(tmp_path, buffer.getvalue())
+    assert "rare compression method" in refusal(tmp_path, buffer.getvalue())
 
 
 # The second one is read by old Pythons in quadratic time.
@@ -204,7 +204,9 @@ def test_a_tar_that_ends_too_early_is_refused(tmp_path: Path, mode: str) -> None
         (b"BZh9", "broken"),
     ],
 )
-def test_what_is_no_archive_is_said_to_be_none(tmp_path: Path, content: bytes, reason: str) -> None:
+def test_a_file_that_is_no_archive_is_refused_as_such(
+    tmp_path: Path, content: bytes, reason: str
+) -> None:
     assert reason in refusal(tmp_path, content)
 
 

@@ -41,7 +41,7 @@ def left_behind(folder: Path) -> list[int]:
     return found
 
 
-def test_output_and_exit_status_are_told(tmp_path: Path) -> None:
+def test_output_and_exit_status_are_returned(tmp_path: Path) -> None:
     outcome = run("import sys; print('out'); print('err', file=sys.stderr); sys.exit(3)", tmp_path)
     assert outcome.status == 3
     assert sorted(outcome.output.split()) == ["err", "out"]
@@ -54,7 +54,7 @@ def test_what_is_written_until_the_end_is_read(
     """As on a busy machine, where the reader comes to itself when all has ended."""
 
     class Late(selectors.DefaultSelector):
-        """Finds nothing at first, and tells it when the command is gone."""
+        """Finds nothing at first, and then waits until the command has ended."""
 
         found_nothing = False
 
@@ -120,7 +120,7 @@ def test_too_much_output_ends_it_and_is_not_kept(tmp_path: Path) -> None:
     assert "bytes left out" in outcome.output
 
 
-def test_lines_are_told_while_it_runs(tmp_path: Path) -> None:
+def test_lines_are_reported_while_it_runs(tmp_path: Path) -> None:
     lines: list[str] = []
     run_bounded(
         [sys.executable, "-c", "print('a'); print('b' * 10000); print('c', end='')"],

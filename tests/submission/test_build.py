@@ -135,7 +135,7 @@ def test_without_setup_cfg_and_with_a_syntax_error_in_a_node_it_is_built(
     assert package_of(found).misplaced_executables == ("bot_pub",)
 
 
-def test_a_bad_e_mail_is_told_and_does_not_hide_other_packages(
+def test_a_bad_e_mail_is_reported_and_does_not_hide_other_packages(
     tree: Tree, real_ros: RosInstallation
 ) -> None:
     tree.package({"package.xml": MANIFEST.replace("ada@example.org", "a@b.c")})
@@ -313,7 +313,7 @@ def test_a_package_of_jazzy_that_is_not_installed_keeps_only_what_rests_on_it(
         assert cause is not None and cause.ours
 
 
-def test_without_colcon_it_is_said_how_to_get_it(tree: Tree, named_ros: RosInstallation) -> None:
+def test_without_colcon_the_text_says_how_to_get_it(tree: Tree, named_ros: RosInstallation) -> None:
     tree.package()
     with pytest.raises(GraderFault, match="colcon is not installed"):
         prepare(tree.root, named_ros, cache=tree.root.parent / "cache")

@@ -37,7 +37,7 @@ def names(tmp_path: Path) -> set[str]:
     return {path.name for path in (tmp_path / "builds").iterdir() if path.suffix != ".stamp"}
 
 
-def test_what_was_stored_is_found_and_said_to_be_cached(cache: BuildCache) -> None:
+def test_what_was_stored_is_found_and_marked_as_cached(cache: BuildCache) -> None:
     first = stored(cache)
     found = cache.find("k")
     assert found is not None

@@ -122,7 +122,7 @@ LOGS = {
             Hello
         SyntaxError: invalid syntax
         """,
-        "src/bot/setup.py: setup.py prints something, which colcon takes for its answer",
+        "src/bot/setup.py: setup.py prints something: colcon cannot read its answer then",
     ),
     "CMake": (
         """\
@@ -232,7 +232,7 @@ def test_a_log_that_quotes_thousands_of_names_is_read_at_once() -> None:
     assert find_build_error(f"Starting >>> bot\n{'setup.py' * 16_000}\n", ("bot",), SOURCES) is None
 
 
-def test_where_nothing_is_said_the_package_that_was_being_built_is_named() -> None:
+def test_without_a_message_the_package_that_was_being_built_is_named() -> None:
     log = "Starting >>> bot\nFinished <<< bot\nStarting >>> c\n"
     assert str(last_started(log, SOURCES, "too late")) == "src/c/CMakeLists.txt: too late"
     assert last_started("", SOURCES, "too late") is None
@@ -246,7 +246,7 @@ def test_where_nothing_is_said_the_package_that_was_being_built_is_named() -> No
             "/usr/bin/ld: x.o: undefined reference to `drive'\ncollect2: error: ld returned 1",
             "/usr/bin/ld: x.o: undefined reference to `drive'",
         ),
-        ("", "it says nothing"),
+        ("", "there is no error message"),
     ],
 )
 def test_where_no_file_is_blamed_the_log_s_own_words_are_shown(said: str, words: str) -> None:

@@ -51,7 +51,7 @@ def test_what_is_commented_out_or_quoted_is_no_command(text: str) -> None:
     assert not [item for item in read_commands(text) if item.name.startswith("rosidl")]
 
 
-def test_a_variable_that_nobody_knows_stays_as_it_is_written() -> None:
+def test_an_unknown_variable_stays_as_it_is_written() -> None:
     assert arguments("rosidl_generate_interfaces(bot ${found})") == ("bot", "${found}")
 
 

@@ -45,7 +45,7 @@ def test_names_that_are_no_text_are_left_out(tree: Tree) -> None:
     assert inspect(root, ["bot_publisher"], {}) == expected
 
 
-def test_what_ros2_run_and_python_find_is_told(tree: Tree) -> None:
+def test_what_ros2_run_and_python_find_is_listed(tree: Tree) -> None:
     sources = {"src/bot/bot_publisher/node.py": hash_of(b"x = 1\n")}
     found = inspect(install(tree), ["bot_publisher", "other"], sources)
     assert found.executables == {"bot_publisher": ("bot_pub",), "other": ()}
@@ -95,7 +95,7 @@ def test_of_equal_files_the_one_with_the_most_similar_path_is_the_origin() -> No
     }
 
 
-def test_an_install_space_is_tidied_before_anybody_looks_into_it(tmp_path: Path) -> None:
+def test_an_install_space_is_tidied_before_it_is_read(tmp_path: Path) -> None:
     install = tmp_path / "install"
     (install / "lib").mkdir(parents=True)
     (install / "lib/libx.so.1").touch()
@@ -132,7 +132,7 @@ def test_what_leads_out_of_an_install_space_is_named_and_nothing_of_it_is_used(
     (install / "lib").mkdir(parents=True)
     (install / "lib/up").symlink_to("../../..")
     os.mkfifo(install / "lib/pipe")
-    assert refused() == "the build installed 'lib/pipe', which is no file, folder or link"
+    assert refused() == "the build installed 'lib/pipe', which is not a file, folder or link"
     assert not install.exists()
 
 

@@ -46,7 +46,7 @@ def test_without_ruff_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert lint(tmp_path, ["a.py"]).problem == "ruff is not installed: `pip install ruff`"
 
 
-def test_a_ruff_that_fails_is_told(tmp_path: Path) -> None:
+def test_a_ruff_that_fails_is_reported(tmp_path: Path) -> None:
     ruff = tmp_path / "ruff"
     ruff.write_text("#!/bin/sh\nexit 101\n")
     ruff.chmod(0o755)
@@ -63,7 +63,7 @@ def test_the_rules_are_known() -> None:
 
 @settings(max_examples=150, deadline=None)
 @given(st.text(max_size=40).map(lambda text: f"class A(B[{text!r}], c.d, e(f)): x = print\n{text}"))
-def test_an_outline_is_made_of_whatever_python_reads(text: str) -> None:
+def test_an_outline_is_made_of_everything_that_python_reads(text: str) -> None:
     try:
         tree = ast.parse(text)
     except (SyntaxError, ValueError):
@@ -82,7 +82,9 @@ def test_a_deep_tree_is_outlined() -> None:
     "text",
     ['name = {"a": 1}\nprint(f"{name["a"]}")\n', "x = 1\ntype Speed = float\n"],
 )
-def test_syntax_of_jazzy_s_python_is_told_from_a_mistake(tmp_path: Path, text: str) -> None:
+def test_syntax_of_jazzy_s_python_is_distinguished_from_a_mistake(
+    tmp_path: Path, text: str
+) -> None:
     (tmp_path / "node.py").write_text(text)
     [error] = newer_syntax(tmp_path, ["node.py"], python=(3, 11))
     assert (error.file, error.line) == ("node.py", 2)

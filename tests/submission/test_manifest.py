@@ -38,7 +38,7 @@ def test_name_build_type_and_dependencies_are_read() -> None:
     )
 
 
-def test_an_entry_inside_export_is_told_apart() -> None:
+def test_an_entry_inside_export_is_kept_apart() -> None:
     found = changed("<export>", "<export>\n<exec_depend>std_msgs</exec_depend>")
     assert [entry.name for entry in found.dependencies] == ["rclpy", "geometry_msgs"]
     assert [(entry.name, entry.kind) for entry in found.misplaced] == [

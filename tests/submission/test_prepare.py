@@ -38,13 +38,13 @@ def test_an_empty_folder_and_an_empty_zip(
     [
         ({"bot.txt": ""}, "no package.xml was found"),
         ({"node.py": NODE}, "hand in the whole package, not only its Python files"),
-        ({"bot.rar": ""}, "unpack bot.rar, and hand in what is in it"),
+        ({"bot.rar": ""}, "unpack bot.rar, and hand in its content"),
         ({"install/bot/package.xml": "", "x": ""}, "build, install, log"),
         ({"COLCON_IGNORE": "", "bot/package.xml": ""}, "folders with a COLCON_IGNORE"),
         ({".src/bot/package.xml": ""}, "hidden folders"),
     ],
 )
-def test_a_submission_without_a_package_is_told_what_to_do(
+def test_a_submission_without_a_package_gets_advice(
     tree: Tree, named_ros: RosInstallation, files: dict[str, str | bytes], hint: str
 ) -> None:
     assert hint in problem(tree.write(files), named_ros)
@@ -90,6 +90,6 @@ def test_two_folders_that_are_refused_are_not_taken_for_the_same(
     for number in range(3):
         folder = tmp_path / str(number) / "ws"
         (folder / "/".join("x" * (50 + number))).mkdir(parents=True)
-        assert "too many folders in one another" in problem(folder, named_ros)
+        assert "folders are nested too deep" in problem(folder, named_ros)
         prints |= {fingerprint(folder), fingerprint(folder)}
     assert len(prints) == 3

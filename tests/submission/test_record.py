@@ -36,7 +36,7 @@ def test_a_record_survives_json(tmp_path: Path, record: SubmissionRecord) -> Non
 def test_a_file_that_holds_no_record_is_refused(tmp_path: Path, text: str, place: str) -> None:
     file = tmp_path / "submission.json"
     file.write_text(text)
-    with pytest.raises(UsageError, match=f"is no record of a submission.*(?s:.*){place}"):
+    with pytest.raises(UsageError, match=f"is not the record of a submission.*(?s:.*){place}"):
         read_record(file)
-    with pytest.raises(UsageError, match="is no record of a submission"):
+    with pytest.raises(UsageError, match="is not the record of a submission"):
         read_record(tmp_path / "none.json")

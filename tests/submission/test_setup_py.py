@@ -42,7 +42,7 @@ setuptools.setup(name=name, entry_points=GROUPS)
     assert [(e.name, e.target) for e in setup(source).entry_points] == [("pub", "bot.node:main")]
 
 
-def test_a_malformed_entry_point_is_told_with_its_line() -> None:
+def test_a_malformed_entry_point_is_reported_with_its_line() -> None:
     found = setup("setup(entry_points={'console_scripts': [\n 'pub : bot.node:main',\n 'x']})")
     assert found.entry_points == ()
     assert [str(error) for error in found.malformed] == [

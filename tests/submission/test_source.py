@@ -18,7 +18,7 @@ def error(data: bytes) -> SourceError:
     return found
 
 
-def test_a_syntax_error_is_told_as_python_tells_it() -> None:
+def test_a_syntax_error_is_reported_in_python_s_words() -> None:
     found = error(b"import rclpy\ndef main(:\n    pass\n")
     assert (found.line, found.message) == (2, "SyntaxError: invalid syntax")
     assert error(b"def main():\npass\n").message.startswith("IndentationError: expected")

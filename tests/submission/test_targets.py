@@ -54,11 +54,11 @@ def with_node(source: str | None) -> dict[str, str | None]:
         ),
     ],
 )
-def test_what_a_target_lacks_is_told_with_the_nearest(target: str, message: str) -> None:
+def test_what_a_target_lacks_is_reported_with_the_nearest(target: str, message: str) -> None:
     assert missing(target) == message
 
 
-def test_a_function_that_is_not_there_is_told_with_those_that_are() -> None:
+def test_a_function_that_is_not_there_is_reported_with_those_that_are() -> None:
     assert missing("bot.node:main", with_node("def run(): pass\nx = 1\n")) == (
         "bot/node.py has no function 'main'. It has 'run'."
     )

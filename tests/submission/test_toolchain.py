@@ -20,7 +20,7 @@ def _install(folder: Path, *tools: str) -> str:
 
 
 def test_what_is_missing_is_named_as_the_packages_of_the_system(tmp_path: Path) -> None:
-    with pytest.raises(GraderFault, match=r"cannot compile: sudo apt install cmake g\+\+$"):
+    with pytest.raises(GraderFault, match=r"tools are missing: sudo apt install cmake g\+\+$"):
         check_toolchain(_install(tmp_path, "make"))
 
 

@@ -35,7 +35,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Reports:
-    """What the messages on a topic tell."""
+    """The reports of callbacks on a topic."""
 
     runs: tuple[Run, ...]
     strange: tuple[str, ...]
@@ -112,7 +112,7 @@ def overlaps(runs: Iterable[Run], least_s: float = 0.0) -> Iterator[Overlap]:
 
 
 def spans(recording: Recording, reports: Reports, wrong: Iterable[Run] = ()) -> tuple[Span, ...]:
-    """Runs as bars to draw; one that was not ended lasts until the end of the observation."""
+    """Runs as bars to draw; a run without an end lasts until the end of the observation."""
     marked = set(wrong)
     return tuple(
         Span(

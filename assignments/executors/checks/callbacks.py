@@ -173,9 +173,9 @@ def _judge_period(
 def _declares(recording: Recording, parameters: Runs, limits: PeriodLimits) -> bool:
     """Whether the process declared a timer of the right period for each callback, and no other.
 
-    Those that wait for a lock do not get it in the order in which they came: one that was late
-    behind another for a long time may come first, on time and hence early. On the wire that looks
-    like a shorter period.
+    Callbacks that wait for a lock do not get it in order: a callback that was late behind another
+    one for a long time may come first, on time and hence early. In the messages that looks like a
+    shorter period.
     """
     timers = declarations.timers(recording)
     right = [timer for timer in timers if judge([timer.period_s], limits).good]
@@ -351,12 +351,12 @@ def work(recording: Recording, parameters: Work) -> Finding:
     if cause is not None:
         return cause.finding(expected)
     allowed_s = parameters.tolerance.of(parameters.duration)
-    told = []
+    parts = []
     for callback in parameters.callbacks:
         found = reports.ended([callback])
         seconds = [item.seconds or 0.0 for item in found]
         middle_s = median(seconds)
-        told.append(f"{code(callback)} works {format_duration(middle_s)}")
+        parts.append(f"{code(callback)} works {format_duration(middle_s)}")
         if abs(middle_s - parameters.duration) <= allowed_s:
             continue
         excused_s = median(
@@ -365,14 +365,14 @@ def work(recording: Recording, parameters: Work) -> Finding:
         )
         if middle_s > parameters.duration and excused_s <= parameters.duration + allowed_s:
             return Finding.to_repeat(
-                expected, f"{told[-1]}, but the machine took the time from the process"
+                expected, f"{parts[-1]}, but the machine took the time from the process"
             )
         return Finding.failed(
             expected,
-            f"{told[-1]} (median of {counted(len(seconds), 'run')})",
+            f"{parts[-1]} (median of {counted(len(seconds), 'run')})",
             f"Report the start, then work with time.sleep({parameters.duration:g}), then report "
             f"the end. {SECONDS_HINT} If it takes longer, something else waits between the two "
             "reports, such as for a lock.",
             Evidence(spans=spans(recording, reports, found)),
         )
-    return Finding.passed(expected, listing(told), Evidence(spans=spans(recording, reports)))
+    return Finding.passed(expected, listing(parts), Evidence(spans=spans(recording, reports)))

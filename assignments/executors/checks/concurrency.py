@@ -29,11 +29,11 @@ def threads(recording: Recording) -> int:
 
 def declared_words(recording: Recording) -> str:
     """The executor and the callback groups in words, or an empty text."""
-    told = [
+    named = [
         f"a {code(name)}" + (f" with {number} threads" if number > 1 else "")
         for name, number in executors(recording)
     ]
-    words = [listing(told)] if told else []
+    words = [listing(named)] if named else []
     groups = _groups(recording, "timer")
     if len(groups) > 1:
         words.append(f"its timers in {_group_words(groups)}")

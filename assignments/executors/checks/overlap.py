@@ -152,13 +152,13 @@ def overlap(recording: Recording, parameters: Overlapping) -> Finding:
     cause = why_reports_are_missing(recording, parameters.topic, names, reports)
     if cause is not None:
         return cause.finding(expected)
-    told = []
+    parts = []
     for callback in parameters.callbacks:
         number = len(_with_others(reports, callback, parameters, parameters.by))
-        told.append(f"{code(callback)} did so {counted(number, 'time')}")
+        parts.append(f"{code(callback)} did so {counted(number, 'time')}")
         if number < parameters.at_least:
             return _serial(recording, parameters, reports, callback, number, expected)
-    return Finding.passed(expected, listing(told), Evidence(spans=spans(recording, reports)))
+    return Finding.passed(expected, listing(parts), Evidence(spans=spans(recording, reports)))
 
 
 def _with_others(

@@ -1,4 +1,4 @@
-"""Cases of a conversion as they went: what was asked, what came back, how far off it is."""
+"""Cases of a conversion: the question, its answers, and how far off they are."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Case:
 
     @property
     def optional(self) -> bool:
-        """Whether it may stay without an answer."""
+        """Whether no answer is right, too."""
         return self.group is Group.ZERO
 
 

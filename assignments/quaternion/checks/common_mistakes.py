@@ -61,7 +61,7 @@ _SIGN_HINT = (
 
 @dataclass(frozen=True)
 class Mistake:
-    """A mistake.
+    """A classic mistake, as a formula.
 
     Attributes:
         formula: From questions, shape (n, k), to the answers that it gives, shape (n, l).

@@ -46,11 +46,11 @@ _ELSEWHERE = 0.9
 # Share of the answers that must belong to the question before to say so.
 _STALE = 0.8
 _AT_ONCE_S = 0.05
-# A callback that converts answers within some ms; one that takes longer holds up the questions.
+# A callback that converts answers within some ms; a slower one holds up the questions.
 _SLOW_S = 0.05
 # What rounding or single precision may cost, but no mistake in a formula.
 _LITTLE_RAD = 1e-3
-# One that publishes a first message when it is created does no harm.
+# Answers before the first question: a node may publish one message when it is created.
 _GREETINGS = 2
 # Nor does one that says everything twice; one that does not stop answers the last far more often.
 _MORE_COPIES = 2
@@ -318,7 +318,7 @@ def _none(row: tuple[float, ...]) -> bool:
 
 
 def _by_kind(parameters: Answers, wrong: list[Case]) -> tuple[str, str]:
-    """What can be said of wrong answers that no known mistake explains."""
+    """The explanation of wrong answers by kind, where no known mistake explains them."""
     groups = {case.group for case in wrong}
     answers = [case.answers[0] for case in wrong]
     lengths = [answer.length for answer in answers if answer.length]

@@ -1,4 +1,4 @@
-"""A message as an author writes it, into plain values of its fields, checked one by one."""
+"""From a message as an author writes it to plain values of its fields, each checked."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from grader.spec.nearest_name import did_you_mean
 from grader.spec.unit import parse_any
 
 NOW = "now"
-"""Stands for the time at which a message is published, in a field of that type."""
+"""In a field for a time: the time at which the message is published."""
 
 _TIME = "builtin_interfaces/msg/Time"
 _PATH = re.compile(r"[A-Za-z]\w*(?:\[\d{1,6}\])*(?:\.[A-Za-z]\w*(?:\[\d{1,6}\])*)*")
@@ -22,24 +22,24 @@ _STEP = re.compile(r"[A-Za-z]\w*|\[\d+\]")
 _PARTS = re.compile(r"^---\s*$", re.MULTILINE)
 
 Find = Callable[[str], str]
-"""From an interface name to the text of its ``.msg`` file; KeyError where there is none."""
+"""Function from an interface name to the text of its ``.msg`` file; KeyError without one."""
 
 
 class StimulusError(ValueError):
-    """Something that a stimulus says does not fit.
+    """A value in a stimulus does not fit.
 
     Attributes:
-        place: Where it says so, below its entry in the YAML.
+        place: Of the value, below the stimulus in the YAML.
     """
 
     def __init__(self, text: str, place: Place) -> None:
-        """Keep where it is."""
+        """Keep the place."""
         self.place = place
         super().__init__(text)
 
 
 def part_of(find: Find, interface: str, number: int) -> Find:
-    """Find definitions, but of one interface only a part: 0 is the request, or the goal."""
+    """A finder that returns only a part of one interface: 0 is the request, or the goal."""
     text = _PARTS.split(find(interface))[number]
     return lambda name: text if name == interface else find(name)
 
@@ -68,7 +68,7 @@ def _nested(value: Mapping[str, Any]) -> dict[str, Any]:
     root = _Inner()
     for key, item in value.items():
         if not _PATH.fullmatch(str(key)):
-            raise ValueError(f"{key!r} is no field: write its path, as in linear.x or data[0]")
+            raise ValueError(f"{key!r} is not a field: write its path, as in linear.x or data[0]")
         *steps, last = _STEP.findall(str(key))
         here: Any = root
         for step in steps:
@@ -82,7 +82,7 @@ def _nested(value: Mapping[str, Any]) -> dict[str, Any]:
 
 
 class _Inner(dict[str, Any]):
-    """Fields or items that come from paths; what an author wrote as a mapping is none."""
+    """A dict of fields or items made from paths, unlike a mapping that an author wrote."""
 
 
 def _plain(value: Any, where: str) -> Any:
@@ -93,7 +93,7 @@ def _plain(value: Any, where: str) -> Any:
     indices = [f"[{index}]" for index in range(len(value))]
     for index in indices:
         if index not in value:
-            raise ValueError(f"{where}{index} is missing: items are given from [0] on")
+            raise ValueError(f"{where}{index} is missing: give the items from [0] on")
     return [_plain(value[index], where + index) for index in indices]
 
 

@@ -1,6 +1,6 @@
-"""Any entry of ``stimuli``: what the probe does in a scenario besides observing.
+"""Any entry of ``stimuli``: an action of the probe in a scenario.
 
-A stimulus is told by its first key, such as ``publish``; the kinds are found in ``kinds/``.
+The first key of a stimulus, such as ``publish``, names its kind; the kinds are in ``kinds/``.
 """
 
 from __future__ import annotations
@@ -48,6 +48,6 @@ else:
         Discriminator(
             _kind,
             custom_error_type="stimulus",
-            custom_error_message=f"its first key tells what it does: {', '.join(_KEYS)}",
+            custom_error_message=f"its first key must be one of {', '.join(_KEYS)}",
         ),
     ]

@@ -1,4 +1,4 @@
-"""Messages of a ``publish`` stimulus that stand in a CSV or MCAP file, or come from a function."""
+"""Messages of a ``publish`` stimulus that come from a CSV or MCAP file, or from a function."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _NS = 1e-9
 
 @dataclass(frozen=True)
 class Given:
-    """A message as it was given.
+    """A message of the stimulus with its origin.
 
     Attributes:
         place: In the YAML, below the stimulus.
-        label: Where else, such as ``cases.csv:3``; empty for the YAML itself.
-        time_s: When it was recorded, from the first on; None where no time is given.
+        label: Its origin outside of the YAML, such as ``cases.csv:3``; else empty.
+        time_s: Time since the first message of the file; None where no time is given.
     """
 
     value: Mapping[str, Any]
@@ -49,7 +49,7 @@ def from_function(name: str, folder: Path, seed: int) -> Iterator[Given]:
 
 
 def _plain(value: Any) -> Any:
-    """Lists and numbers of Python from what NumPy gives."""
+    """Convert arrays and numbers of NumPy to lists and numbers of Python."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -79,7 +79,7 @@ def _from_csv(file: Path) -> Iterator[Given]:
             for row in reader:
                 label = f"{file.name}:{reader.line_num}"
                 if None in row:
-                    text = f"{label}: more values than the first row names fields"
+                    text = f"{label}: more values than fields in the first row"
                     raise StimulusError(text, ("from",))
                 # An empty cell leaves its field out, so that rows may have arrays of any length.
                 value = {name.strip(): cell.strip() for name, cell in row.items() if cell}

@@ -16,7 +16,7 @@ S = TypeVar("S", bound="StimulusModel")
 
 
 class ScenarioOfStimuli(Protocol):
-    """What a stimulus looks at in its scenario, to say what does not fit."""
+    """What a stimulus needs to know of its scenario to find its own mistakes."""
 
     @property
     def stimuli(self) -> Sequence[StimulusModel]:
@@ -33,7 +33,7 @@ class ScenarioOfStimuli(Protocol):
 
 @dataclass(frozen=True)
 class Making:
-    """What the orders of a scenario are made with.
+    """The data of an assignment from which the orders of a scenario are made.
 
     Attributes:
         folder: Of the assignment.
@@ -67,7 +67,7 @@ class StimulusModel(Model):
     """Base of the models of stimuli, which lie in ``kinds/`` and are marked with :func:`kind`."""
 
     key: ClassVar[str]
-    """The key of the YAML that tells it."""
+    """The key of the YAML that names the kind."""
     heading: ClassVar[str] = ""
     """Its heading in the documentation; by default the key."""
     inner: ClassVar[Models] = {}
@@ -89,7 +89,7 @@ class StimulusModel(Model):
         return None
 
     def order(self, making: Making) -> dict[str, Any]:
-        """What the cell is told, as plain JSON; ``kind`` is the ``order_type`` that plays it.
+        """The order for the cell as plain JSON; ``kind`` names the ``order_type`` that plays it.
 
         Raises:
             StimulusError: A value does not fit.
@@ -98,7 +98,7 @@ class StimulusModel(Model):
         raise NotImplementedError
 
     def mistakes(self, making: Making, scenario: ScenarioOfStimuli) -> Iterator[tuple[Place, str]]:
-        """What does not fit, as far as it shows without a run: its order cannot be made."""
+        """Mistakes that show without a run; by default, that the order cannot be made."""
         try:
             self.order(making)
         except StimulusError as error:

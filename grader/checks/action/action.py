@@ -66,7 +66,7 @@ class OfGoals(Parameters):
     @property
     def words(self) -> str:
         """The goals in words."""
-        which = f" with {words(self.goal)}" if self.goal else ""
+        which = f" ({words(self.goal)})" if self.goal else ""
         return f"the goal{which} of {code(self.action)}"
 
 
@@ -167,7 +167,7 @@ class FeedbackOf(OfGoals):
     @model_validator(mode="after")
     def _enough(self) -> FeedbackOf:
         if self.rate is not None and self.at_least < 3:
-            raise ValueError("a rate needs at_least: 3 messages of feedback or more")
+            raise ValueError("'rate' needs 'at_least': 3 messages of feedback or more")
         return self
 
     def _asked(self) -> str:
@@ -266,7 +266,7 @@ class Result(OfGoals):
 
     def _asked(self) -> str:
         wanted = f" with {words(self.result)}" if self.result else ""
-        return f"{self.words} {self.status}{wanted} within {format_duration(self.within)}"
+        return f"{self.words} ends as {self.status}{wanted} within {format_duration(self.within)}"
 
 
 @check("action.result", Subject.RECORDING, Result)

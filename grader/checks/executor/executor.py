@@ -90,7 +90,7 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
     have the same name, each of them must answer. Calls count from the node's first message on (or,
     if it publishes nothing, from its appearance). Calls at the very end, with too little time for
     an answer, do not count. A callback may be busy for a while if answers still come in time. With
-    `typically`, also the median of the answers must come soon.
+    `typically`, the median of the answer times must be short too.
 
     If no call can be judged, the check uses what the process declared: that it spins and has a
     timer.
@@ -157,7 +157,7 @@ def _working_from(recording: Recording, node: str) -> int:
     if process is None:
         return begin_ns
     # Before an executor spins the constructor may wait for something. A node that never answers
-    # does not spin, whatever its process declares.
+    # does not spin, even if its process declares that it does.
     spun = [item.time_ns for item in recording.declared("spin") if item.process == process.name]
     answered = [
         call.answered_ns
@@ -166,18 +166,17 @@ def _working_from(recording: Recording, node: str) -> int:
     ]
     if spun and answered:
         begin_ns = max(begin_ns, min(*spun, *answered))
-    # The tracer held its first publisher until it had matched, in vain if its type is another one.
+    # The tracer held its first publisher until it had matched; one of another type never does.
     held = [item.time_ns for item in recording.declared("held") if item.process == process.name]
     return max([begin_ns, *(time_ns for time_ns in held if time_ns < begin_ns + _MOST_HELD_NS)])
 
 
 def _wait_s(recording: Recording, call: Call) -> float:
-    """How long a call waited for its answer."""
     return ((call.answered_ns or recording.stop_ns) - call.requested_ns) / NS
 
 
 def _own_s(recording: Recording, call: Call) -> float:
-    """The same without what the machine took meanwhile."""
+    """How long a call waited, without what the machine took meanwhile."""
     return left_s(recording, call.requested_ns, call.answered_ns or recording.stop_ns)
 
 
@@ -230,7 +229,7 @@ def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> 
 
 
 def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
-    """The finding where no call counts: what the process declared must do."""
+    """The finding where no call counts, from what the process declared."""
     ended = why_ended(recording)
     if ended is not None:
         return ended.finding(expected)
@@ -247,7 +246,7 @@ def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
         if name in seen and offered.isdisjoint((name, one) for one in executor_services(name))
     ]
     if lacking:
-        # What a process declares would be all that there is, and it can declare anything.
+        # Only declarations would be left, and a process can declare anything.
         busy = was_held_up(recording)
         return Cause(
             f"{codes(lacking)} has none of the services "
@@ -316,7 +315,7 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
     timer with a callback is right, whatever its period. If the process did not declare its
     publisher, the check ends as an error and costs no points.
     """
-    expected = f"a timer, in whose callback the node publishes on {code(parameters.topic)}"
+    expected = f"a timer whose callback publishes on {code(parameters.topic)}"
     messages = recording.on(parameters.topic)
     if not messages:
         return why_silent(recording, parameters.topic).finding(expected)

@@ -12,7 +12,7 @@ from grader.spec.nearest_name import nearest
 
 @dataclass(frozen=True)
 class Difference:
-    """One thing that differs, by the name of the entry in the student's definition or in ours."""
+    """One difference, by the name of the entry in the student's definition or the expected one."""
 
     name: str
     text: str
@@ -28,11 +28,11 @@ def field_differences(wanted: Section, own: Section, package: str) -> Iterator[D
     for name, field in observed.items():
         if name not in expected and name not in renamed.values():
             hint = "Remove it. A constant has an equals sign, such as `uint8 ON=1`."
-            yield Difference(name, f"a field {code(str(field))} too many", hint)
+            yield Difference(name, f"a field {code(str(field))} that is not asked for", hint)
     order = [name for name in observed if name in expected]
     if len(order) == len(expected) == len(observed) and order != list(expected):
         text = f"the fields are in the order {listing(map(code, order))}"
-        hint = "The order of the lines is the order of the bytes in a message: keep it."
+        hint = "ROS sends the fields in this order. Use the order that is asked for."
         yield Difference(order[0], text, hint)
 
 

@@ -173,11 +173,11 @@ def _compared(
         )
     differing = [
         (item, section.lines.get(item.name))
-        for ours, section in zip(wanted, own, strict=True)
-        for item in differ(ours, section, name.package)
+        for expected, section in zip(wanted, own, strict=True)
+        for item in differ(expected, section, name.package)
     ]
     if not differing:
-        return Finding.passed(parameters.asked_for, f"so says {code(definition.file)}")
+        return Finding.passed(parameters.asked_for, f"found in {code(definition.file)}")
     places = tuple(
         SourceError(definition.file, line, item.text.replace("`", "")) for item, line in differing
     )
@@ -200,19 +200,19 @@ def _lines(sections: tuple[Section, ...]) -> Iterator[str]:
 class Manifest(OfInterface):
     """Parameters of interface.manifest."""
 
-    asks = "package.xml of `{self.parts.package}` is that of an interface package"
+    asks = "package.xml of `{self.parts.package}` has what an interface package needs"
 
 
 @check("interface.manifest", Subject.SUBMISSION, Manifest)
 def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding:
     """package.xml names the packages that an interface package needs.
 
-    `rosidl_default_generators` by `buildtool_depend` (or `build_depend`, `depend`),
-    `rosidl_default_runtime` by `exec_depend` (or `depend`), membership of the group
-    `rosidl_interface_packages`, and each package whose messages the definition uses by `depend` (or
-    by one tag for the build and one for the run). Without these entries, the build works only on a
-    machine where all of the packages are installed. A package that was built must be in ament's
-    index of packages, where `ros2 interface show` looks.
+    It must have `rosidl_default_generators` as `buildtool_depend` (or `build_depend`, `depend`),
+    `rosidl_default_runtime` as `exec_depend` (or `depend`), the group `rosidl_interface_packages`,
+    and each package whose messages the definition uses as `depend` (or one tag for the build and
+    one for the run). Without these entries, the build works only on a machine where all of the
+    packages are installed. A package that was built must also be in ament's index of packages,
+    where `ros2 interface show` looks.
     """
     definition = _definition(submission, parameters)
     stop_if(why_no_manifest(submission, parameters.parts.package))
@@ -232,7 +232,7 @@ def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding:
         return Finding.passed(parameters.asked_for, "every entry is there")
     cmake = package.file("CMakeLists.txt")
     return Finding.failed(
-        f"{parameters.asked_for}, and registered where ROS looks for packages",
+        f"{parameters.asked_for}, and the package is registered where ROS looks for it",
         f"{code(package.name)} was installed, but not registered: neither `ros2 interface show` "
         "nor another package finds it",
         f"End {code(cmake)} with ament_package().",

@@ -16,7 +16,7 @@ from grader.diagnosis.no_endpoint import SERVICE, offered
 from grader.diagnosis.no_node import why_not_node
 from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import nodes_seen
-from grader.findings.wording import code, listing
+from grader.findings.wording import code, counted, listing
 from grader.recording.model import Call, Recording
 from grader.spec.name import QualifiedNodeName
 
@@ -64,7 +64,7 @@ def state(recording: Recording, parameters: State) -> Finding:
     stop_if(why_slow(recording, calls, _ANSWER_S))
     seen = [_text(call.response, "current_state") for call in calls]
     if len(seen) < len(parameters.states):
-        text = f"the scenario asks for the state only {len(seen)} times"
+        text = f"the scenario asks for the state only {counted(len(seen), 'time')}"
         return Finding.error(parameters.asked_for, text)
     changes = [call for call in recording.calls if call.service == f"{node}/change_state"]
     steps = [(call.requested_ns, f"is {label}") for call, label in zip(calls, seen, strict=True)]
@@ -75,7 +75,7 @@ def state(recording: Recording, parameters: State) -> Finding:
     for number, (wanted, label) in enumerate(zip(parameters.states, seen, strict=False)):
         if label != wanted:
             before = [one for one in changes if one.requested_ns < calls[number].requested_ns]
-            observed = f"at the call {number + 1} of get_state it is {label}"
+            observed = f"at call {number + 1} of get_state it is {label}"
             return _otherwise(parameters, observed, before[-1:], shown)
     return Finding.passed(parameters.asked_for, listing(seen, "then"), shown)
 
@@ -84,7 +84,7 @@ def _otherwise(
     parameters: State, observed: str, last_change: list[Call], shown: Evidence
 ) -> Finding:
     """The finding for another state, after the last transition succeeded or failed."""
-    hint = "Does the node begin unconfigured, and change no state by itself?"
+    hint = "The node must begin unconfigured, and must not change its state by itself."
     for call in last_change:
         if (call.response or {}).get("success") is not True:
             observed += f", after the transition {_text(call.request, 'transition')} failed"

@@ -142,11 +142,11 @@ def _words(parameters: Follows, messages: Sequence[Message]) -> str:
         whole = all(isinstance(value, int) for value in values)
     except (IndexError, NoSuchField):
         whole = False
-    decimals = "" if whole else f"to {counted(parameters.decimals, 'decimal')}, "
+    decimals = "" if whole else f" to {counted(parameters.decimals, 'decimal')}"
     return (
-        f"log lines that show {codes(parameters.fields)} of messages on {code(parameters.topic)}, "
-        f"{decimals}within {format_duration(parameters.within)} of "
-        f"{counted(parameters.at_least, 'message')} or more{_SENT[parameters.sent]}"
+        f"log lines that show {codes(parameters.fields)} of at least "
+        f"{counted(parameters.at_least, 'message')} on {code(parameters.topic)}"
+        f"{_SENT[parameters.sent]}{decimals}, each within {format_duration(parameters.within)}"
     )
 
 

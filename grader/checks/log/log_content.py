@@ -147,7 +147,7 @@ class Matching(Records):
         return f"{level}log messages{whose}{what}"
 
     def says(self, text: str) -> bool:
-        """Whether a record's text is meant."""
+        """Whether a record has the text."""
         if self.text is not None and self.text.casefold() not in text.casefold():
             return False
         if self.number is not None and not any(
@@ -157,7 +157,7 @@ class Matching(Records):
         return self.pattern is None or re.search(self.pattern, text) is not None
 
     def found(self, recording: Recording) -> list[Logged]:
-        """The records that are meant."""
+        """The records with the text at the level."""
         return [
             item
             for item in self.of(recording)
@@ -298,7 +298,7 @@ class Rate(Matching):
         if self.rate is None and given == (None, None):
             raise ValueError("say how often: rate, at_least or at_most")
         if self.rate is not None and given != (None, None):
-            raise ValueError("rate stands alone, without at_least and at_most")
+            raise ValueError("'rate' cannot be used with 'at_least' or 'at_most'")
         return self
 
     @property

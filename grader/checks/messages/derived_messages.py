@@ -39,12 +39,12 @@ def mistakes(value: str, message: Mapping[str, Any]) -> Iterator[tuple[str, floa
         turn = 2.0 * math.acos(max(-1.0, min(1.0, w)))
         yield "2 acos(w), which has lost the sign of the yaw", turn
         turn = 2.0 * math.asin(max(-1.0, min(1.0, z)))
-        yield "2 asin(z), which is wrong where w is negative: math.atan2 knows both", turn
+        yield "2 asin(z), which is wrong where w is negative: use math.atan2", turn
         turn = math.atan(math.tan(right))
-        yield "the yaw without its quadrant: math.atan2(a, b), not math.atan(a / b)", turn
+        yield "the yaw in a wrong quadrant: use math.atan2(a, b), not math.atan(a / b)", turn
     else:
         yield f"`{value}` with the wrong sign", -right
-        yield f"`{value}` without its sign, as of math.hypot() or abs()", abs(right)
+        yield f"`{value}` without its sign, as from math.hypot() or abs()", abs(right)
     for path, number in leaves(message).items():
         if path != value and isinstance(number, int | float):
             yield f"`{path}`", float(number)

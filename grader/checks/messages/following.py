@@ -105,7 +105,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
             "took the time from the process",
         )
     plots = tuple(_plot(recording, derived, judged, index) for index in range(len(derived.fields)))
-    seen = f"so it is in all of {counted(len(judged), 'message')}"
+    seen = f"right in all of {counted(len(judged), 'message')}"
     return Finding.passed(expected, seen, Evidence(plots=plots))
 
 
@@ -157,11 +157,10 @@ def _failure(
             f"{newest[index]:.4g}"
             for index in bad
         ]
-        clauses = [_explanation(derived, seen, some, index) for index in bad]
-        if len(set(clauses)) == 1:
-            observed = listing(fields) + clauses[0]
-        else:
-            observed = listing(map("".join, zip(fields, clauses, strict=True)))
+        by_clause: dict[str, list[str]] = {}
+        for index, text in zip(bad, fields, strict=True):
+            by_clause.setdefault(_explanation(derived, seen, some, index), []).append(text)
+        observed = "; ".join(listing(texts) + clause for clause, texts in by_clause.items())
         hint = (
             f"Set {codes(derived.fields[index] for index in bad)} in the callback of {source}, "
             f"from {codes(derived.values[index] for index in bad)} of its message."
@@ -205,7 +204,7 @@ def _explanation(
         short = ", or not there at all: the array is too short"
         return f": not a finite number{short if '[' in derived.fields[index] else ''}"
     if len(numbers) > 1 and _spread(numbers) <= 0.0:
-        return ": the same number in every message"
+        return ": no change from message to message"
     wrong = [sample for sample in wrong if not derived.fitting(sample.errors, index)]
     rows = sorted({row for sample in (*seen, *wrong) for row in sample.window})
     tolerance = derived.tolerances[index]

@@ -64,7 +64,7 @@ class Count(Parameters):
         if self.exactly is None and self.at_least is None and self.at_most is None:
             raise ValueError("say how many: exactly, at_least or at_most")
         if self.exactly is not None and (self.at_least, self.at_most) != (None, None):
-            raise ValueError("exactly stands alone, without at_least and at_most")
+            raise ValueError("'exactly' cannot be used with 'at_least' or 'at_most'")
         low, high = self.bounds
         if high is not None and low > high:
             raise ValueError(f"at_least ({low}) is more than at_most ({high})")
@@ -133,7 +133,7 @@ def count(recording: Recording, parameters: Count) -> Finding:
     if per:
         hint = "Publish once in each call of the callback: look for a second publish()."
     elif high == 1:
-        hint = "Publish once, in the constructor, and call no timer and no second publish."
+        hint = "Publish once, in the constructor. Create no timer, and call publish() nowhere else."
     else:
         hint = "Look for a second timer, a second publish() or a loop around it."
     return Finding.failed(expected, observed, hint, evidence)
@@ -277,7 +277,7 @@ class Series(Parameters):
         if bool(self.values) == (self.step is not None):
             raise ValueError("give either 'values' or 'step'")
         if self.start is not None and self.step is None:
-            raise ValueError("'start' goes with 'step'")
+            raise ValueError("'start' needs 'step'")
         return self
 
     def named_fields(self) -> Iterator[NamedFields]:
@@ -294,9 +294,8 @@ class Series(Parameters):
         which = f"{code(self.field)} of the messages on {code(self.topic)}"
         if self.values:
             return f"{which}: {', '.join(map(_text, self.values))}, in this order"
-        begins = "" if self.start is None else f" from {_text(self.start)} on"
-        verb = "counts" if self.step == 1 else f"grows by {_text(self.step)}"
-        return f"{which} {verb}{begins}, message by message"
+        begins = "" if self.start is None else f"begins with {_text(self.start)} and "
+        return f"{which} {begins}grows by {_text(self.step)} from message to message"
 
 
 @check("messages.sequence", Subject.RECORDING, Series)
@@ -334,9 +333,7 @@ def sequence(recording: Recording, parameters: Series) -> Finding:
     if len(messages) < needed:
         return why_few(recording, parameters.topic, needed).finding(expected)
     if parameters.values and len(parameters.values) - 1 not in places:
-        return Finding.to_repeat(
-            expected, "the last of these messages was lost on its way to the probe"
-        )
+        return Finding.to_repeat(expected, "the last of these messages was lost in transit")
     return Finding.passed(
         expected,
         f"{_text(found[0])} to {_text(found[-1])} in {counted(len(found), 'message')}",
@@ -382,7 +379,7 @@ def _explain_order(parameters: Series, found: Sequence[Any]) -> tuple[str, str]:
     """What the values tell, as a clause, and what to try."""
     if parameters.step is None:
         return "", "Publish the values that are asked for, each once and in this order."
-    hint = "Change the value once for every message, by what is asked for."
+    hint = f"Change the value once for every message, by {_text(parameters.step)}."
     steps = [b - a for a, b in pairwise(found)]
     if steps and not any(steps):
         return (
@@ -395,8 +392,8 @@ def _explain_order(parameters: Series, found: Sequence[Any]) -> tuple[str, str]:
         return f": {grows} from message to message", hint
     if found[0] in found[1:] and steps[0]:
         return (
-            f": it begins anew with message {found.index(found[0], 1) + 1}",
-            "Is the value set back, does it overflow, or do two publishers count?",
+            f": it goes back to the first value in message {found.index(found[0], 1) + 1}",
+            "Is the value reset, does it overflow, or do two publishers count?",
         )
     return "", hint
 

@@ -91,7 +91,7 @@ def within_limits(recording: Recording, parameters: WithinLimits) -> Finding:
         f"{len(beyond)} of {counted(len(sent), 'command')} ({share}): the first is "
         f"{_excess(first, scene)[1]}{most}",
         "Clamp before you publish: max(-limit, min(limit, value)).",
-        evidence_at(recording, "first command beyond", first.time_ns, *plots),
+        evidence_at(recording, "first command beyond a limit", first.time_ns, *plots),
     )
 
 
@@ -122,9 +122,8 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     any gain and any limit, if the tolerance of the goal is small enough that the speed falls below
     the limit.
 
-    It is no proportion either where all commands have one of two sizes, each of them several times,
-    unless these are next to each other where a command has two decimals, or the lower one comes for
-    1 s at most.
+    Commands of only two sizes, each sent three times or more, fail: that is on-off control. It is
+    no failure if the sizes differ by 0.01 m/s or less, or the lower one is sent for 1 s or less.
     """
     expected = (
         f"linear.x at the end of the way at most {percent(parameters.share)} of its largest value"
@@ -146,7 +145,7 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     last = min(driving[-_LAST:], key=_size)
     plot = _plot(recording, driving, "linear.x (m/s)")
     evidence = evidence_at(recording, "end of the way", last.time_ns, plot)
-    seen = f"{speed(_size(last))} at the end, {speed(fastest)} at most"
+    seen = f"{speed(_size(last))} at the end; the largest is {speed(fastest)}"
     levels = Counter(round(_size(item), _DIGITS) for item in driving)
     if len(levels) == _SWITCHED and min(levels.values()) >= _SEVERAL and _stays(driving, levels):
         sizes = " and ".join(speed(size) for size in sorted(levels, reverse=True))

@@ -48,8 +48,8 @@ _FIELDS_HINT = (
     "the turn."
 )
 _IN_BETWEEN_HINT = (
-    "Log what makes it stop: a range that is not measured (inf, 0.0) may count as an obstacle, and "
-    "a second place that publishes, such as a timer, may contradict the callback."
+    "Log what makes it stop. A range that is not measured (inf, 0.0) may count as an obstacle. Or "
+    "a second place, such as a timer, publishes other commands than the callback."
 )
 
 
@@ -69,9 +69,9 @@ class Drives(RobotParameters):
 def drives(recording: Recording, parameters: Drives) -> Finding:
     """The robot drives ahead at the right speed.
 
-    Judged by the true speed, while nothing is near ahead: after it has sped up (half a second, and
-    what the robot's acceleration needs to that speed), and until it comes to rest for good. The
-    median must be the expected speed within `tolerance`, and so must the speed in 90 % of the time.
+    Judged by the true speed while nothing is near ahead. The robot has time to speed up: half a
+    second more than its acceleration needs. The speed counts until it comes to rest for good. The
+    median must be within `tolerance` of the expected speed, and so must the speed 90 % of the time.
     """
     wanted, share = parameters.speed, parameters.tolerance
     expected = f"drives at {speed(wanted)} (within {percent(share)}) while nothing is near ahead"
@@ -83,14 +83,14 @@ def drives(recording: Recording, parameters: Drives) -> Finding:
     plot = speed_plot(recording, (low, high))
     if not steps:
         cause = why_interrupted(recording) or Cause(
-            f"the robot drove too shortly to judge: {metres(way_m(recording.truth))} in all",
-            "Drive on as long as nothing is near ahead; one command holds until the next.",
+            f"the robot drove only {metres(way_m(recording.truth))}, too little to judge its speed",
+            "Drive on as long as nothing is near ahead. One command holds until the next.",
             _since_departure(recording),
         )
         return cause.finding(expected)
     middle = median(step.linear_m_s for step in steps)
     good = sum(low <= step.linear_m_s <= high for step in steps) / len(steps)
-    seen = f"median {speed(middle)}, in that range for {percent(round(good, 3))} of the time"
+    seen = f"median {speed(middle)}; the speed is right for {percent(round(good, 3))} of the time"
     if low <= middle <= high and good >= _LEAST_SHARE:
         return Finding.passed(expected, seen, Evidence(plots=(plot,)))
     deeper = why_interrupted(recording)
@@ -98,7 +98,7 @@ def drives(recording: Recording, parameters: Drives) -> Finding:
         return deeper.finding(expected)
     words, hint = _wrong_speed(steps, recording.scene, wanted, middle)
     off = next((step for step in steps if not low <= step.linear_m_s <= high), steps[0])
-    evidence = evidence_at(recording, "first out of that range", off.time_ns, plot)
+    evidence = evidence_at(recording, "first at a wrong speed", off.time_ns, plot)
     return Finding.failed(expected, f"{seen}: {words}", hint, evidence)
 
 
@@ -143,10 +143,11 @@ def _wrong_speed(
     if abs(command) > limit * 1.001 and abs(middle) > limit * 0.98:
         words = f"{speed(command)} was commanded, and the robot can do no more than {speed(limit)}"
         return words, _FIELDS_HINT
-    words = f"{middle / wanted:.3g} times the expected speed"
+    pace = "slowly" if abs(middle) < abs(wanted) else "fast"
+    words = f"it drives too {pace}" if middle * wanted >= 0.0 else "it drives the wrong way"
     slowest, fastest = min(s.linear_m_s for s in steps), max(s.linear_m_s for s in steps)
-    if fastest - slowest > _SAME_SPEED * abs(middle):
-        words += f", between {speed(slowest)} and {speed(fastest)}"
+    if fastest - slowest > _SAME_SPEED * abs(middle) and speed(slowest) != speed(fastest):
+        words = f"it varies from {speed(slowest)} to {speed(fastest)}"
     return words, f"Publish the same speed as long as nothing is near ahead. {_FIELDS_HINT}"
 
 
@@ -211,7 +212,7 @@ def _too_slow(recording: Recording, gone_m: float) -> Cause:
     lost_s = stolen_s(recording, truth[0].time_ns, truth[-1].time_ns)
     words = (
         f"was still on its way when the observation ended: {metres(gone_m)} in all, at "
-        f"{speed(average)} on average, {format_duration(waited_s)} after the beginning"
+        f"{speed(average)} on average; it had set off after {format_duration(waited_s)}"
     )
     if lost_s > 0.25 * (driven_s + waited_s):
         return Cause.to_repeat(f"{words}; the machine took {format_duration(lost_s)} from the run")

@@ -60,7 +60,7 @@ def reaches(recording: Recording, parameters: Reaches) -> Finding:
         cause = why_off_course(recording) or _restless(recording, last, "is at the goal, but")
     if cause is not None:
         return cause.finding(expected)
-    seen = f"{metres(run.distance_m(last))} from it"
+    seen = f"{metres(run.distance_m(last))} from the goal"
     if heading is not None:
         seen += f", {degrees(abs(run.heading_error_rad(last)))} off its heading"
     return Finding.passed(expected, seen, Evidence(plots=(run.distance_plot, run.heading_plot)))
@@ -91,9 +91,8 @@ class Settles(RobotParameters):
 def settles(recording: Recording, parameters: Settles) -> Finding:
     """The robot comes to rest in time.
 
-    Judged by the true motion: from the beginning of simulated time, which is when the node is first
-    connected, to the moment from which it rests until the end of the run. motion.reaches judges
-    where it rests.
+    Judged by the true motion, from the beginning of simulated time (when the node is first
+    connected) until the robot comes to rest for good. motion.reaches judges where it rests.
     """
     expected = f"comes to rest for good within {format_duration(parameters.within)}"
     cause = why_not_moved(recording)
@@ -105,25 +104,25 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
     end = truth[-1] if rest is None else truth[rest]
     took_s = (end.time_ns - truth[0].time_ns) / NS
     if rest is not None and took_s <= parameters.within:
-        return Finding.passed(expected, f"after {format_duration(took_s)}", evidence)
+        return Finding.passed(expected, f"at rest after {format_duration(took_s)}", evidence)
     deeper = why_interrupted(recording)
     if deeper is not None:
         return deeper.finding(expected)
     lost_s = stolen_s(recording, truth[0].time_ns, end.time_ns)
     if lost_s > 0.0 and took_s - lost_s <= parameters.within:
-        seen = f"after {format_duration(took_s)}" if rest is not None else "not until the end"
+        seen = f"at rest after {format_duration(took_s)}" if rest is not None else "never at rest"
         return Finding.to_repeat(
             expected, f"{seen}; the machine took up to {format_duration(lost_s)} from the run"
         )
     deeper = why_unsteered(recording)
     if deeper is None and rest is None:
-        deeper = _restless(recording, end, f"after {format_duration(took_s)}")
+        deeper = _restless(recording, end, f"after {format_duration(took_s)} it is")
     if deeper is not None:
         return deeper.finding(expected)
     return Finding.failed(
         expected,
-        f"after {format_duration(took_s)}",
-        "Larger gains are faster, until it overshoots.",
+        f"at rest after {format_duration(took_s)}",
+        "With larger gains the robot is faster. With gains that are too large it overshoots.",
         evidence_at(recording, "at rest", end.time_ns, *evidence.plots),
     )
 
@@ -150,15 +149,15 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding:
     straight_m = run.distance_m(run.truth[0])
     if straight_m <= parameters.position:
         return Finding.error(
-            expected, f"the start is {metres(straight_m)} from the goal: there is no way to judge"
+            expected, f"the start is {metres(straight_m)} from the goal: there is no path to judge"
         )
     cause = why_not_there(run, parameters.position)
     if cause is not None:
         return cause.finding(expected)
     gone_m = way_m(run.truth)
     longer = gone_m / straight_m - 1.0
-    words = f"{percent(round(longer, 3))} longer" if longer >= 0.0 else "no longer"
-    seen = f"{metres(gone_m)} for {metres(straight_m)}, {words}"
+    words = f"{percent(round(longer, 3))} longer" if longer >= 0.0 else "not longer"
+    seen = f"a path of {metres(gone_m)} for a straight line of {metres(straight_m)}: {words}"
     evidence = Evidence(plots=(run.distance_plot,))
     more_m = gone_m - straight_m * (1.0 + parameters.most)
     if more_m <= 0.0:
@@ -174,8 +173,8 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding:
     return Finding.failed(
         expected,
         seen,
-        "Look at its heading on the way: does it turn to the goal at once, and by the short way? "
-        "The error atan2(dy, dx) - yaw is wrapped, and its gain is large against that of the "
+        "Does the robot turn to the goal at once, and the short way? Wrap the error "
+        "atan2(dy, dx) - yaw to [-pi, pi]. Its gain must be several times the gain of the "
         "distance.",
         evidence_at(
             recording,
@@ -238,7 +237,7 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     beyond_rad = _beyond_rad(run, parameters.position)
     seen, plots = [], []
     if most_m is not None:
-        seen.append(f"{metres(past_m)} past it")
+        seen.append(f"{metres(past_m)} past the goal")
         plots.append(run.distance_plot)
     if most_rad is not None:
         seen.append(f"{degrees(beyond_rad)} beyond its heading")

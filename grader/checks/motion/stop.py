@@ -129,13 +129,13 @@ def _late(recording: Recording, scene: Scene, rest: int, sight: Sight, parameter
             "which may explain it"
         )
     shown = [one.stamp_ns for one in scans(recording) if begin_ns <= one.stamp_ns <= end_ns]
-    within = f"; {counted(len(shown), 'scan')} showed it meanwhile" if shown else ""
+    within = f"; {counted(len(shown), 'scan')} came meanwhile" if shown else ""
     return Cause(
-        f"{seen}: it came to rest {format_duration((end_ns - begin_ns) / NS)} after that distance "
-        f"was reached, at up to {speed(fastest)}{within}",
+        f"{seen}: it drove on for {format_duration((end_ns - begin_ns) / NS)} below "
+        f"{metres(wanted_m)}, at up to {speed(fastest)}{within}",
         "Which number does the callback compare the front range with? Ranges are in metres, and "
         "-inf is nearer than the LiDAR can measure. Publish the stop in the scan callback itself, "
-        "from the newest scan: a sleep, a slow timer or an average of several scans costs way.",
+        "from the newest scan: with a sleep, a slow timer or an average the robot stops late.",
         _evidence(recording, scene, rest, parameters),
     )
 
@@ -224,7 +224,7 @@ def _set_off(
         "near an obstacle: linear.x = 0.0, not less."
         if is_start
         else "Remember that the robot has stopped, or compare the same range in every callback: "
-        "two places that publish contradict each other.",
+        "two places that publish may contradict each other.",
         evidence_at(recording, "the robot set off", step.time_ns, speed_plot(recording)),
     )
 
@@ -258,5 +258,5 @@ def no_contact(recording: Recording, parameters: NoContact) -> Finding:
             cause = why_cut_short(recording)
     if cause is not None:
         return cause.finding(expected)
-    evidence = Evidence(plots=(speed_plot(recording),))
-    return Finding.passed(expected, f"no contact on {metres(way_m(recording.truth))}", evidence)
+    way, evidence = metres(way_m(recording.truth)), Evidence(plots=(speed_plot(recording),))
+    return Finding.passed(expected, f"no contact on a path of {way}", evidence)

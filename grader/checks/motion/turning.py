@@ -42,11 +42,10 @@ class TwoPhases(GoalParameters):
 def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
     """At the goal's position the robot turns and no longer drives.
 
-    Judged by the commands in force and the true way. Within `position` of the goal the robot
-    may drive on towards it, as far as its own tolerance says, and turn on the spot towards it;
-    but while it turns away from the goal's position, or once it has done so without driving, it
-    may not drive any more (for the delay of odometry 2 cm are allowed, or what the robot
-    goes in 0.09 s at its full speed).
+    Judged by the active commands and the true path. Within `position` of the goal, the robot may
+    still drive and turn towards it. It must not drive while it turns away from the goal's position,
+    nor after it has turned away on the spot. Odometry comes late, so 2 cm are allowed, or what the
+    robot drives in 0.09 s at full speed if that is more.
     """
     expected = (
         f"no linear motion once within {metres(parameters.position)} of the goal, only turning"
@@ -63,15 +62,15 @@ def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
     way = sum(way_m(pair) for pair in stray)
     fastest = 0.0 if recording.scene is None else recording.scene.max_linear_m_s
     if way <= max(_RUN_OUT_M, _RUN_OUT_S * fastest):
-        return Finding.passed(expected, f"{metres(way)} after it had begun to turn", evidence)
+        return Finding.passed(expected, f"drove {metres(way)} after it had begun to turn", evidence)
     first = stray[0][1]
     fastest = max((abs(after.command_m_s) for _, after in stray))
     when_s = recording.since_launch_s(first.time_ns)
     cause = why_off_course(recording) or Cause(
         f"drove {metres(way)} while it turned at the goal, commanded with up to {speed(fastest)} "
         f"(from {when_s:.2f} s after launch)",
-        "In the second phase linear.x is 0.0. Remember that the position was reached: a flag that "
-        "is set once does not fall back into the first phase.",
+        "In the second phase linear.x is 0.0. Remember in a flag that the position was reached, so "
+        "that the node does not fall back into the first phase.",
         evidence_at(recording, "drives again", first.time_ns, *evidence.plots),
     )
     return cause.finding(expected)
@@ -124,7 +123,7 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
     (once driving has ended near the goal) against the goal's heading. The long way goes away from
     the goal direction and through half a turn. Overshooting by less is not the long way.
     """
-    expected = "turns by the short way, never more than half a turn for an error"
+    expected = "turns the short way, never more than half a turn"
     run = approach(recording, parameters.goal)
     if isinstance(run, Cause):
         return run.finding(expected)
@@ -145,7 +144,7 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
         cause = why_not_there(run, parameters.position) if arrival is None else None
         if cause is not None:
             return cause.finding(expected)
-        return Finding.passed(expected, "no long way", evidence)
+        return Finding.passed(expected, "it never turned the long way", evidence)
     what, error_rad, step = detours[0]
     when_s = recording.since_launch_s(step.time_ns)
     more = f", and {counted(len(detours) - 1, 'more time')}" if len(detours) > 1 else ""

@@ -116,8 +116,8 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
 
     Judged by the process, which must still run when the observation ends, and by the ROS graph,
     which must not have lost the node before. Of several nodes, only those count that publish on a
-    recorded topic or subscribe to a topic of a stimulus; a helper node may end earlier. Offences in
-    the sandbox, such as a signal to its first process, end a node.
+    recorded topic or subscribe to a topic of a stimulus; a helper node may end earlier. What the
+    sandbox forbids, such as a signal to its first process, also fails.
     """
     name = parameters.name
     process = declarations.process_of(recording, name) if name else None
@@ -136,7 +136,7 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
 
 
 def _why_gone(recording: Recording, name: str | None) -> Cause | None:
-    """A node that the scenario is about vanished early, and gave no sign of life after."""
+    """Why a node that the scenario is about vanished early, without a sign of life after it."""
     concerned = target_nodes(recording)
     nodes = concerned or recording.student_nodes
     if name is not None:

@@ -124,7 +124,7 @@ def executable(submission: SubmissionRecord, parameters: Executable) -> Finding:
 
 
 def _misnamed(submission: SubmissionRecord, parameters: Executable) -> str:
-    """Rule of the one file of the install space that can be run in place of what is missing."""
+    """The rule by which the only file of the install space runs in place of the missing one."""
     if why_not_built(submission, parameters.package) is not None:
         return ""
     package, name = existing_package(submission, parameters.package), parameters.executable

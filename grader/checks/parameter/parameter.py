@@ -33,6 +33,7 @@ from grader.recording.model import Recording
 from grader.spec.name import QualifiedNodeName
 
 _TOLERANCE = 1e-9
+_GIVE = "Give declare_parameter() a ParameterDescriptor"
 
 
 class OfParameter(Parameters):
@@ -135,15 +136,14 @@ def _why_other_descriptor(found: Descriptor, parameters: Declared, shown: Eviden
         kind = "IntegerRange" if found.type == "integer" else "FloatingPointRange"
         return Cause(
             f"its range is {_range_words(found.range)}" if found.range else "it has no range",
-            f"Give declare_parameter() a ParameterDescriptor with a {kind}(from_value=..., "
-            "to_value=..., step=...).",
+            f"{_GIVE} with a {kind}(from_value=..., to_value=..., step=...).",
             shown,
         )
     if parameters.read_only not in (None, found.read_only):
         seen = "it is read-only" if found.read_only else "it is not read-only"
-        return Cause(seen, f"ParameterDescriptor(read_only={parameters.read_only}).", shown)
+        return Cause(seen, f"{_GIVE}(read_only={parameters.read_only}).", shown)
     if parameters.described and not found.description.strip():
-        return Cause("it has no description", "ParameterDescriptor(description='...').", shown)
+        return Cause("it has no description", f"{_GIVE}(description='...').", shown)
     return None
 
 
@@ -185,7 +185,7 @@ def settings_to(recording: Recording, parameters: OfSetting) -> tuple[Setting, .
 
 
 def refusal(item: Setting) -> str:
-    """What the node said when it refused a value."""
+    """The node's reason for the refusal of a value."""
     return f"refused: {item.reason or 'without a reason'}"
 
 
@@ -240,10 +240,10 @@ def _why_other_answer(recording: Recording, item: Setting, parameters: Set) -> C
             shown,
         )
     if parameters.reason.casefold() not in item.reason.casefold():
-        reason = f"“{item.reason}”" if item.reason else "nothing"
+        reason = f"is “{item.reason}”" if item.reason else "is empty"
         return Cause(
-            f"it was refused, but the reason says {reason}",
-            "SetParametersResult(successful=False, reason='...') tells why.",
+            f"it was refused, but the reason {reason}",
+            "Say why in SetParametersResult(successful=False, reason='...').",
             shown,
         )
     for reading in readings(recording, parameters.node, parameters.name):
@@ -251,7 +251,7 @@ def _why_other_answer(recording: Recording, item: Setting, parameters: Set) -> C
             if same_value(parameters.value, reading.value) == parameters.accepted:
                 return None
             verb = "accepted" if item.accepted else "refused"
-            seen = f"it was {verb}, but is {value_text(reading.value)} then"
+            seen = f"it was {verb}, but its value is {value_text(reading.value)} afterwards"
             return Cause(seen, "Do not set the parameter yourself in the callback.", shown)
     return None
 

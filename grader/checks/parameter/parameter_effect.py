@@ -29,8 +29,8 @@ from grader.spec.unit import format_duration
 
 _LEAST_PERIODS = 3
 _NEW_TIMER = (
-    "A timer keeps its period: make it anew in add_post_set_parameters_callback() by "
-    "self.timer.cancel() and self.create_timer(period, self.callback), or set "
+    "A timer keeps its period. In a callback of add_post_set_parameters_callback(), call "
+    "self.timer.cancel() and then self.timer = self.create_timer(period, self.callback), or set "
     "self.timer.timer_period_ns."
 )
 
@@ -70,8 +70,8 @@ class TakesEffect(OfSetting):
         if self.period is not None:
             parts.append(f"a message every {format_duration(self.period)}")
         return (
-            f"{' and '.join(parts)} on {code(self.topic)} from {format_duration(self.within)} "
-            f"after {self.name} = {value_text(self.value)} was set"
+            f"{' and '.join(parts)} on {code(self.topic)}, {format_duration(self.within)} "
+            f"or more after {self.name} = {value_text(self.value)} was set"
         )
 
 
@@ -79,7 +79,7 @@ class TakesEffect(OfSetting):
 def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding:
     """Setting the parameter changes what the node does.
 
-    Judged by the messages from shortly after the node accepted the value until the same parameter
+    Judged by the messages from `within` after the node accepted the value until the same parameter
     was set again or the run ended.
     """
     item = settings_to(recording, parameters)[0]
@@ -152,7 +152,7 @@ def _why_other_message(
         return None
     late_s = (message.stamp_ns - set_ns) / NS
     seen = f"{format_duration(late_s)} after it was set a message has {difference_words(wrong)}"
-    hint = f"Look what the node makes of {code(parameters.name)} where it publishes."
+    hint = f"Look at how the node uses {code(parameters.name)} where it publishes."
     if any(wrong == unlike(one.value, parameters.fields, parameters.tolerance) for one in before):
         hint = (
             "The message is as it was before: read "
@@ -174,7 +174,7 @@ def _why_other_period(
     off_s = median_s - parameters.period
     if abs(off_s) <= parameters.period_tolerance * parameters.period:
         return None
-    seen = f"messages come every {format_duration(median_s)} (median) then"
+    seen = f"after that, messages come every {format_duration(median_s)} (median)"
     if 0.0 < off_s * (len(times) - 1) <= recording.stolen_s(times[0], times[-1]):
         return Cause.to_repeat(f"{seen}, but the machine took the time")
     most = percent(parameters.period_tolerance)

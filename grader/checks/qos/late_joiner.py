@@ -47,8 +47,8 @@ class LateJoiner(Parameters):
         """What is expected, in words."""
         who = f"a late joiner on {code(self.topic)} gets"
         if self.last == 0:
-            return f"{who} nothing of what was before it"
-        return f"{who} the last {counted(self.last, 'message')} of those before it, and no more"
+            return f"{who} no message published before it"
+        return f"{who} the last {counted(self.last, 'message')} published before it, and no more"
 
 
 @check("qos.late_joiner", Subject.RECORDING, LateJoiner)
@@ -58,7 +58,7 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     Judged by behaviour: a subscription of the probe joins in the middle of the run, and gets the
     last messages that were published before (`last` of them, or none for 0), as the durability
     and depth of the publisher make it. Messages that were published just while it was matched
-    may count on either side.
+    may count as before or after.
 
     A scenario that records the topic subscribes to it from the start. Without `record`, there
     is no subscription until the late joiner's; the sequence numbers of the publisher's middleware
@@ -114,7 +114,8 @@ class _Case:
 
     @property
     def seen(self) -> str:
-        return f"it got {len(self.history)} of the {counted(self.number, 'message')} before it"
+        before = f"{counted(self.number, 'message')} published before it"
+        return f"it got {len(self.history)} of the {before}"
 
     @property
     def is_newest(self) -> bool:
@@ -172,7 +173,7 @@ class _Case:
             return None
         number = counted(gone, "publisher was", "publishers were")
         lost = "what a publisher keeps is lost with it"
-        observed = f"{seen}: {lost}, and {number} destroyed before it joined"
+        observed = f"{seen}: {number} destroyed before it joined, and {lost}"
         return Cause(observed, _ONE_PUBLISHER_HINT, self.evidence)
 
 
@@ -211,7 +212,8 @@ def _why_wrong(case: _Case) -> Cause | None:
 def _why_unpublished_before(case: _Case) -> Cause:
     """Why little or nothing was published before the late joiner, the only subscription."""
     recording, join = case.recording, case.join
-    seen = f"before it, {counted(case.number, 'message')} had been published to no subscription"
+    number = counted(case.number, "message was", "messages were")
+    seen = f"{number} published before it, while there was no subscription"
     destroyed = case.why_destroyed(seen)
     if destroyed is not None:
         return destroyed
@@ -222,7 +224,7 @@ def _why_unpublished_before(case: _Case) -> Cause:
     if case.number * span_s > case.parameters.last * (span_s - stolen_s):
         return Cause.to_repeat(f"{seen}; the machine took {format_duration(stolen_s)}")
     return Cause(
-        f"{seen} in {format_duration(span_s)}",
+        f"{seen} ({format_duration(span_s)})",
         "Publish from the start, whether or not there is a subscription: leave out conditions such "
         "as get_subscription_count() > 0. What comes before the late joiner is kept for it.",
         case.evidence,

@@ -356,19 +356,19 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
         left_open = _left_open(recording, endpoint, pair)
         hint = _HINT.format(kind.value)
         if refused and parameters.expect == "match":
-            observed = f"{own} and this peer do not match: {', '.join(refused)}"
+            observed = f"{own} does not match such a {other}: {', '.join(refused)}"
             hint = f"{_RULE} {hint}"
         elif refused and left_open:
             taken = ", ".join(str(getattr(endpoint.qos, policy)) for policy in left_open)
             observed = (
-                f"{own} asks for the best available {' and '.join(left_open)}, declared by the "
-                "process: it requests what the publishers offer that are there when it is created, "
-                f"here {taken}, and would match this peer alone"
+                f"{own} requests the best available {' and '.join(left_open)}, declared by the "
+                "process. It then takes what the publishers offer when it is created, here "
+                f"{taken}. Alone with such a publisher it would match"
             )
         elif not refused and parameters.expect == "refuse":
             observed = (
-                f"{own} and this peer match: no policy of what is offered is weaker than what is "
-                "requested"
+                f"{own} matches such a {other}: no policy that is offered is weaker than the one "
+                "that is requested"
             )
         else:
             continue
@@ -390,7 +390,7 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
     pair = sides(kind, endpoints[0].qos, peer)
     return Finding.passed(
         expected,
-        ", ".join(refusals(*pair)) or "no policy stands against it",
+        ", ".join(refusals(*pair)) or "every policy is compatible",
         Evidence(tables=(compatibility_table(*pair),)),
     )
 

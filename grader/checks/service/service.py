@@ -75,7 +75,7 @@ class Responds(Parameters):
     def _asked(self) -> str:
         asked = f" to {words(self.request)}" if self.request else ""
         wanted = [words(self.response)] if self.response else []
-        wanted += [f"{path} with “{word}”" for path, word in self.contains.items()]
+        wanted += [f"{path} that contains “{word}”" for path, word in self.contains.items()]
         return (
             f"the service {code(self.service)} answers{asked} with "
             f"{' and '.join(wanted) or 'a response'} within {format_duration(self.within)}"
@@ -189,8 +189,8 @@ class Concurrent(Parameters):
 
     def _asked(self) -> str:
         return (
-            f"{code(self.service)} works on calls that come at once "
-            f"{self.calls.replace('_', ' ')}, each for {format_duration(self.takes)}"
+            f"{code(self.service)} processes calls {self.calls.replace('_', ' ')} if they come at "
+            f"once, each in {format_duration(self.takes)}"
         )
 
 
@@ -208,7 +208,7 @@ def concurrent(recording: Recording, parameters: Concurrent) -> Finding:
         if (second.requested_ns - first.requested_ns) / NS < _TOGETHER * parameters.takes
     ]
     if not pairs:
-        text = "the scenario calls the service never twice at once"
+        text = "the scenario never calls the service twice at once"
         return Finding.error(parameters.asked_for, text)
     # Time enough for the slower of both, one after the other.
     stop_if(why_slow(recording, calls, 2.0 * len(calls) * parameters.takes))
@@ -236,7 +236,7 @@ def _why_other_order(
     in_doubt = side_by_side and gap_s - stolen_s <= _TOGETHER * takes_s
     if in_doubt or not (together or far_apart):
         return Cause(
-            f"{seen}, so it cannot be told how they were worked on",
+            f"{seen}, so it cannot be judged how they were processed",
             f"Each call should take {format_duration(takes_s)}.",
             ours=stolen_s > 0.0,
             disturbed=stolen_s > 0.0,
@@ -245,7 +245,7 @@ def _why_other_order(
     declared = f"; the process declared a {codes(executors)}" if executors else ""
     if not side_by_side:
         return Cause(
-            f"{seen}, so both were worked on at the same time{declared}",
+            f"{seen}, so both were processed at the same time{declared}",
             "Give the service a MutuallyExclusiveCallbackGroup, or use rclpy.spin(node).",
             _evidence(recording, pair),
         )

@@ -47,7 +47,7 @@ def _judged_package(submission: SubmissionRecord, name: str) -> PackageRecord:
         hint = "Correct this line or the one before it."
         stop_if(Cause(seen, hint, Evidence(places=places)))
     if not package.sources:
-        hint = f"The code belongs into the folder {code(f'{name}/{name}')}, beside __init__.py."
+        hint = f"The code belongs in the folder {code(f'{name}/{name}')}, beside __init__.py."
         stop_if(Cause(f"the package {code(name)} has no Python code", hint))
     return package
 
@@ -179,7 +179,7 @@ def docstrings(submission: SubmissionRecord, parameters: Docstrings) -> Finding:
     ]
     hint = (
         'A docstring is the first statement in the body: """Publish the next command.""" A '
-        "comment with # is none."
+        "comment with # is not one."
     )
     return _shared(parameters, judged, "a docstring", hint)
 
@@ -241,7 +241,7 @@ def _lacking(one: SourceFunction, returns: bool) -> str:
 def _shared(
     parameters: _Share, judged: Sequence[tuple[bool, SourceError]], what: str, hint: str
 ) -> Finding:
-    """Judge by how many have what they need."""
+    """The finding by the share of items that have what they need."""
     lacking = [place for good, place in judged if not good]
     having = len(judged) - len(lacking)
     observed = f"{having} of {len(judged)} have {what}"

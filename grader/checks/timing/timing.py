@@ -53,7 +53,7 @@ _MOST_LATE, _LATE_SHARE = 3, 0.2
 _AROUND_NS = NS // 10
 # Middleware that stamps every message.
 _STAMPING = "rmw_fastrtps_cpp"
-_CLOCK_HINT = "Publish when the time has come, and leave the clock of the process alone."
+_CLOCK_HINT = "Publish at the right time, and do not change the clock of the process."
 
 
 class Period(Parameters):
@@ -276,7 +276,7 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
             observed,
             "Publish once in every call of the callback: look for a condition that leaves calls "
             "out, for a time.sleep(), and for a second timer or publish(). create_timer takes its "
-            "period in seconds: the reciprocal of the rate.",
+            "period in seconds: 1 / rate.",
             evidence,
         )
     paused = _why_paused(recording, parameters, messages)

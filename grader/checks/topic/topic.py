@@ -58,7 +58,7 @@ def _presence(recording: Recording, kind: Kind, parameters: Topic) -> Finding:
         return absent
     endpoints = recording.student_endpoints(kind, parameters.topic)
     if not endpoints:
-        return Finding.passed(expected, "messages came from one, too short-lived for the graph")
+        return Finding.passed(expected, "messages came from one, but too briefly for the ROS graph")
     first = min(endpoints, key=lambda item: item.appeared_ns)
     nodes, when_s = {item.node for item in endpoints}, recording.since_launch_s(first.appeared_ns)
     return Finding.passed(
@@ -82,8 +82,8 @@ def _absence(recording: Recording, kind: Kind, parameters: Topic, expected: str)
             endpoints = recording.student_endpoints(kind, name)
             failed = Finding.failed(
                 expected,
-                f"one on {code(found)} instead; everything else was judged in a run with "
-                f"`--ros-args -r {remap}`, which puts the name right",
+                f"one on {code(found)} instead; everything else was judged in a second run, with "
+                f"`--ros-args -r {remap}` to correct the name",
                 f"Write the topic's name as '{name.lstrip('/')}'.",
                 Evidence(moments=endpoints_seen(recording, endpoints)),
             )

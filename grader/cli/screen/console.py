@@ -45,7 +45,7 @@ def open_page(url: str) -> None:
     """Open a page in the user's browser, or say that it has to be opened by hand."""
     import webbrowser
 
-    # Without a display only browsers for terminals are found, and they would take ours.
+    # Without a display only browsers for terminals are found, which would take this terminal.
     shown = any(os.environ.get(name) for name in ("BROWSER", "DISPLAY", "WAYLAND_DISPLAY"))
     failed = [sys.platform.startswith("linux") and not shown]
     if not failed[0]:

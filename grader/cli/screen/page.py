@@ -1,7 +1,7 @@
 """The report page that follows a watched submission: a small server for this machine only.
 
 The report itself is served as it was written, with its own policy that forbids requests. It is
-shown in a frame of a page of ours, which asks for news and loads the frame again.
+shown in a frame of an outer page, which asks this server for changes and reloads the frame.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class PageState:
 
     version: int = 0
     title: str = "rosgrade watch"
-    told: str = "grading"
+    text: str = "grading"
 
 
 class ReportPage:
@@ -49,9 +49,9 @@ class ReportPage:
         """Address and port, as a browser names them in its requests."""
         return f"{ADDRESS}:{self._server.server_address[1]}"
 
-    def tell(self, told: str, title: str, *, is_new: bool = False) -> None:
-        """Let every open page show something."""
-        self.state = PageState(self.state.version + is_new, title, told)
+    def show(self, text: str, title: str, *, is_new: bool = False) -> None:
+        """Show a text and a title on every open page."""
+        self.state = PageState(self.state.version + is_new, title, text)
 
     def read_report(self) -> bytes | None:
         """The report as it is, or None where there is none yet."""
@@ -61,7 +61,7 @@ class ReportPage:
             return None
 
     def close(self) -> None:
-        """End it."""
+        """Stop the server."""
         self._server.shutdown()
         self._server.server_close()
         self._thread.join()
@@ -73,7 +73,7 @@ class _Handler(BaseHTTPRequestHandler):
         super().__init__(*arguments)  # type: ignore[arg-type]
 
     def do_GET(self) -> None:
-        """Answer."""
+        """Answer a request of the browser."""
         # Another site's name may be made to lead here; the browser still says whom it asks.
         if self.headers.get("Host") != self._page.host:
             self._answer(HTTPStatus.FORBIDDEN, "text/plain", b"")

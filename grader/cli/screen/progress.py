@@ -69,7 +69,7 @@ class Progress:
             _print(text)
 
     def note(self, text: str) -> None:
-        """Say something that must not be missed."""
+        """Print a line that stays."""
         if self._bars is not None:
             from rich.text import Text
 
@@ -88,16 +88,16 @@ class Progress:
                 f"{work} {total}" + (f", {already} of them by an earlier run" if already else "")
             )
 
-    def advance(self, name: str, said: str = "", *, fresh: bool = True) -> None:
-        """Count one that is done."""
+    def advance(self, name: str, note: str = "", *, fresh: bool = True) -> None:
+        """Count one piece of work that is done."""
         self._count += 1
         self._fresh += fresh
         rate = self._rate()
         if self._bars is not None:
             text = f"{self._work}, {self._count} of {self._total}{rate and f', {rate}'}"
             self._show("", text, completed=self._count, total=self._total)
-        elif said and fresh and not self._quiet:
-            _print(f"{self._count} of {self._total}: {name}: {said}{rate and f' ({rate})'}")
+        elif note and fresh and not self._quiet:
+            _print(f"{self._count} of {self._total}: {name}: {note}{rate and f' ({rate})'}")
 
     def narrate(self, scenario: str, event: Mapping[str, Any]) -> None:
         """Tell what the cell of a scenario does."""

@@ -18,10 +18,10 @@ _Answer = TypeVar("_Answer")
 
 
 class _Lasting:
-    """A text stream that leads nowhere once it cannot be written to any more.
+    """A text stream that drops what it gets once writing has failed.
 
-    It stands before Python's own stream, and not below it: what Ctrl-C interrupts there in the
-    middle of a write would be written twice.
+    It wraps Python's own stream and is not below it: a write that Ctrl-C interrupts there would
+    be written twice.
     """
 
     def __init__(self, stream: TextIO) -> None:

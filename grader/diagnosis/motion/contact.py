@@ -66,7 +66,7 @@ def why_touched(recording: Recording) -> Cause | None:
     if before.command_m_s or before.command_rad_s:
         command = f"with linear.x = {speed(before.command_m_s)} as the last command"
     else:
-        command = "although the last command was to stop: too late"
+        command = "although the last command was to stop: it came too late"
     reason = cause_of(Contact(recording, step, before))
     return Cause(
         f"drove into {name} {motion}, {when_s:.2f} s after launch, {command}{reason.words}",
@@ -84,8 +84,8 @@ def no_scan_for_long(symptom: Contact) -> Reason | None:
         return None
     return Reason(
         f"; the last scan had come {since_ns / NS:.2f} s before",
-        "Without scans the robot drives blindly: keep the time of the last scan, and let a "
-        "timer stop the robot when it is more than a second ago.",
+        "Without new scans the robot drives blindly. Store the time of the last scan, and let a "
+        "timer stop the robot when that is more than 1 s ago.",
     )
 
 
@@ -97,9 +97,9 @@ def old_command(symptom: Contact) -> Reason | None:
         return None
     return Reason(
         f", sent {since_ns / NS:.2f} s before",
-        "The robot keeps the last command: publish one with every scan, or from a timer of 10 "
-        "Hz or more, and to stop one with linear.x = 0.0. A time.sleep() or a loop in a "
-        "callback keeps it from coming in time.",
+        "The robot keeps the last command. Publish a command for every scan, or from a timer of "
+        "10 Hz or more. To stop, publish linear.x = 0.0. A time.sleep() or a loop in a callback "
+        "delays the command.",
     )
 
 
@@ -111,8 +111,8 @@ def callback_in_a_loop(symptom: Contact) -> Reason | None:
         return None
     return Reason(
         f"; a callback was at {place.file}:{place.line} when it was interrupted",
-        "A loop in a callback never sees a newer scan, nor does a time.sleep(), because the "
-        "next one waits for its end: decide once for each scan, publish once and return.",
+        "A callback with a loop or a time.sleep() never sees a newer scan: the next scan waits "
+        "until it returns. Decide once for each scan, publish once and return.",
     )
 
 
@@ -126,8 +126,8 @@ def contradicting_commands(symptom: Contact) -> Reason | None:
         return None
     return Reason(
         f"; {stops} of {counted(len(lately), 'command')} in the last second were to stop",
-        "Two places publish: one stops the robot, the other drives it on at once. Look for a timer "
-        "that publishes the speed again and again, and let one place alone decide.",
+        "Two places publish: one stops the robot, the other starts it again at once. Look for a "
+        "timer that publishes the speed again and again. Let only one place decide.",
     )
 
 
@@ -136,10 +136,10 @@ def decided_to_drive(symptom: Contact) -> Reason:
     """The node continued to drive, or stopped too late."""
     return Reason(
         "",
-        "Log the range that you compare. Is it the beam straight ahead, whose angle is 0, of the "
-        "newest scan, and is your limit in metres? Where it is within the limit, publish "
-        "linear.x = 0.0. A time.sleep() in the callback or a slow timer decides by an old scan. "
-        "The robot needs time to see (a scan comes every 0.2 s) and to brake.",
+        "Log the range that you compare. Is it the beam straight ahead (angle 0) of the newest "
+        "scan? Is your limit in metres? When the range is below the limit, publish linear.x = 0.0. "
+        "With a time.sleep() in the callback or a slow timer, you decide by an old scan. A scan "
+        "comes every 0.2 s, and the robot needs time to brake.",
     )
 
 

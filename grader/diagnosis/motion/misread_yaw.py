@@ -42,18 +42,18 @@ class Reading:
 _READINGS = (
     Reading(
         "always 0",
-        "A quaternion in ROS is x, y, z, w: read as w, x, y, z, no turn on the ground is left of "
-        "it. Nor is one in roll or pitch: of as_euler('xyz') and euler_from_quaternion(), yaw is "
-        f"the last. {_FORMULA}, anew in each callback: at the start it may have been 0.",
+        "The order of a quaternion in ROS is x, y, z, w. as_euler('xyz') and "
+        "euler_from_quaternion() return roll, pitch and yaw: yaw is the last of the three. "
+        f"{_FORMULA}. Compute it again in each callback: at the start it may have been 0.",
         lambda _: 0.0,
     ),
     Reading(
         "in degrees",
-        "Angles in ROS are radians (REP-103), and so are those of atan2: convert none of them.",
+        "Angles in ROS are in radians (REP-103), and so is atan2's result: do not convert them.",
         math.degrees,
     ),
     Reading(
-        "half of what it is",
+        "half of the true yaw",
         f"A quaternion holds half of the angle: {_FORMULA}, or 2 * atan2(z, w) on flat ground.",
         lambda yaw_rad: yaw_rad / 2.0,
     ),
@@ -63,14 +63,14 @@ _READINGS = (
         lambda yaw_rad: math.sin(yaw_rad / 2.0),
     ),
     Reading(
-        "what it is with its sign changed",
-        "Counter-clockwise is positive (REP-103), and 2 * asin(z) has the wrong sign where w is "
+        "the true yaw with the wrong sign",
+        "Counter-clockwise is positive (REP-103), and 2 * asin(z) has the wrong sign when w is "
         f"negative: {_FORMULA}.",
         lambda yaw_rad: -yaw_rad,
     ),
     Reading(
-        "never beyond -90° and 90°",
-        f"asin and atan know only half of the circle: {_FORMULA}, with atan2.",
+        "always between -90° and 90°",
+        f"asin and atan return angles from -90° to 90° only. Use atan2: {_FORMULA}.",
         lambda yaw_rad: math.asin(math.sin(yaw_rad)),
     ),
 )

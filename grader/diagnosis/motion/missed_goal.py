@@ -102,7 +102,7 @@ def wrong_place(symptom: GoalMissed) -> Cause | None:
         (
             first.x_m + goal.x_m,
             first.y_m + goal.y_m,
-            "the goal counted from where the robot started",
+            "the goal measured from where the robot started",
             "The goal is in the frame of odometry: subtract the position that odometry reports.",
         ),
         (
@@ -130,8 +130,8 @@ def loop_in_a_callback(symptom: GoalMissed) -> Cause | None:
         return None
     return symptom.cause(
         f": a callback was at {stuck.file}:{stuck.line} when it was interrupted",
-        "A loop in a callback never sees newer odometry, because the next message waits for "
-        "its end: compute one command for each, publish it and return.",
+        "A loop in a callback never sees newer odometry: the next message waits until the "
+        "callback returns. Compute one command for each message, publish it and return.",
     )
 
 
@@ -153,14 +153,14 @@ def angle_not_wrapped(symptom: GoalMissed) -> Cause | None:
         return None
     times = "once" if len(detours) == 1 else f"{len(detours)} times"
     turned = (
-        f"on its way it turned away from the goal through half a turn, {times}"
+        f"on its way it turned away from the goal, the long way round, {times}"
         if detours
-        else f"it turned {turns:.1f} times around"
+        else f"it made {turns:.1f} full turns"
     )
     return symptom.cause(
         f": {turned}",
-        "Print yaw, the error and the command while it turns. Yaw goes with the robot, from "
-        f"-pi to pi; the error is atan2(dy, dx) - yaw. {WRAP_HINT}",
+        "Print yaw, the error and the command while it turns. Yaw follows the robot, from "
+        f"-pi to pi. The error is atan2(dy, dx) - yaw. {WRAP_HINT}",
     )
 
 
@@ -171,8 +171,8 @@ def drove_on(symptom: GoalMissed) -> Cause | None:
     if nearest_m > symptom.position_m:
         return None
     return symptom.cause(
-        f": it had been there, {metres(nearest_m)} near, and drove on",
-        "Compare the distance in every callback, and publish linear.x = 0.0 where it is below "
+        f": it came as near as {metres(nearest_m)}, and drove on",
+        "Compare the distance in every callback, and publish linear.x = 0.0 when it is below "
         "your tolerance.",
     )
 
@@ -184,8 +184,8 @@ def stopped_elsewhere(symptom: GoalMissed) -> Cause | None:
         return None
     return symptom.cause(
         "",
-        "Print the goal that your node reads, and drive on until math.hypot(goal's x - x, "
-        "goal's y - y), in metres and from the newest odometry, is smaller than the tolerance.",
+        "Print the goal that your node reads. Drive until math.hypot(goal's x - x, goal's y - y) "
+        "is below the tolerance, in metres, with x and y from the newest odometry.",
     )
 
 
@@ -196,7 +196,7 @@ def drives_away(symptom: GoalMissed) -> Cause | None:
     if symptom.run.distance_m(symptom.last) <= began_m:
         return None
     return symptom.cause(
-        f", farther than at its start ({metres(began_m)})",
+        f", farther than at the start ({metres(began_m)})",
         "Print the direction of the goal, yaw and the command while it drives. The direction "
         "changes with the position: it is atan2(dy, dx), dy first, with dx = goal's x - x, and "
         "not atan(dy / dx). The error is this direction - yaw, and a positive error turns left. "
@@ -209,6 +209,6 @@ def too_slow(symptom: GoalMissed) -> Cause:
     """It is on its way, but too slow, or it weaves from side to side."""
     return symptom.cause(
         f", after {format_duration(symptom.watched_s)}",
-        "If it is on its way, it is too slow: a larger gain, within the limits of the robot. If it "
-        "weaves from side to side, make the angular gain smaller.",
+        "If it drives to the goal, it is too slow: make the gain larger, within the robot's "
+        "limits. If it weaves from side to side, make the angular gain smaller.",
     )

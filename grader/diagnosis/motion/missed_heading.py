@@ -38,7 +38,7 @@ class HeadingMissed(Symptom[Cause]):
         """The symptom in words, followed by more, with the heading over time."""
         plots = (self.run.heading_plot,)
         return Cause(
-            f"is at the goal's position, but looks to {degrees(self.last.yaw_rad)} instead of "
+            f"is at the goal's position, but faces {degrees(self.last.yaw_rad)} instead of "
             f"{degrees(self.run.goal.yaw_rad)}{words}",
             hint,
             Evidence(moments=(until_the_end(self.run.recording),), plots=plots),
@@ -72,8 +72,8 @@ def turns_for_ever(symptom: HeadingMissed) -> Cause | None:
         return None
     return symptom.cause(
         f" and still turns at {turn(symptom.last.angular_rad_s)} when the observation ends",
-        "angular.z is a gain times the goal's heading - yaw, both in radians and wrapped, and "
-        "0 where that is within the tolerance: print all three while it turns.",
+        "angular.z = gain * (goal's heading - yaw), in radians, normalised to [-pi, pi], and 0.0 "
+        "within the tolerance. Print the goal's heading, yaw and angular.z while it turns.",
     )
 
 
@@ -84,14 +84,14 @@ def another_heading(symptom: HeadingMissed) -> Cause | None:
     headings = (
         (
             math.radians(goal_rad),
-            "as if the goal's heading were 0, or were taken for degrees",
-            "Angles in ROS are radians (REP-103), and so is the goal's heading already. Log the "
-            "value that your node has read: that of a float parameter is "
+            "as if the goal's heading were 0, or were in degrees",
+            "The goal's heading is in radians already (REP-103): do not convert it. Log the value "
+            "that your node has read. A float parameter's value is "
             "get_parameter_value().double_value.",
         ),
         (
             -goal_rad,
-            "that is the goal's heading with its sign changed",
+            "that is the goal's heading with the wrong sign",
             "Counter-clockwise is positive (REP-103): error = goal's heading - yaw.",
         ),
     )
@@ -112,8 +112,8 @@ def has_not_turned(symptom: HeadingMissed) -> Cause | None:
         return None
     return symptom.cause(
         ": it has not turned since it arrived",
-        "Once the position is reached, angular.z is a gain times the goal's heading - yaw: is "
-        "this part of the code reached, and which command does it publish?",
+        "At the goal's position, angular.z = gain * (goal's heading - yaw). Is this part of the "
+        "code reached? Which command does it publish?",
     )
 
 
@@ -122,7 +122,7 @@ def stopped_turning(symptom: HeadingMissed) -> Cause:
     """It stopped turning too early or too late."""
     return symptom.cause(
         "",
-        "Turn on until abs(goal's heading - yaw) is within the tolerance, in radians and as they "
-        "were given, and print yaw: it comes from the quaternion, and nothing is added to it. If "
-        "it turns past the heading, make the angular gain smaller.",
+        "Turn until abs(goal's heading - yaw) is below the tolerance, both in radians. Print yaw: "
+        "compute it from the quaternion, and add nothing to it. If the robot turns past the "
+        "heading, make the angular gain smaller.",
     )

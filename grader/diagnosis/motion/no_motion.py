@@ -15,6 +15,7 @@ from grader.diagnosis.wrong_value import MISREAD, was_integer
 from grader.findings.finding import Evidence
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.reference import Goal, UnknownValue
+from grader.findings.value import leaves
 from grader.findings.wording import code, codes, counted
 from grader.measure.compatibility import compatibility_table, refusals
 from grader.measure.motion.approach import Approach
@@ -112,8 +113,8 @@ def why_rejected(recording: Recording) -> Cause | None:
     return Cause(
         f"{counted(len(refused), 'command')} on {code(command_topic(recording))} {were} not finite "
         f"(first: {first.text}); the robot stops instead",
-        "A command must be finite: look for a division by zero, for inf from a range that sees "
-        "nothing, and for sqrt or acos of a number out of range.",
+        "A command must be finite: look for a division by zero, for a range of inf (nothing is "
+        "there), and for sqrt or acos of a number out of range.",
         evidence_at(recording, "command rejected", first.time_ns),
     )
 
@@ -139,7 +140,7 @@ def no_velocity_command(symptom: NotMoved) -> Cause | None:
     recording, topic = symptom.recording, command_topic(symptom.recording)
     found = sorted({message.type for message in recording.on(topic)})
     return Cause(
-        f"{_STILL}: what was published on {code(topic)} is no velocity command but {codes(found)}",
+        f"{_STILL}: the messages on {code(topic)} are no velocity commands but {codes(found)}",
         "Publish geometry_msgs/msg/Twist.",
         Evidence(moments=first_seen(recording, recording.on(topic))),
     )
@@ -186,13 +187,16 @@ def only_zeros(symptom: NotMoved) -> Cause | None:
     recording, sent = symptom.recording, symptom.sent
     if not all(is_zero(item.twist) for item in sent):
         return None
-    topic = code(command_topic(recording))
-    seen = (
-        f"{_STILL}: in all {counted(len(sent), 'command')} on {topic}, linear.x and angular.z are 0"
-    )
+    topic = command_topic(recording)
+    number = counted(len(sent), "command")
+    seen = f"{_STILL}: in all {number} on {code(topic)}, linear.x and angular.z are 0"
     last = recording.truth[-1]
     misread = misreading(recording, last)
-    if misread is not None:
+    twists = (item.value.get("twist", item.value) for item in recording.on(topic))
+    others = sorted({path for twist in twists for path, value in leaves(twist).items() if value})
+    if others:
+        seen += f", but {codes(others)} {'is' if len(others) == 1 else 'are'} not"
+    elif misread is not None:
         return Cause(f"{seen}; {misread.words}", misread.hint, symptom.evidence)
     return Cause(
         seen,
@@ -231,6 +235,6 @@ def moves_too_late(symptom: NotMoved) -> Cause:
     return Cause(
         f"{_STILL}: the first command to move, {speed(first.twist.linear_m_s)} ahead, came "
         f"{format_duration(max(left_s, 0.0))} before the end",
-        "A speed below 1 mm/s, or one that holds for a moment only, does not move the robot.",
+        "A speed below 1 mm/s, or a command that lasts only a moment, does not move the robot.",
         symptom.evidence,
     )

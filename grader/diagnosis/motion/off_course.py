@@ -1,4 +1,4 @@
-"""Why a robot left its course, whatever the way it is steered."""
+"""Why a robot left its course, for reasons that do not depend on how it is steered."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def why_unsteered(recording: Recording) -> Cause | None:
     until = " until the observation ended" if next_ns == end_ns else ""
     return Cause(
         f"no command came for {format_duration(long_s)}{until}, from {when_s:.2f} s after launch "
-        "on, and the robot moved on by its last command",
-        "Publish a command for each odometry: look for time.sleep() and for a loop in a "
-        "callback, which keep the next one waiting, and for a condition before publish().",
+        "on, and the robot kept moving by its last command",
+        "Publish a command for each message of odometry. Look for time.sleep() or a loop in a "
+        "callback, which delay the next one, and for a condition before publish().",
         evidence_at(recording, "no command from here on", begin_ns, speed_plot(recording)),
     )

@@ -14,7 +14,7 @@ from grader.recording.model import NS, Call, Process, Recording
 from grader.spec.unit import format_duration
 from grader.submission.record import SourceError
 
-# What had less time for an answer than this may be unanswered for that reason.
+# A call with less time for an answer than this may be unanswered for that reason.
 _ANSWER_S = 1.0
 # A node whose callbacks return at once answers a call to its parameter services sooner.
 _SLOW_S = 0.5
@@ -22,7 +22,7 @@ _SLOW_S = 0.5
 HINT = (
     "A callback must return soon. Look for `while True`, time.sleep() or input() in a callback, in "
     "the constructor or in main(), for rclpy.spin() or rate.sleep() in a callback, for a client's "
-    "call() in a callback, and for a node that is not given to rclpy.spin()."
+    "call() in a callback, and for a node that is not passed to rclpy.spin()."
 )
 
 
@@ -67,7 +67,7 @@ def why_blocked(
     since_s = recording.since_launch_s(call.requested_ns)
     return Cause(
         f"{seen}: something blocks the executor{in_brackets(place)}; from {since_s:.2f} s "
-        "after launch on the node's parameter service answers no call either",
+        "after launch on the node's parameter service does not answer either",
         HINT,
         Evidence(
             moments=(Moment("first call that was not answered", since_s),),
@@ -85,7 +85,7 @@ def why_slow(recording: Recording, seen: str, nodes: Collection[str]) -> Cause |
     moment = Moment("call that waited", recording.since_launch_s(call.requested_ns))
     return Cause(
         f"{seen}: the callbacks keep each other waiting, and calls to the node's parameter "
-        f"service waited {format_duration(wait_s)} and more",
+        f"service waited {format_duration(wait_s)} or more",
         HINT,
         Evidence(moments=(moment,)),
     )
@@ -125,9 +125,9 @@ def why_never_spun(
         if not names or not all(declarations.in_no_executor(recording, name) for name in names):
             return None
         return Cause(
-            f"{seen}: an executor spins, but {codes(names)} was not given to it, so none of its "
+            f"{seen}: an executor spins, but {codes(names)} was not added to it, so none of its "
             "callbacks runs",
-            "Give the node to the executor that spins, executor.add_node(node), or call "
+            "Add the node to the executor that spins, executor.add_node(node), or call "
             "rclpy.spin(node).",
             Evidence(moments=(until_the_end(recording, "no executor had the node"),)),
         )
@@ -135,7 +135,7 @@ def why_never_spun(
     where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
     return Cause(
         f"{seen}: rclpy.spin() was never called, so no callback runs{where}",
-        "Call rclpy.spin(node) in main(), and let nothing before it wait or loop for ever.",
+        "Call rclpy.spin(node) in main(). Nothing before it may wait or loop for ever.",
         Evidence(
             moments=(until_the_end(recording, "rclpy.spin() was still not called"),),
             places=(place,) if place else (),

@@ -85,9 +85,9 @@ def not_imported(symptom: Raised) -> str | None:
     for beginning, names in TABLE.imports.items():
         if found and found[1] in names.split():
             return (
-                "If it is the one of ROS or Python, import it at the top of the file: "
-                f"{code(f'{beginning} {found[1]}')}. Otherwise it is used before it is defined, "
-                "or misspelt."
+                "If you mean the one of ROS or Python, import it at the top of the file: "
+                f"{code(f'{beginning} {found[1]}')}. Otherwise it is misspelt, or used before it "
+                "is defined."
             )
     return None
 

@@ -47,9 +47,9 @@ def library_hint(message: str, recording: Recording) -> str | None:
     if nearest(found[1], own | PACKAGES, cutoff=0.8) is not None:
         return None
     return (
-        f"Is {code(found[1])} spelt right? Where this is graded, Python has the standard library, "
-        f"ROS 2 and {codes(allowed.split())}. A package or a module of your own: hand it in, name "
-        "it in package.xml, let setup.py install it (packages=[...]), and import it from its "
-        "package (from my_package import my_module). Another library: ask your instructor to allow "
-        "it."
+        f"Is {code(found[1])} spelt right? The machine that grades has Python's standard library, "
+        f"ROS 2 and {codes(allowed.split())}. For another library, ask your instructor to allow "
+        "it. If it is your own package or module: hand it in, name it in package.xml, let setup.py "
+        "install it (packages=[...]), and import it from its package (from my_package import "
+        "my_module)."
     )

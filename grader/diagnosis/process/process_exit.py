@@ -166,8 +166,8 @@ def main_returned(symptom: ProcessExit) -> Cause | None:
     return Cause(
         f"{symptom.seen} with exit code 0: main() returned{how}",
         "main() must call rclpy.init() and create the node. rclpy.spin(node) keeps a node alive "
-        "until Ctrl-C. Look for what ends it: spin_once() handles one round only, a daemon thread "
-        "ends with main(), rclpy.shutdown(), sys.exit() and os._exit() end everything.",
+        "until Ctrl-C. Look for what ends it: spin_once() handles one round only; a daemon thread "
+        "ends with main(); rclpy.shutdown(), sys.exit() and os._exit() end everything.",
         symptom.evidence,
     )
 
@@ -205,7 +205,7 @@ def service_without_response(symptom: ProcessExit) -> Cause | None:
     # The deepest line of the student's is that of spin(), which is right.
     return Cause(
         f"{symptom.seen} with {failure}: a service's callback did not return a response",
-        "A service's callback ends with `return response`, the object that it was called with.",
+        "End the service's callback with `return response`: return the object that it was given.",
         symptom.evidence,
     )
 
@@ -223,9 +223,9 @@ def machine_lacks_it(symptom: ProcessExit) -> Cause | None:
     else:
         return None
     return Cause(
-        f"{symptom.seen}: it uses {code(name)}{in_brackets(symptom.place)}, which ROS 2 Jazzy has, "
-        "but which is not installed where this is graded",
-        f"No point is lost by it. Tell your instructor: it needs {needs}.",
+        f"{symptom.seen}: it uses {code(name)}{in_brackets(symptom.place)}: ROS 2 Jazzy has "
+        "it, but it is not installed on the machine that grades",
+        f"You lose no points for it. Tell your instructor that it needs {needs}.",
         symptom.evidence,
         ours=True,
     )
@@ -245,7 +245,7 @@ def raised(symptom: ProcessExit) -> Cause | None:
 
 
 def offence(recording: Recording) -> Cause | None:
-    """What the processes did that is never allowed, also where they ended before it was seen."""
+    """A forbidden action of the processes, also where they ended before it was seen."""
     for breach in recording.breaches:
         if not breach.allowed:
             moment = Moment(breach.what, recording.since_launch_s(breach.time_ns))

@@ -112,7 +112,7 @@ def fatal_failure(recording: Recording, process: str) -> Failure | None:
     """The exception that ended a process: the deepest of the last chain.
 
     Of ``ValueError``, then another error while that one was handled, the ``ValueError`` is
-    the one to mend.
+    the one to correct.
     """
     found = [failure for failure in failures(recording, process) if not failure.ignored]
     first = len(found) - 1
@@ -142,7 +142,7 @@ def interrupted_place(
         return None
     path = submission_path(frame.file, recording.submission) or frame.file
     source = f": {frame.source}" if frame.source else ""
-    return SourceError(path, frame.line, f"was here when SIGINT came{source}")
+    return SourceError(path, frame.line, f"the program was here when it was interrupted{source}")
 
 
 def student_place(failure: Failure, submission: SubmissionRecord) -> SourceError | None:

@@ -15,7 +15,7 @@ from sim.motion import Pose, wrap_angle
 
 NO_SPEED_M_S = 1e-3
 WRAP_HINT = (
-    "An angle error beyond [-pi, pi] makes the long way of the short one: normalise it with "
+    "With an angle error outside [-pi, pi] the robot turns the long way round: normalise it with "
     "atan2(sin(e), cos(e)) before you multiply it by the gain."
 )
 

@@ -1,4 +1,4 @@
-"""Rows over time, each with a name, a note, and what was when."""
+"""Rows over time, each with a name, a note, bars, ticks and crosses."""
 
 from __future__ import annotations
 

@@ -140,7 +140,7 @@ def _panel(
 
 
 def _steps(times: Sequence[float], values: Sequence[float]) -> list[svg.Point]:
-    """A command holds until the next: no slopes between two."""
+    """Commands as steps, because a command holds until the next one."""
     points: list[svg.Point] = []
     for time, value in zip(times, values, strict=True):
         if points and points[-1][1] != value:

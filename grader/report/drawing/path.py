@@ -166,6 +166,6 @@ def _from_goal(end: Truth, target: Target) -> str:
     """How far from a goal the robot ended."""
     away_m = math.hypot(end.x_m - target.pose.x_m, end.y_m - target.pose.y_m)
     return (
-        f" It ended {metres(away_m)} from the goal; the dashed circle is what is near enough, "
+        f" It ended {metres(away_m)} from the goal; the dashed circle is the tolerance, "
         f"{metres(target.radius_m)}."
     )

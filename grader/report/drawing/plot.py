@@ -24,9 +24,9 @@ ASIDE, GAP = 0.2, 14
 BIN = 8
 """Height of a bar of a histogram, in pixels."""
 APART = 5.0
-"""Pixels between two crosses that are still told apart."""
+"""Least distance of two crosses in pixels."""
 DOTS = 120
-"""Points that are still told apart; more are a line."""
+"""Most points that are drawn one by one; more are a line."""
 
 
 def draw_plot(plot: Plot, name: str) -> svg.Figure:
@@ -94,7 +94,7 @@ def _series(points: Sequence[svg.Point], band: svg.Point, x: Scale, y: Scale) ->
 
 
 def _apart(points: Sequence[svg.Point]) -> list[svg.Point]:
-    """Points that are still told apart as crosses; the last of a run always stays."""
+    """Points far enough apart for crosses; the last of a run always stays."""
     kept: list[svg.Point] = []
     for point in points:
         if len(kept) > 1 and math.dist(kept[-2], point) < APART:
@@ -153,8 +153,8 @@ def _caption(plot: Plot, values: Sequence[float], band: svg.Point | None, lost: 
         if math.isinf(low) or math.isinf(high):
             allowed = f"up to {high:.6g}" if math.isinf(low) else f"from {low:.6g}"
         outside, count = sum(not low <= value <= high for value in values), len(values)
-        told = f"{outside} of {count} outside (marked ×)" if outside else f"all {count} inside"
-        parts = [f"allowed {allowed}{unit_of(plot.y_label)} (shaded)", told]
+        inside = f"{outside} of {count} outside (marked ×)" if outside else f"all {count} inside"
+        parts = [f"allowed {allowed}{unit_of(plot.y_label)} (shaded)", inside]
     if lost:
-        parts.append(f"{lost} without a finite value not drawn")
+        parts.append(f"{lost} not finite and not drawn")
     return f"{one_line(plot.title)}: {', '.join(parts)}."

@@ -87,8 +87,8 @@ def resume_commands(token: str) -> str:
 
 def command(name: str, message: str, **properties: str) -> str:
     """Write a workflow command; its properties, such as ``file``, are decoded by the runner."""
-    told = ",".join(f"{key}={_property(value)}" for key, value in properties.items())
-    return f"::{name}{' ' if told else ''}{told}::{_data(clean(message)[:MOST_CHARACTERS])}"
+    settings = ",".join(f"{key}={_property(value)}" for key, value in properties.items())
+    return f"::{name}{' ' if settings else ''}{settings}::{_data(clean(message)[:MOST_CHARACTERS])}"
 
 
 def _annotation(check: CheckPart, result: Result, level: str, prefix: str | None) -> str:

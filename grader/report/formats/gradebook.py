@@ -143,10 +143,10 @@ def read_canvas(text: str, name: str = "the Canvas export") -> CanvasExport:
             "Export it in Canvas with Gradebook, Export"
         )
     body = [row for row in rows[1:] if len(row) >= end and _POINTS_POSSIBLE not in row[0]]
-    said = next((row[end:] for row in rows[1:] if _POINTS_POSSIBLE in row[0]), [])
+    possible = next((row[end:] for row in rows[1:] if _POINTS_POSSIBLE in row[0]), [])
     return CanvasExport(
         identity,
-        {title: text.strip() for title, text in zip_longest(columns, said, fillvalue="")},
+        {title: text.strip() for title, text in zip_longest(columns, possible, fillvalue="")},
         students=tuple(tuple(row[:end]) for row in body),
         excused=tuple(
             frozenset(
@@ -176,9 +176,9 @@ def canvas_csv(
     results = [row.result for row in rows if row.result is not None]
     assignment = _one_assignment(results)
     title = _column(export, column or assignment)
-    ours = max(result.max_score for result in results)
+    max_score = max(result.max_score for result in results)
     # Canvas takes this row for a change of the assignment, so what it says itself is kept.
-    points = export.points.get(title) or number(ours)
+    points = export.points.get(title) or number(max_score)
     table = [
         [*export.identity, title],
         [f"    {_POINTS_POSSIBLE}", *[""] * (len(export.identity) - 1), points],
@@ -208,7 +208,7 @@ def canvas_csv(
             taken.setdefault(student, who)
     if len(table) == 2:
         raise UsageError("\n".join(["no score could be filled in:", *problems]))
-    doubts = tuple(_doubts(export, title, points, ours))
+    doubts = tuple(_doubts(export, title, points, max_score))
     return CanvasFile(_csv(table), len(table) - 2, tuple(problems), doubts)
 
 
@@ -227,11 +227,11 @@ def cell(text: str) -> str:
     return f"'{shown}" if shown.lstrip().startswith(_FORMULA) else shown
 
 
-def _doubts(export: CanvasExport, title: str, points: str, ours: float) -> Iterator[str]:
-    if _value(points) != ours:
+def _doubts(export: CanvasExport, title: str, points: str, max_score: float) -> Iterator[str]:
+    if _value(points) != max_score:
         yield (
-            f"{title} has {points} points in Canvas and {number(ours)} here; the scores are "
-            "filled in as they are"
+            f"{title} has {points} points in Canvas and {number(max_score)} here; the scores are "
+            "filled in without scaling"
         )
     if title not in export.points:
         others = [other for other in export.points if not _DROPPED.search(other)]
@@ -293,14 +293,14 @@ def _column(export: CanvasExport, wanted: str) -> str:
     ]
     if len(fitting) > 1:
         raise UsageError(
-            f"the gradebook has {wanted!r} several times: {', '.join(fitting)}. Name one whole"
+            f"the gradebook has {wanted!r} several times: {', '.join(fitting)}. Give one full title"
         )
     title = fitting[0] if fitting else cell(wanted)
     dropped = _DROPPED.search(title)
     if dropped:
         raise UsageError(
-            f"Canvas drops a column called {title!r} without a word, because it has "
-            f"{dropped[0]!r} in it, as its own totals: give the assignment another title there"
+            f"Canvas drops the column {title!r} without a message, because its name has "
+            f"{dropped[0]!r} in it, as the totals of Canvas do: rename the assignment there"
         )
     if re.search(r"read\s+only", export.points.get(title, "")):
         raise UsageError(f"Canvas skips the column {title!r}: it is read-only there")

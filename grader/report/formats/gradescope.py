@@ -29,9 +29,9 @@ _UNFINISHED = (
     "run it again."
 )
 _NOT_GRADED = (
-    "**Not graded.** This 0 is a placeholder and not your score: something of the autograder or "
-    "of its machine failed, which is no fault of your submission. Ask the course staff to run it "
-    "again."
+    "**Not graded.** This 0 is a placeholder and not your score: something failed in the "
+    "autograder or its machine. This is not a fault of your submission. Ask the course staff to "
+    "run it again."
 )
 
 

@@ -2,9 +2,9 @@
 
 A check is a test case.
 
-A check that failed is a ``failure``, a fault of ours an ``error``, a check that waits for
-another is ``skipped``. So is one that failed without points, or full points would look like a
-mistake. The default family, xunit2, is what Jenkins' junit-10.xsd allows; xunit1
+A check that failed is a ``failure``, a check that could not be judged is an ``error``, a check that
+waits for another is ``skipped``. So is one that failed without points, or full points would look
+like a mistake. The default family, xunit2, is what Jenkins' junit-10.xsd allows; xunit1
 adds the student's file and line and the points to each test case, which that schema forbids.
 Source: https://github.com/jenkinsci/xunit-plugin, ``junit-10.xsd``.
 """

@@ -77,12 +77,12 @@ def literal(text: str) -> str:
     """Text in one line that shows as it is."""
     escaped = _MARKUP.sub(lambda match: f"\\{match[0]}", one_line(text)).translate(_HTML)
     escaped = _ADDRESS.sub(lambda match: f"\\{match[0]}", escaped)
-    # A word joiner is not seen, and nobody and no issue is called.
+    # An invisible word joiner, so that no user is mentioned and no issue is linked.
     return _CALL.sub(lambda match: f"{match[0]}\N{WORD JOINER}", escaped)
 
 
 def fence(text: str) -> str:
-    """Lines as a block of code, whatever stands in them."""
+    """Lines as a block of code, with any content."""
     shown = clean(text)
     longest = max((len(run) for run in re.findall(r"`+", shown)), default=0)
     marks = "`" * max(3, longest + 1)
@@ -113,9 +113,9 @@ def first_to_fix(result: Result) -> list[str]:
 def _table(result: Result) -> str:
     lines = ["| | check | points |", "| --- | --- | ---: |"]
     for check in result.checks:
-        said = STATUS[check.status]
+        words = STATUS[check.status]
         title = prose(check.title, cell=True)
-        lines.append(f"| {said.symbol} {said.word} | {title} | {explanation.points(check)} |")
+        lines.append(f"| {words.symbol} {words.word} | {title} | {explanation.points(check)} |")
     return "\n".join([*lines, ""])
 
 

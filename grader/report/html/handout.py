@@ -1,6 +1,6 @@
 """The handout of an assignment: what is asked for, and the checks with their points.
 
-Whatever a student does not get to see before grading is only counted.
+Checks that a student does not see before grading are only counted.
 """
 
 from __future__ import annotations

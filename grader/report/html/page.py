@@ -1,6 +1,6 @@
 """What all pages for a browser share: templates, style, script, and the policy that guards them.
 
-A page needs no network. Whatever a student chose is untrusted: every value is cleaned of control
+A page needs no network. Text that a student chose is untrusted: every value is cleaned of control
 characters and escaped on its way into the page, and the page's own policy forbids requests and
 every script and style but its own, which it names by their hashes.
 """
@@ -65,7 +65,7 @@ def _content_security_policy(style: str, script: str) -> str:
 
 @cache
 def environment() -> Environment:
-    """The templates, with all that they call; whatever they print is cleaned and escaped."""
+    """The templates, with the functions that they call; all output is cleaned and escaped."""
     # Imported late: the commands that write no report start faster without it.
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 

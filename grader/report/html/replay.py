@@ -29,7 +29,7 @@ Replay = Mapping[str, Any]
 STEP = 10
 """Steps of 10 ms from one sample to the next."""
 MOST = 1e6
-"""Metres, or the like, beyond which nothing is told apart."""
+"""Largest number that is kept, in metres or the like; a larger one becomes this."""
 MOST_BEAMS = 90
 MOST_SCANS = 200
 MOST_LINES = 120
@@ -110,7 +110,7 @@ def _millis(*values: float) -> list[int]:
 
 
 def _finite(value: float) -> float:
-    """A number for JSON: a scan may be of a submission that publishes its own."""
+    """A finite number for JSON: a student's own scan may hold any number."""
     return min(max(value, -MOST), MOST) if not math.isnan(value) else 0.0
 
 

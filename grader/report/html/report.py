@@ -64,7 +64,7 @@ def render_report(
         faults=_faults(result),
         replays=_replays(grade, sections, references),
         runs=runs,
-        told={run.scenario for run in runs},
+        shown_runs={run.scenario for run in runs},
         files={run.id: run.recording for run in result.scenarios},
         remarks={run.id: run.remarks for run in result.scenarios},
         gallery=Gallery(),
@@ -132,8 +132,8 @@ def build_lines(build: BuildRecord) -> list[tuple[str, bool]]:
     file = culprit.file.rpartition("/")[2]
     place = (f":{culprit.line}", f"line {culprit.line}") if culprit.line else ("",)
     named = [i for i, text in enumerate(lines) if file in text and any(p in text for p in place)]
-    said = [i for i, text in enumerate(lines) if culprit.message and culprit.message in text]
-    hits = sorted({*named[:MOST_PLACES], *said[:1]})
+    quoting = [i for i, text in enumerate(lines) if culprit.message and culprit.message in text]
+    hits = sorted({*named[:MOST_PLACES], *quoting[:1]})
     if not hits:
         return []
     begin = max(0, hits[0] - 2)

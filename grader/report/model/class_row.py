@@ -13,7 +13,7 @@ class RowStatus(str, Enum):
 
     GRADED = "graded"
     NOT_GRADED = "not graded"
-    """A fault of ours or of the machine, or the batch has not come to it yet."""
+    """rosgrade or the machine failed, or the batch has not graded it yet."""
     UNREADABLE = "unreadable"
     """What was handed in cannot be read, or holds no package: nothing was built or run."""
     MISSING = "missing"

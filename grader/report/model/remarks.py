@@ -18,7 +18,7 @@ _FLOOD = 1000
 def remarks(recording: Recording) -> tuple[str, ...]:
     """Say what is conspicuous about a run, one sentence each.
 
-    A limit of the sandbox that was reached is told elsewhere (``Recording.breaches``).
+    A limit of the sandbox that was reached is reported elsewhere (``Recording.breaches``).
     """
     return (*_renaming(recording), *_posing(recording), *_excess(recording), *_tricks(recording))
 
@@ -26,7 +26,7 @@ def remarks(recording: Recording) -> tuple[str, ...]:
 def _renaming(recording: Recording) -> Iterator[str]:
     if recording.remaps:
         yield (
-            f"wrong names were put right in this run, so that everything else could be judged: "
+            f"this run corrected wrong names, so that everything else could be judged: "
             f"{codes(recording.remaps)}"
         )
 
@@ -36,7 +36,7 @@ def _posing(recording: Recording) -> Iterator[str]:
     for node in recording.student_nodes:
         if node.name.rpartition("/")[2] == PROBE:
             yield (
-                f"a node of the submission is called {code(node.name)}, as the node that watches "
+                f"a node of the submission is called {code(node.name)}, like the node that watches "
                 "the run"
             )
     heard = [e for e in recording.endpoints if e.owner is Owner.PROBE]
@@ -47,7 +47,7 @@ def _posing(recording: Recording) -> Iterator[str]:
         if endpoint.topic in set(Untouched().topics) - wanted:
             taken.setdefault(endpoint.node, set()).add(endpoint.topic)
     for node_name, topics in sorted(taken.items()):
-        yield f"the node {code(node_name)} publishes on {codes(sorted(topics))}, as a robot does"
+        yield f"the node {code(node_name)} publishes on {codes(sorted(topics))}, which robots do"
 
 
 def _excess(recording: Recording) -> Iterator[str]:
@@ -73,7 +73,7 @@ def _excess(recording: Recording) -> Iterator[str]:
     for process in recording.processes:
         if process.dropped_bytes:
             left_out = counted(process.dropped_bytes, "byte")
-            yield f"{code(process.name)} printed more than is kept, by {left_out}"
+            yield f"{code(process.name)} printed {left_out} more than rosgrade keeps"
 
 
 def _tricks(recording: Recording) -> Iterator[str]:
@@ -81,12 +81,12 @@ def _tricks(recording: Recording) -> Iterator[str]:
         for process in dict.fromkeys(item.process for item in recording.declared("foreign")):
             yield (
                 f"{code(process)} wrote into the channel through which rosgrade reports from "
-                "inside a process; what is said there is never proof"
+                "inside a process; such a report is never proof"
             )
     # Without a sandbox there are libraries that are missing where a class is graded.
     modules = recording.environment.get("unlisted", "").split()
     if modules:
         yield (
-            f"the code imports {codes(modules)}, and no sandbox is in force here: where one is, "
-            "Python has only the standard library, ROS 2, `numpy`, and what the assignment allows"
+            f"the code imports {codes(modules)}, and this run had no sandbox: in a sandbox, Python "
+            "has only the standard library, ROS 2, `numpy`, and what the assignment allows"
         )

@@ -21,7 +21,7 @@ SCHEMA: Literal[1] = 1
 
 
 def _normal(value: Any) -> Any:
-    """The same, so that it can be written and is read again as it was."""
+    """A value whose JSON gives the same value again: rounded, and encodable in UTF-8."""
     if isinstance(value, float):
         # Nine significant digits: microseconds in a run of minutes, and no noise behind.
         return float(f"{value:.9g}")
@@ -37,7 +37,7 @@ def _normal(value: Any) -> Any:
 
 
 def jsonable(value: Any) -> Any:
-    """The same with numbers that JSON does not know as text."""
+    """A value in which numbers that JSON does not know (NaN, infinity) are text."""
     if isinstance(value, dict):
         return {name: jsonable(item) for name, item in value.items()}
     if isinstance(value, list):
@@ -51,7 +51,7 @@ class ResultSchema(GenerateJsonSchema):
     """A schema in which a number may be one that JSON does not know."""
 
     def float_schema(self, schema: core_schema.FloatSchema) -> JsonSchemaValue:
-        """Of a number."""
+        """The schema of a number."""
         return {"anyOf": [{"type": "number"}, {"enum": ["NaN", "Infinity", "-Infinity"]}]}
 
 
@@ -84,7 +84,7 @@ class SubmissionPart(Identity):
 
 
 class FindingPart(_Part):
-    """What a check said of one scenario, or of the submission (``scenario`` is null)."""
+    """A check's finding in one scenario, or about the submission (``scenario`` is null)."""
 
     scenario: str | None
     status: Status
@@ -97,7 +97,7 @@ class FindingPart(_Part):
 
 
 class CheckPart(FindingPart):
-    """A check: what it said of the scenario that decided, and of the others.
+    """A check: its finding in the scenario that decided, and in the others.
 
     ``waits_for`` names the checks to correct first where this one was skipped, ``author_hint``
     is the instructor's own hint to a check that did not pass.
@@ -114,7 +114,7 @@ class CheckPart(FindingPart):
 
     @property
     def findings(self) -> tuple[FindingPart, ...]:
-        """What it said of every scenario, first of the one that decided."""
+        """Its findings in every scenario, first in the one that decided."""
         return (self, *self.other_scenarios)
 
 
@@ -126,7 +126,7 @@ class WithheldPart(_Part):
 
 
 class DisturbancePart(_Part):
-    """What the host took from a run: in all, and the latest that a clock of ours woke up."""
+    """Delays of a run by the host: their sum, and the largest delay of the metronome."""
 
     taken_s: float
     worst_late_s: float

@@ -48,6 +48,6 @@ def for_student(result: Result) -> Result:
 
 
 def _without_traceback(check: CheckPart) -> CheckPart:
-    """A traceback is for instructors, and quotes their own checks."""
+    """A check without its traceback, which is for instructors and quotes their own checks."""
     others = tuple(item.model_copy(update={"traceback": ""}) for item in check.other_scenarios)
     return check.model_copy(update={"traceback": "", "other_scenarios": others})

@@ -21,7 +21,7 @@ MOST_CHARACTERS = 500
 
 
 class Row(NamedTuple):
-    """One thing that is said, such as what was ``observed``; ``printed`` has several lines."""
+    """One part of an explanation, such as ``observed``; ``printed`` has several lines."""
 
     name: str
     text: str
@@ -158,7 +158,7 @@ def headline(result: Result) -> str:
         for status in (Status.PASSED, Status.FAILED, Status.SKIPPED, Status.ERROR)
     )
     if not result.graded:
-        text = "Something of the grader or of the machine failed; no point is lost by it"
+        text = "Something failed in the grader or the machine; no points are lost"
     elif result.score == result.max_score > 0 or passed == every:
         text = f"{passed} of {every} visible checks passed" if withheld.checks else "Full points"
         if failed:

@@ -1,6 +1,6 @@
 """The grade in a terminal: a table, every lost point explained, the score last.
 
-Nothing is said by colour alone, and nothing of a student's is parsed as markup: every text is
+Nothing is shown by colour alone, and nothing of a student's is parsed as markup: every text is
 cleaned and wrapped in a :class:`rich.text.Text`.
 """
 
@@ -90,7 +90,7 @@ def _grid(overflowing: int, right: int, *, expand: bool = False) -> Table:
 
 def _table(console: Console, result: Result) -> Table:
     wide = console.width >= _WIDE
-    # Whatever is left over is the last column's, and it takes nothing from the others.
+    # The last column gets the width that is left over, and takes none from the others.
     table = _grid(overflowing=1, right=2, expand=wide)
     longest = max(cell_len(_line(console, check.title)) for check in result.checks)
     if wide:
@@ -114,9 +114,9 @@ def _table(console: Console, result: Result) -> Table:
 
 
 def _status(console: Console, status: Status) -> Text:
-    said = STATUS[status]
-    symbol = said.ascii if console.options.ascii_only else said.symbol
-    return Text(f"{symbol} {said.word}", _STYLE[status])
+    words = STATUS[status]
+    symbol = words.ascii if console.options.ascii_only else words.symbol
+    return Text(f"{symbol} {words.word}", _STYLE[status])
 
 
 def _explain(console: Console, result: Result, check: CheckPart) -> None:
@@ -175,5 +175,5 @@ def _line(console: Console, text: str) -> str:
 
 
 def _encodable(console: Console, text: str) -> str:
-    """What the terminal's encoding has no character for is written as an escape."""
+    """A text with escapes for characters that the terminal's encoding does not have."""
     return text.encode(console.encoding, "backslashreplace").decode(console.encoding)

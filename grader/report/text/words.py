@@ -38,13 +38,13 @@ ENVIRONMENT = {
     "cpus": "CPUs",
 }
 ENDINGS = {
-    Ending.UNTIL: "everything that was waited for had been seen",
+    Ending.UNTIL: "everything that the scenario waits for was seen",
     Ending.TIMEOUT: "the time limit of the scenario passed",
     Ending.EXITED: "every process had ended by itself",
-    Ending.NO_NODE: "no node appeared within the discovery limit",
-    Ending.NO_MATCH: "nodes appeared, but no endpoint on a recorded topic",
+    Ending.NO_NODE: "no node appeared in time",
+    Ending.NO_MATCH: "nodes appeared, but no expected publisher or subscription",
     Ending.NOT_STARTED: "nothing could be launched",
-    Ending.FAULT: "a fault of the grader or of the machine",
+    Ending.FAULT: "the grader or the machine failed",
 }
 ADVICE = ("try next", "also")
 """What stands before the first piece of advice, and before every other."""

@@ -35,13 +35,13 @@ if TYPE_CHECKING:
 _TICK_S = 0.05
 _CALM_TICK_S = 0.1
 _GRAPH_PERIOD_S = 0.1
-# What comes and goes later than the first match matters to no wait.
+# After the first match no wait depends on new endpoints, so the graph is read less often.
 _SETTLED_GRAPH_PERIOD_S = 0.25
 _PIPES_LIMIT_S = 5.0
 _MOST_MALFORMED = 10
 """Packets; no library sends a single one."""
 _FORGERY = "wrote into the channel through which rosgrade reports from inside a process"
-_NAMES = "made a node or a topic with a name that ROS does not allow, past the checks of rclpy"
+_NAMES = "made a node or a topic with a name that ROS does not allow, without rclpy's checks"
 _GARBAGE = "sent garbage to the UDP ports of the node that watches the run"
 
 
@@ -63,7 +63,7 @@ class Cell:
         self._domain_id = domain_id
         self._probe = probe
         self._packets = packets
-        # Of our own participant: no other is here yet.
+        # Ports of the probe's own participant: no other is here yet.
         self._ports = bound_ports() if packets is not None else frozenset()
         on_line = LineTeller() if order.tells_output else None
         self._output = OutputReader(order.limits.output_bytes, on_line)
@@ -181,7 +181,7 @@ class Cell:
         return replace(endpoint, kept=kept, heartbeats=number)
 
     def _violations(self) -> Iterator[tuple[str, str]]:
-        """What the student's processes did so far that is never allowed: kind, and in words."""
+        """Forbidden actions of the student's processes so far, each with its kind and a text."""
         for violation in self._students.violations:
             yield "forbidden call", violation
         if self._output.forgers:
@@ -203,7 +203,7 @@ class Cell:
             ending = self._await_until()
         if self._order.process_sandbox is not None:
             self._other_domains = tuple(d for d in joined_domains() if d != self._domain_id)
-        # What arrived while the last wait ended still counts.
+        # Endpoints that appeared while the last wait ended still count.
         self._graph.poll()
         self._find_foreign()
         return Ending.FAULT if self._faults else ending
@@ -252,7 +252,7 @@ class Cell:
         return None
 
     def _last_look(self, seen: Any) -> Ending | None:
-        """What an ended process announced may still be on its way: look for a moment more."""
+        """Look for a moment more: announcements of an ended process may still be on their way."""
         for _ in self._ticks_for(2 * _GRAPH_PERIOD_S):
             if seen():
                 return None
@@ -372,7 +372,7 @@ class Cell:
 
 
 def _raise_if_abandoned() -> None:
-    """Standard input ends with the process that ordered the run."""
+    """Raise if standard input has ended, as it does with the runner that ordered the run."""
     readable, _, _ = select.select([0], [], [], 0)
     if readable and not os.read(0, 1):
         raise Abandoned

@@ -20,7 +20,7 @@ from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
 from grader.run.process.descendants import kill_by_variable
 
 _ENDING_LIMIT_S = 10.0
-# Beyond every bounded wait of a cell, even stretched by a busy host: something of ours hangs.
+# Longer than all bounded waits of a cell, even stretched by a busy host: the cell hangs.
 _HANGING_S = 600.0
 _SHOWN_ERROR = 4000
 SCRATCH = "scratch"
@@ -31,7 +31,7 @@ class CellProcess:
     """A cell that is getting ready, and then runs one order.
 
     Args:
-        imports: Modules and interfaces, ours or ROS's only, besides what every cell imports.
+        imports: More modules and interfaces to import, only of rosgrade and of ROS.
 
     Attributes:
         folder: Its own; gone after :meth:`close`.
@@ -65,7 +65,7 @@ class CellProcess:
         except OSError as error:
             for descriptor in (in_write, out_read, self._status):
                 os.close(descriptor)
-            raise GraderFault(f"the prefork server of cells has ended: {error.strerror}") from error
+            raise GraderFault(f"the process starting runs has ended: {error.strerror}") from error
         finally:
             for descriptor in theirs:
                 os.close(descriptor)
@@ -73,11 +73,11 @@ class CellProcess:
 
     @property
     def recording(self) -> Path:
-        """The file that it leaves."""
+        """Path of the recording that it writes."""
         return self.folder / RECORDING_FILE
 
     def run(self, order: CellOrder) -> Iterator[Mapping[str, Any]]:
-        """Run an order; the events of its progress.
+        """Run an order and yield the events of its progress.
 
         Raises:
             MiddlewareHung: The student's processes kept its middleware busy.
@@ -105,15 +105,15 @@ class CellProcess:
             raise MiddlewareHung
         # A cell that was taken over must not make us read what it points to.
         if self.returncode or not self.recording.is_file() or self.recording.is_symlink():
-            ended = f"the cell of scenario {order.scenario!r} ended with status {self.returncode}"
+            ended = f"the run of scenario {order.scenario!r} ended with status {self.returncode}"
             if self.returncode == -signal.SIGKILL:
                 ended += " (it was killed, or stopped by a signal such as SIGSTOP)"
             last_words = self._errors.read_text(encoding="utf-8", errors="replace").strip()
             raise GraderFault(f"{ended}:\n{last_words[-_SHOWN_ERROR:]}" if last_words else ended)
 
     def abandon(self) -> None:
-        """Let it kill what it started and end; returns at once."""
-        # Called by the thread that interrupts and by the one that waits, perhaps at the same time.
+        """Make it kill the processes that it started, and end; returns at once."""
+        # Called by the interrupting and by the waiting thread, perhaps at the same time.
         with self._closing, contextlib.suppress(OSError):
             if not self._stdin.closed:
                 self._stdin.close()

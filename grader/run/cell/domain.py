@@ -1,4 +1,4 @@
-"""A ROS domain of one's own on this machine, locked for the life of the holder.
+"""A ROS domain that only its holder uses on this machine, locked as long as the holder lives.
 
 Domains 1 to 101 are used: the ports of higher ones collide with the system's ephemeral
 ports (https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html), and 0 is the
@@ -23,7 +23,7 @@ _OWN_PORTS = range(10, _PORTS, 2)
 
 
 class DomainLock(AbstractContextManager["DomainLock"]):
-    """Holds one domain until it is closed; in a network of one's own without a lock."""
+    """Holds one domain until it is closed; without a lock in a private network."""
 
     def __init__(self, domain_id: int, lock: socket.socket | None = None) -> None:
         self.domain_id = domain_id
@@ -53,7 +53,7 @@ def lock_domain(avoid: Collection[int] = ()) -> DomainLock:
 
 
 def joined_domains() -> tuple[int, ...]:
-    """Domains with participants in a network of one's own, by the UDP ports that are bound."""
+    """Domains with participants in a private network, by the UDP ports that are bound."""
     return domains_of_ports(bound_ports())
 
 

@@ -55,12 +55,12 @@ class EndingConditions:
         return bool(conditions) and all(conditions)
 
     def _quiet_s(self, watch: Stopwatch) -> float:
-        """Since the last message of the student's, and of ours, to which one may be the answer."""
+        """Time since the last message of the student, or of the probe, which may be answered."""
         last_ns = max(self._probe.last_message_ns or 0, self._player.last_ns or 0)
         return min(watch.elapsed_s, (time.time_ns() - last_ns) / NS)
 
     def _longest_quiet_s(self, quiet_s: float) -> float:
-        """A timer that has not fired yet may still publish."""
+        """The wanted silence, or more where a declared timer may fire later."""
         periods = [
             float(item.data["period_s"])
             for item in self._output.declarations
@@ -70,7 +70,7 @@ class EndingConditions:
 
 
 class ExitBarrier:
-    """Keeps processes that wait to exit, by their tracers' word, until the graph has them."""
+    """Keeps processes from exiting until everything that they declared was seen in the graph."""
 
     def __init__(
         self, output: OutputReader, graph: GraphObserver, students: StudentProcesses
@@ -82,11 +82,11 @@ class ExitBarrier:
 
     @property
     def is_asked(self) -> bool:
-        """Whether a process waits that was not let go yet."""
+        """Whether a process waits for the permission to exit."""
         return len(self._waiting()) > self._given
 
     def give(self) -> None:
-        """Let processes go, if all that was declared stands in the graph."""
+        """Let processes exit if everything that they declared is in the graph."""
         if self.is_asked and self._all_seen():
             waiting = self._waiting()
             for name in waiting[self._given :]:

@@ -1,4 +1,4 @@
-"""The ROS graph as the probe sees it, and who in it is whose."""
+"""The ROS graph as the probe sees it, with the owner of each node and endpoint."""
 
 from __future__ import annotations
 
@@ -72,8 +72,8 @@ class GraphObserver:
     """Polls the graph and dates every appearance and disappearance.
 
     Args:
-        private: In a network of their own are only ours and the student's: what is here now is
-            ours, and what comes later is the student's. Process ids say nothing there.
+        private: In a private network the participants that are here now are the cell's, and
+            those that come later are the student's. Process ids tell nothing there.
 
     Attributes:
         forbidden_names: Whether a node or a topic has had a name that ROS does not allow. Every
@@ -145,7 +145,7 @@ class GraphObserver:
         self._see_services(self._clients, of_node, now_ns)
 
     def _found(self, ask: Callable[[], Iterable[_Found]]) -> Iterable[_Found]:
-        """What a question about the graph finds: nothing where ROS does not allow a name in it."""
+        """The answer to a question about the graph; empty where ROS does not allow a name in it."""
         try:
             return ask()
         except (NameValidationException, UnicodeDecodeError):

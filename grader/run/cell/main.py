@@ -27,7 +27,7 @@ from grader.run.process.descendants import become_subreaper, kill_descendants
 
 
 def add_type_support(prefixes: Iterable[Path]) -> None:
-    """Make the interfaces of install spaces of ours importable in this process."""
+    """Make the interface packages in install spaces importable in this process."""
     for prefix in prefixes:
         sys.path[:0] = [str(path) for path in sorted(prefix.glob("lib/python3.*/site-packages"))]
         _load(sorted(prefix.glob("lib/lib*__rosidl_*.so")))
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 
 def _keep(recording: Recording, probe: Probe, order: CellOrder, folder: Path) -> None:
-    # What was written by another definition would be read as something that was never sent.
+    # Bytes of another definition would be read as values that were never sent.
     garbled = {one.topic for one in recording.endpoints if recording.misdefined(one.topic)}
     messages = [one for one in probe.messages if one.is_sent or one.topic not in garbled]
     find = definition_finder(Path(prefix) for prefix in order.prefixes)
@@ -93,7 +93,7 @@ def main(folder: Path, avoid_domains: tuple[int, ...], rights: Rights | None = N
         finally:
             kill_descendants(os.getpid())
         _keep(recording, probe, order, folder)
-        # In a sandbox nothing of it is left, and it may wait for ever for what it was sent.
+        # In a sandbox it ends with the cell; to close it may wait for ever for what was sent.
         if rights is None:
             probe.close()
     return 0

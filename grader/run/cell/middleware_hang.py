@@ -24,7 +24,7 @@ _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 # As the names of Fast DDS' threads begin.
 _MIDDLEWARE = b"(dds."
 _BUSY_S = 5.0
-"""CPU time that no run of good manners takes at a stretch."""
+"""CPU time that the middleware never takes at a stretch in an ordinary run."""
 
 
 class MiddlewareHung(GraderFault):
@@ -40,7 +40,7 @@ class HangMonitor:
         self._before_s = 0.0
 
     def sentence(self) -> signal.Signals | None:
-        """What it is to be ended with, or None."""
+        """The signal to end the cell with, or None."""
         return ENDED_BY if self._lasts() else None
 
     def _lasts(self) -> bool:
@@ -74,12 +74,12 @@ def _switches(status: bytes) -> tuple[bytes, ...]:
 
 
 def hung_recording(order: CellOrder, submission: SubmissionRecord, launched_ns: int) -> Recording:
-    """What is known of a run whose cell was ended: nothing that was sent in it."""
+    """The recording of a run whose cell was ended: without any message."""
     now_ns = time.time_ns()
     breach = Breach(
         now_ns,
         "forbidden packets",
-        "sent what keeps the middleware of the node that watches the run busy without end",
+        "sent packets that keep the middleware of the node that watches the run busy for ever",
         "",
     )
     ended = [

@@ -43,13 +43,13 @@ if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox
 
 STATUS = struct.Struct("=id")
-"""What is told of each cell: process id and 0, then exit status and CPU time in seconds."""
+"""A report on a cell: process id and 0, then exit status and CPU time in seconds."""
 _REQUEST_BYTES = 65_536
 _IN_FLIGHT_S, _IN_FLIGHT_POLL_S = 10.0, 0.02
 _CLOSING_LIMIT_S = 20.0
 """More than a cell may take to end what it started."""
 _STOPPED_S = 3.0
-"""Time between two looks for what was stopped, in which a cell ends what is its student's."""
+"""Time between two looks for stopped processes; a cell ends its student's in that time."""
 _ORPHANED_LIMIT_S = 30.0
 """More than the runner waits before it kills cells itself."""
 _ALWAYS = (
@@ -58,7 +58,7 @@ _ALWAYS = (
     "rcl_interfaces/srv/ListParameters",
 )
 SIMULATOR_MODULE = "grader.run.cell.simulator"
-"""What a cell with a simulated robot imports besides."""
+"""Module that a cell with a simulated robot imports in addition."""
 
 
 def readable(descriptors: Collection[int], limit_s: float | None = None) -> set[int]:
@@ -103,7 +103,7 @@ class PreforkServer:
 
     @property
     def is_alive(self) -> bool:
-        """Whether it can still be asked for cells, and they would find what is in the cache."""
+        """Whether it still takes requests, and its cells would find the Pythons of the cache."""
         return self._popen.poll() is None and self._trees == _trees_of(self._sandbox)
 
     @property
@@ -112,7 +112,7 @@ class PreforkServer:
         return self._cells.path
 
     def request(self, request: dict[str, Any], descriptors: list[int]) -> None:
-        """Ask for a cell with these descriptors: 0, 1, 2 and where its status is told."""
+        """Ask for a cell with these descriptors: 0, 1, 2 and one for the reports on it."""
         data = json.dumps({**request, "private": self._sandbox is not None}).encode()
         deadline = time.monotonic() + _IN_FLIGHT_S
         while True:
@@ -120,7 +120,7 @@ class PreforkServer:
                 socket.send_fds(self._socket, [data], descriptors)
                 return
             except OSError as error:
-                # Some submission has too many on their way, and is ended for it.
+                # Some submission has too many descriptors in flight, and is ended for it.
                 if error.errno != errno.ETOOMANYREFS or time.monotonic() > deadline:
                     raise
             time.sleep(_IN_FLIGHT_POLL_S)
@@ -165,13 +165,13 @@ class PreforkServer:
 
 
 def _trees_of(sandbox: Sandbox | None) -> list[tuple[int, int]]:
-    """What a sandbox shows of the cache: other folders once something was deleted in there."""
+    """Identities of the cache folders in a sandbox, which change when one is deleted."""
     found = [path.stat() for path in sandbox.cached] if sandbox is not None else []
     return [(status.st_dev, status.st_ino) for status in found]
 
 
 def _serve(requests: socket.socket) -> None:
-    """Fork a cell for each request, and tell how each ended, until the runner has gone."""
+    """Fork a cell for each request, and report how each ended, until the runner has gone."""
     running: dict[int, int] = {}
     ended_read, ended_write = os.pipe()
     os.set_blocking(ended_read, False)
@@ -179,7 +179,7 @@ def _serve(requests: socket.socket) -> None:
     signal.set_wakeup_fd(ended_write, warn_on_full_buffer=False)
     signal.signal(signal.SIGCHLD, lambda _number, _frame: None)
     sources = [requests.fileno(), ended_read]
-    told_s = 0.0
+    reported_s = 0.0
     # Without a runner the cells that run are still waited for, but not those that hang.
     limit_s: float | None = None
     while len(sources) > 1 or running:
@@ -192,8 +192,8 @@ def _serve(requests: socket.socket) -> None:
             with contextlib.suppress(BlockingIOError):
                 os.read(ended_read, 4096)
             own_s = time.process_time()
-            if _tell_ended(running, own_s - told_s):
-                told_s = own_s
+            if _report_ended(running, own_s - reported_s):
+                reported_s = own_s
         if requests.fileno() in ready:
             text, descriptors, _, _ = socket.recv_fds(requests, _REQUEST_BYTES, 4)
             request = json.loads(text) if text else {}
@@ -226,21 +226,21 @@ def _fork(
         os.write(status, STATUS.pack(pid, 0.0))
 
 
-def _tell_ended(running: dict[int, int], own_s: float) -> bool:
-    """Tell of each cell that has ended; our own CPU time counts for the first one."""
-    has_told = False
+def _report_ended(running: dict[int, int], own_s: float) -> bool:
+    """Report each cell that has ended; the server's own CPU time counts for the first one."""
+    has_reported = False
     with contextlib.suppress(ChildProcessError):
         while True:
             pid, status, usage = os.wait4(-1, os.WNOHANG)
             if not pid:
                 break
             descriptor = running.pop(pid)
-            cpu_s = usage.ru_utime + usage.ru_stime + (0.0 if has_told else own_s)
-            has_told = True
+            cpu_s = usage.ru_utime + usage.ru_stime + (0.0 if has_reported else own_s)
+            has_reported = True
             with contextlib.suppress(BrokenPipeError):
                 os.write(descriptor, STATUS.pack(os.waitstatus_to_exitcode(status), cpu_s))
             os.close(descriptor)
-    return has_told
+    return has_reported
 
 
 def _become_cell(arguments: list[str], descriptors: list[int], *, private: bool) -> None:
@@ -261,7 +261,7 @@ def _become_cell(arguments: list[str], descriptors: list[int], *, private: bool)
                     os.close(int(name))
         folder, rights = Path(arguments[0]), None
         if private:
-            # As the one that waits for it sees it: nothing of this process can while it hangs.
+            # Run by the process that waits for the cell: the cell itself cannot while it hangs.
             monitor = HangMonitor(Path("/proc/1"))
             rights = enter(folder, monitor.sentence)
             folder = CELL

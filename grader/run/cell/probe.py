@@ -1,4 +1,4 @@
-"""The probe: our node in the cell. It observes, it never judges.
+"""The probe: rosgrade's node in the cell. It observes, it never judges.
 
 It offers no parameter services, publishes no log and has no use_sim_time, so that nothing a
 student sends can change it.
@@ -76,7 +76,7 @@ class _Pending:
             self.answered_ns = time.time_ns()
 
 
-def told_of_matches(on_match: Callable[[Any], None]) -> SubscriptionEventCallbacks:
+def match_events(on_match: Callable[[Any], None]) -> SubscriptionEventCallbacks:
     """Events of a subscription without rclpy's own, which only warn and cost CPU time."""
     return SubscriptionEventCallbacks(matched=on_match, use_default_callbacks=False)
 
@@ -123,7 +123,7 @@ class Probe:
         self._logs = KeptLines(limits.output_bytes)
         # Also what was published before the probe was matched.
         profile = qos_profile("reliable", "transient_local", _ROSOUT_DEPTH)
-        events = told_of_matches(self.note_match)
+        events = match_events(self.note_match)
         self.node.create_subscription(Log, _ROSOUT, self._take_log, profile, event_callbacks=events)
         for topic in topics:
             self._topics[topic.name] = topic
@@ -234,7 +234,7 @@ class Probe:
         self._create_subscription(topic.name, topic.type, profile, receive)
 
     def _create_subscription(self, topic: str, type: str, profile: QoSProfile, receive: Any) -> Any:
-        events = told_of_matches(self.note_match)
+        events = match_events(self.note_match)
         return self.node.create_subscription(
             import_interface(type), topic, receive, profile, event_callbacks=events, raw=True
         )
@@ -281,8 +281,8 @@ class Probe:
         number = self._kept[topic, join] = self._kept.get((topic, join), 0) + 1
         if number > self._limits.messages or len(data) > self._limits.message_bytes:
             return
-        # Both come from the writer, who may have written the packet by hand: a recording holds
-        # what its format has room for, which no check believes to be the time of anything.
+        # The writer may have forged both: a value that the format of a recording cannot hold
+        # becomes one that no check takes for a time or a number.
         stamp_ns, sequence = info["source_timestamp"], info["publication_sequence_number"] or 0
         self.messages.append(
             RawMessage(

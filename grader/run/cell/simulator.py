@@ -114,7 +114,7 @@ class SimulatedRobot:
             self.incidents.append(Incident(stamp_ns, event.kind.value, event.text))
 
     def on_late(self, lateness: Lateness) -> None:
-        """Note steps that the host did not let us do in time; called by the simulator."""
+        """Note steps that are late because of the host; called by the simulator."""
         late_ms = lateness.late_ns / 1e6
         text = f"{lateness.steps} steps done {late_ms:.0f} ms late"
         self.incidents.append(Incident(self._stamp_ns, "late", text, lateness.late_ns / NS))

@@ -142,8 +142,8 @@ _TICK_S = 0.02
 _TICKS_PER_SAMPLE = 5
 _STARTING = 3
 _SAMPLES_PER_LOOK = 10
-"""Processes are looked for in the first samples, in one of so many of the others, and where one
-of those that are known had to wait."""
+"""New processes are looked for in the first samples, then in one of so many, and whenever a known
+one had to wait."""
 _TRIFLE_NS = 2_000_000
 """A wait in one sample that needs no explanation."""
 _LONGEST_STRETCH = 8.0
@@ -248,7 +248,7 @@ class DisturbanceMeter:
 
 
 class Stopwatch:
-    """Time since its start, less what the host took from us meanwhile."""
+    """Time since its start, less what the host took meanwhile."""
 
     def __init__(self, meter: DisturbanceMeter) -> None:
         self._meter = meter

@@ -1,7 +1,7 @@
 """What the machine may do to a run in the middle: set its clock, or run out of memory.
 
 Messages and log lines carry the time of day. Once NTP, the host of a virtual machine or a laptop's
-sleep has set that clock, the time between two of them is unknown. What the kernel ends for want of
+sleep has set that clock, the time between two of them is unknown. What the kernel ends for lack of
 memory stayed within its limits: the machine had too little for all that ran on it.
 """
 
@@ -28,19 +28,19 @@ class MachineFaults:
         self._kills = oom_kills()
 
     def clock_was_set(self) -> str | None:
-        """That the clock was set since the beginning, in words; None if it was not."""
+        """A sentence if the clock was set since the beginning, else None."""
         step_ns = ahead_ns() - self._ahead_ns
         if abs(step_ns) <= _TRIFLE_NS:
             return None
         way = "forward" if step_ns > 0 else "back"
         return (
             f"the clock of this machine was set {way} by {abs(step_ns) / NS:.3g} s in the middle "
-            "of the run (NTP does that, the host of a virtual machine, and sleep), so that no "
-            "time that was recorded can be trusted"
+            "of the run (by NTP, the host of a virtual machine, or sleep), so the recorded "
+            "times are wrong"
         )
 
     def out_of_memory(self, processes: Iterable[Process], breaches: Sequence[Breach]) -> str | None:
-        """That the kernel may have ended one of these processes, in words; None if not."""
+        """A sentence if the kernel may have ended one of these processes, else None."""
         now = oom_kills()
         if breaches or self._kills is None or now is None or now == self._kills:
             return None
@@ -48,8 +48,8 @@ class MachineFaults:
             if process.stopped_by == "itself" and process.exit_code == -signal.SIGKILL:
                 return (
                     f"this machine ran out of memory in the middle of the run: the kernel ended "
-                    f"{now - self._kills} of its processes, and {process.name} was killed; grade "
-                    "fewer at once (--jobs), or where there is more memory"
+                    f"{now - self._kills} of its processes, and {process.name} was killed. Grade "
+                    "fewer at once (--jobs), or on a machine with more memory"
                 )
         return None
 

@@ -31,7 +31,7 @@ _POLL_S = 0.1
 _LOOKS_PER_SEARCH = 5
 """What is mapped takes longer to read than what is resident."""
 _OWN_BYTES = 2048 * MIB
-"""Of the cell itself: messages wait in it, and it is in no sandbox of a student's."""
+"""Memory that the cell itself may take: messages wait in it."""
 _FULL = 0.99
 # Some for ordinary subprocesses; every session gets a share of the CPU of its own.
 _MOST_SESSIONS = 16
@@ -43,7 +43,7 @@ class Watchdog:
     """Looks from a thread of its own until it is stopped.
 
     Args:
-        violations: What was done so far that is never allowed: its kind, and the same in words.
+        violations: Forbidden actions so far, each with its kind and a text.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class Watchdog:
         self._thread.start()
 
     def stop(self) -> tuple[Breach, ...]:
-        """End; the limits that were passed."""
+        """Stop to look; return the limits that were passed."""
         self._stop.set()
         self._thread.join()
         self._look()

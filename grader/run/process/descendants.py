@@ -1,4 +1,4 @@
-"""Processes and what came of them, read from /proc, and shared memory that killed nodes leave.
+"""Descendants of a process, read from /proc, and shared memory that killed nodes leave.
 
 Fast DDS removes its segments only at a clean end. A living participant holds a lock on
 ``fastrtps_<hex>_el`` beside each of its segments in /dev/shm; without one the owner is dead.
@@ -23,7 +23,7 @@ _LONGEST_COMMAND = 1000
 
 
 def become_subreaper() -> None:
-    """Make orphaned descendants our children (prctl(2)): none can leave us by forking twice."""
+    """Make orphaned descendants children of this process (prctl(2)), also after a double fork."""
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
@@ -98,7 +98,7 @@ def command_line(pid: int) -> str:
 
 
 def is_init(pid: int) -> bool:
-    """Whether a process is the first one of a PID namespace below ours (see proc(5), NSpid)."""
+    """Whether a process is the first one of a PID namespace below this one (proc(5), NSpid)."""
     try:
         status = (_PROC / str(pid) / "status").read_text(errors="replace")
     except OSError:
@@ -141,7 +141,7 @@ def reap() -> None:
 
 
 def kill_by_variable(name: str, value: str, *, limit_s: float = 5.0) -> None:
-    """SIGKILL what a cell left behind that was killed itself: by a variable of this value."""
+    """SIGKILL processes that a killed cell left behind, found by an environment variable."""
     wanted = f"{name}={value}".encode()
     deadline = time.monotonic() + limit_s
     while time.monotonic() < deadline:

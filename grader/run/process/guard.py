@@ -1,6 +1,6 @@
 """Sees system calls of the student's processes that a sandbox refuses, and says what they were.
 
-The kernel asks a process of ours before it goes on with such a call (seccomp_unotify(2)). The
+The kernel asks the cell's process before it goes on with such a call (seccomp_unotify(2)). The
 filter that makes it ask belongs to a thread, and to all that is started from it: so the
 student's sandboxes are started from one thread, and the cell itself is not under it.
 """
@@ -37,10 +37,10 @@ _Started = TypeVar("_Started")
 
 
 class Guard:
-    """Starts the student's sandboxes, and refuses what is asked of it."""
+    """Starts the student's sandboxes, and refuses the calls that the kernel asks about."""
 
     def __init__(self, program: bytes, calls: Mapping[str, int]) -> None:
-        """Begin to listen; an OSError where a container around us listens already."""
+        """Begin to listen; an OSError where a container around rosgrade listens already."""
         self._names = {number: name for name, number in calls.items()}
         self._starter = ThreadPoolExecutor(1, "starter")
         self._listener = self._starter.submit(_install, program, calls["seccomp"]).result()
@@ -55,13 +55,13 @@ class Guard:
         """Start something under guard."""
         return self._starter.submit(start).result()
 
-    def can_have_ended(self, ours: Collection[int | None]) -> bool:
+    def can_have_ended(self, sandboxes: Collection[int | None]) -> bool:
         """Whether the student's processes may have killed or stopped one of them themselves."""
-        return bool(self._ending.difference(ours))
+        return bool(self._ending.difference(sandboxes))
 
     @property
     def violations(self) -> tuple[str, ...]:
-        """What the student's processes did so far that is never allowed, in words."""
+        """Forbidden calls of the student's processes so far, as texts."""
         return tuple(self._violations)
 
     def close(self) -> None:
@@ -108,7 +108,7 @@ class Guard:
 
 
 def _install(program: bytes, call: int) -> int:
-    """Put this thread under a filter; what the kernel asks through."""
+    """Put this thread under a filter; return the descriptor through which the kernel asks."""
     libc = ctypes.CDLL(None, use_errno=True)
 
     class Filter(ctypes.Structure):

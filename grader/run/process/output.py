@@ -30,9 +30,9 @@ _KINDS = frozenset(
         *("destroyed", "leaving", "exiting"),
     }
 )
-"""What a tracer tells of; see ``tracer/sitecustomize.py``."""
+"""Kinds of declarations of a tracer; see ``tracer/sitecustomize.py``."""
 _OF_PROCESS = frozenset({"started", "leaving", "exiting"})
-"""What counts only of the process that was launched, not of those that it starts."""
+"""Kinds that count only for the process that was launched, not for those that it starts."""
 
 
 @dataclass
@@ -160,7 +160,7 @@ class OutputReader:
 
     @property
     def forgers(self) -> frozenset[str]:
-        """Processes of which another than the tracer wrote to the tracer's pipe."""
+        """Processes in which other code than the tracer wrote to the tracer's pipe."""
         return frozenset(self._foreign)
 
     def tail(self, process: str, stream: str, lines: int) -> list[str]:
@@ -214,7 +214,7 @@ class OutputReader:
             self._take_declarations(stream)
 
     def _take_declarations(self, stream: _Stream) -> None:
-        """Turn lines of a tracer into declarations; what is not one is dropped, and that told."""
+        """Turn lines of a tracer into declarations; note the process of any other line."""
         lines = stream.kept.lines
         stream.kept = KeptLines(self._limit)
         for line in lines:
@@ -236,7 +236,7 @@ class OutputReader:
 
 
 def _parsed(text: str) -> dict[str, Any]:
-    """What a line of a tracer says; empty if a tracer cannot have written it."""
+    """The data in a line of a tracer; empty if a tracer cannot have written it."""
     try:
         data = json.loads(text, parse_constant=lambda _: None)
         is_known = data["kind"] in _KINDS and isinstance(data["pid"], int)
@@ -247,7 +247,7 @@ def _parsed(text: str) -> dict[str, Any]:
 
 
 def _is_fit(data: dict[str, Any]) -> bool:
-    """Whether it can be written down: the student can write to the pipe too, large and deep."""
+    """Whether it can be recorded: the student, too, can write to the pipe, large and deep."""
     inner = [value for value in data.values() if isinstance(value, dict)]
     values = [value for item in (data, *inner) for value in item.values() if value not in inner]
     keys = [key for item in (data, *inner) for key in item]

@@ -29,13 +29,13 @@ HOME = "/home/student"
 _SIGNALLED = 128
 _STATUS_BYTES = 4096
 _AROUND = 1024
-"""Processes and threads of the cell, and of the other sandboxes in it."""
+"""Room for the processes and threads of the cell, and of the other sandboxes in it."""
 _FORMATS = (b"\x7fELF", b"#!")
 
 
 @dataclass(frozen=True)
 class ProcessSandbox:
-    """What a cell has to know to put a student into a sandbox.
+    """Everything with which a cell puts a process of the student into a sandbox.
 
     Attributes:
         arguments: Of bubblewrap.
@@ -76,7 +76,7 @@ class SandboxedProcess(subprocess.Popen[bytes]):
             _check_executable(process_sandbox.outside(argv[0]))
         self._status, status = os.pipe()
         os.set_blocking(self._status, False)
-        self._told = b""
+        self._written = b""
         self._init: int | None = None
         arguments = [*process_sandbox.arguments, "--clearenv"]
         for name, value in environment.items():
@@ -109,8 +109,8 @@ class SandboxedProcess(subprocess.Popen[bytes]):
     def init(self) -> int | None:
         """First process of the sandbox; None before there is one."""
         if self._init is None:
-            told = self._read_status().get("child-pid")
-            self._init = told if isinstance(told, int) else None
+            pid = self._read_status().get("child-pid")
+            self._init = pid if isinstance(pid, int) else None
         return self._init
 
     @property
@@ -143,17 +143,17 @@ class SandboxedProcess(subprocess.Popen[bytes]):
     def _read_status(self) -> dict[str, Any]:
         with contextlib.suppress(OSError):
             while block := os.read(self._status, _STATUS_BYTES):
-                self._told += block
+                self._written += block
         found: dict[str, Any] = {}
         # The last line may not be there in full yet.
         with contextlib.suppress(ValueError):
-            for line in self._told.splitlines():
+            for line in self._written.splitlines():
                 found.update(json.loads(line))
         return found
 
 
 def _check_executable(path: Path) -> None:
-    """Raise what the kernel would say of a program."""
+    """Raise the error that the kernel would give at the start of a program."""
     with path.open("rb") as file:
         begin = file.read(4)
     if not begin.startswith(_FORMATS):

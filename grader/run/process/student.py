@@ -38,7 +38,7 @@ _SUSPENDED_NS = NS // 2
 
 
 class PlainProcess(subprocess.Popen[bytes]):
-    """A process without a sandbox, with what there is to know of one in a sandbox."""
+    """A process without a sandbox, with the properties of one in a sandbox."""
 
     init: int | None = None
     was_set_up = True
@@ -106,7 +106,7 @@ class StudentProcesses:
                 program = Path(process_sandbox.guard).read_bytes()
                 self._guard = Guard(program, process_sandbox.calls)
             except OSError:
-                # A container around us watches system calls: all are refused, and none is seen.
+                # A container around rosgrade watches system calls: all are refused, none is seen.
                 self._sandbox = replace(process_sandbox, filter=process_sandbox.unguarded)
         self._running: list[_Running] = []
         self._pids: frozenset[int] = frozenset()
@@ -177,7 +177,7 @@ class StudentProcesses:
 
     @property
     def violations(self) -> tuple[str, ...]:
-        """System calls of theirs that are never allowed, in words."""
+        """Forbidden system calls of the student's processes, as texts."""
         return self._guard.violations if self._guard is not None else ()
 
     @property
@@ -258,7 +258,7 @@ class StudentProcesses:
                 process.stop_s = stop_s
 
     def clean_up(self) -> None:
-        """Kill whatever is left and remove what it left in shared memory."""
+        """Kill all remaining processes and remove what they left in shared memory."""
         # Helpers such as multiprocessing's resource tracker end by themselves a moment later.
         deadline = time.monotonic() + _AFTERMATH_S
         while not self.poll() and descendant_pids(os.getpid()) and time.monotonic() < deadline:
@@ -279,7 +279,7 @@ class StudentProcesses:
         """Sandboxes that could not be set up, one sentence each; call after :meth:`clean_up`."""
         return tuple(
             f"the sandbox of {process.name} could not be set up: "
-            f"{' '.join(self._output.tail(process.name, 'stderr', 1)) or 'it said nothing'}"
+            f"{' '.join(self._output.tail(process.name, 'stderr', 1)) or 'no message'}"
             for process in self._running
             if process.stopped_by == "itself"
             and not process.is_ended
@@ -287,23 +287,23 @@ class StudentProcesses:
         )
 
     def ended_from_outside(self, breaches: Sequence[Breach]) -> str | None:
-        """That something outside of its sandbox killed or stopped a process; None if not.
+        """A sentence if something outside of its sandbox killed or stopped a process, or None.
 
         Within one only its own processes can send a signal, and the guard sees that.
         """
         # A sandbox's own processes end with the status of what was started in it.
-        ours = {pid for one in self._running for pid in (one.popen.pid, one.popen.init)}
-        if breaches or self._guard is None or self._guard.can_have_ended(ours):
+        sandboxes = {pid for one in self._running for pid in (one.popen.pid, one.popen.init)}
+        if breaches or self._guard is None or self._guard.can_have_ended(sandboxes):
             return None
         for process in self._running:
             code = process.exit_code
             if process.stopped_by == "itself" and code in (-signal.SIGKILL, -signal.SIGSTOP):
                 name = signal.Signals(-code).name
-                return f"{process.name} got {name} from outside of its sandbox, during the run"
+                return f"{process.name} got {name} from outside its sandbox during the run"
         return None
 
     def records(self) -> tuple[Process, ...]:
-        """What became of each process; call after :meth:`clean_up`."""
+        """The recorded facts of each process; call after :meth:`clean_up`."""
         return tuple(
             Process(
                 name=process.name,

@@ -1,1 +1,1 @@
-"""Stimuli: what the probe does in a run besides observing."""
+"""Stimuli: actions of the probe in a run."""

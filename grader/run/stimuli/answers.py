@@ -1,4 +1,4 @@
-"""Whether a question was answered, by a node that may answer twice, late or not at all."""
+"""Answers to questions, matched one by one: a node may answer twice, late or not at all."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _LONGER = 2.0
 
 
 class Answers:
-    """What comes on the topic of the answers, while one question after another is asked.
+    """Counts the answers on a topic, while one question after another is published.
 
     A second answer to one question must not pass for the answer to the next: the questions would
     run ahead of the node, which would then lose some of them, or be ended before its last answer.
@@ -27,7 +27,7 @@ class Answers:
         self._longest_s = 0.0
 
     def ask(self) -> None:
-        """A question is asked."""
+        """Note that a question is published."""
         # Its answer may still come, when that to this question is expected.
         self._is_behind |= self._is_asked and self._first_s is None
         self._is_asked = True
@@ -36,7 +36,7 @@ class Answers:
         self._first_s = None
 
     def hear(self, answer: bytes, waited_s: float) -> None:
-        """Something came on the topic."""
+        """Note a message on the topic of the answers."""
         self._newest = answer
         is_new = answer != self._before
         if is_new and not self._is_new:

@@ -1,4 +1,4 @@
-"""Calls a service of the student, once it is there; and what all stimuli share that do so."""
+"""The stimulus that calls a service of the student, and the base of all that send requests."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _GRACE_S = 0.1
 _LOOK_NS = NS // 2
 """Time between two looks whether a node spins."""
 _MISSING_S = 1.0
-"""What has not come so long after the graph's last change will hardly come."""
+"""A server that is missing so long after the graph's last change will hardly come."""
 _UNCALLABLE_S = 1.0
-"""A node that could not be asked for so long has none of the services that would tell."""
+"""A node that could not be called for so long has no service that shows whether it spins."""
 MARGIN_S = 0.25
-"""What is waited for is waited for a little longer, so that its time has passed in every clock."""
+"""Every wait lasts a little longer, so that its time has passed on every clock."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Readiness:
 
     @property
     def is_in_vain(self) -> bool:
-        """Whether the server is waited for, and is not there."""
+        """Whether the wait for the server began, and it is not there."""
         return self._patience.began_ns > 0 and self._there is None
 
     @property
@@ -110,7 +110,7 @@ class Requesting(Playing):
 
     @property
     def is_through(self) -> bool:
-        """Whether what comes after it need not wait for it any more."""
+        """Whether later requests need not wait for it any more."""
         return self.is_done
 
     @property
@@ -119,7 +119,7 @@ class Requesting(Playing):
         return None if self.is_done else max(self._order.after_s, self._now_s + _POLL_S)
 
     def holds_up(self, other: Requesting) -> bool:
-        """Whether another one has to wait for it: it is due or stands before it, and is there."""
+        """Whether another stimulus has to wait for this one, which is due or written earlier."""
         if self.is_through or self._place == other._place:
             return False
         if self._order.after_s == other._order.after_s:
@@ -161,7 +161,7 @@ class Calling(Requesting):
 
     @property
     def is_through(self) -> bool:
-        """A sequence with a pace of its own holds nothing up."""
+        """Whether later requests need not wait; a sequence with its own pace holds up none."""
         return self.is_done or (self._order.every_s is not None and self._sent > 0)
 
     @property

@@ -1,4 +1,4 @@
-"""What a stimulus acts on, and what every kind of stimulus can do."""
+"""The base of all stimuli, and the context of the run that they act on."""
 
 from __future__ import annotations
 
@@ -183,11 +183,11 @@ class Playing:
 
 
 PLAYS: dict[type[Any], type[Playing]] = {}
-"""Class of an order -> what plays it."""
+"""Class of an order -> class of the stimulus that plays it."""
 
 
 def plays(order_type: type[Any]) -> Callable[[type[P]], type[P]]:
-    """Say which orders a class plays."""
+    """Decorator: register a class as the one that plays the orders of a type."""
 
     def register(playing: type[P]) -> type[P]:
         PLAYS[order_type] = playing

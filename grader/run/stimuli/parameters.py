@@ -137,7 +137,7 @@ class ListingParameters(Playing):
 
     @property
     def due_s(self) -> float | None:
-        """When to call next: calls that wait for a message would keep the student's rhythm."""
+        """When to call next: calls after each message would follow the student's rhythm."""
         return self._due_s
 
     def tick(self, elapsed_s: float | None) -> None:

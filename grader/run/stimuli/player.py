@@ -73,7 +73,7 @@ class Player:
         return max((item.last_ns for item in self._playing if item.last_ns), default=None)
 
     def begin(self) -> None:
-        """Now was the first match."""
+        """Start the clock of all stimuli: the first match was now."""
         if self._began_s is None:
             self._began_s = time.monotonic()
 

@@ -29,7 +29,7 @@ class KillOrder:
 
 
 class _OfProcess(Playing):
-    """What is done to one process at one time."""
+    """Base of the stimuli that act on one process at one time."""
 
     _done = False
 
@@ -55,7 +55,7 @@ class Killing(_OfProcess):
 
     @property
     def keeps_run(self) -> bool:
-        """What the scenario ends is meant to be gone."""
+        """Whether it ended the process, which is then meant to be gone."""
         return self._context.students.was_killed(self._order.process)
 
     def play(self, elapsed_s: float) -> None:
@@ -83,7 +83,7 @@ class Restarting(_OfProcess):
 
     @property
     def keeps_run(self) -> bool:
-        """Until it is started again nothing needs to run."""
+        """Whether the process is still to be started again."""
         return not self._done
 
     def play(self, elapsed_s: float) -> None:

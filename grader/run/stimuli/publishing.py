@@ -19,7 +19,7 @@ from grader.run.stimuli.context import Patience, Playing, StimulusContext, plays
 from grader.run.stimuli.filling import filled
 
 _POLL_S = 0.02
-# Of a node that declares nothing to us, the writer that answers may match a moment later.
+# Where the tracer declares nothing, the publisher of the answers may match a moment later.
 _GRACE_S = 0.1
 
 

@@ -39,7 +39,7 @@ _IMPORTED = 100_000
 
 
 def _exit() -> None:
-    """Python ends in its usual way: by the end of the program or an exception, no signal."""
+    """Report that Python ends in its usual way: by the program's end or an exception, no signal."""
     report("exiting")
     if "rosgrade_rclpy" in sys.modules:
         quietly(sys.modules["rosgrade_rclpy"].flush)

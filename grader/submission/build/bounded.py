@@ -71,7 +71,7 @@ class Outcome:
     """How a command ended.
 
     Attributes:
-        status: Exit status, or minus the signal's number, or None where we ended it.
+        status: Exit status, or minus the signal's number, or None if it passed a limit.
         ended_by_us: The limit that it passed: ``time``, ``output`` or what ``excess`` returned.
     """
 

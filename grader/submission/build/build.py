@@ -44,7 +44,7 @@ _SIGNALLED = 128
 # What colcon, Python, compilers and make say of a program of theirs that was killed.
 _KILLED = re.compile(r"code -9\b|\bSIGKILL\b|\bKilled\b")
 _LEAST_FREE_BYTES = 64 * MIB
-# What makes the sandbox, each with its own complaint; colcon is only started by the last.
+# Error messages of the programs that set up a sandbox, the last of which starts colcon.
 _NOT_STARTED = re.compile(r"(?:/\S*/)?(?:sh|unshare|mkdir|mount|setpriv|bwrap|prlimit): .*")
 
 
@@ -123,7 +123,7 @@ class Builder(BuildSetting):
             key: Name of the build in the cache; by default all that it depends on is in it.
 
         Raises:
-            BuildKilled: It was ended by no limit of ours.
+            BuildKilled: The build was ended, although it was within its limits.
         """
         wall_s = self.limits.python_s if only_python else self.limits.other_s
         if key is None:
@@ -178,7 +178,7 @@ class Builder(BuildSetting):
     def _run(
         self, colcon: Colcon, sources: Sources, parts: Mapping[str, CachedBuild]
     ) -> BuildRecord:
-        """Really build."""
+        """Build without a look into the cache."""
         install = colcon.install
         for name, part in parts.items():
             assert part.install is not None
@@ -186,7 +186,7 @@ class Builder(BuildSetting):
             for line in part.build.log.splitlines():
                 self.on_output(line)
         finished = set(parts)
-        # It is there before anything of the student's runs, who could else put a link in its place.
+        # Made before the student's code runs, which could otherwise put a link in its place.
         install.mkdir(exist_ok=True)
         kills = oom_kills()
         check_python = self.sandbox.watched() if self.sandbox else None
@@ -220,7 +220,7 @@ class Builder(BuildSetting):
         )
 
     def _check_machine(self, outcome: Outcome, colcon: Colcon, *, memory_ran_out: bool) -> None:
-        """Raise what is not the student's fault."""
+        """Raise an error for a failure that is not the student's fault."""
         status, output = outcome.status, outcome.output
         if status is None:
             return
@@ -233,8 +233,8 @@ class Builder(BuildSetting):
         # A program of the build may also kill itself; then it does so again.
         if _is_cut_off(status, output) or (killed and not self.is_second):
             raise BuildKilled(
-                f"colcon ended in the middle of a build (status {status}), twice, which no limit "
-                "of ours does: perhaps it was stopped, or memory ran out; grade again"
+                f"colcon ended in the middle of a build (status {status}), twice, although the "
+                "build was within its limits. Was it stopped, or did memory run out? Grade again"
             )
         if status != 0 and "No space left on device" in output:
             for place in (colcon.scratch, colcon.install.parent):

@@ -3,7 +3,7 @@
 ``<cache>/builds/<key>/`` holds ``build.json`` and, where something was installed, ``install/``.
 An entry is made under another name and renamed, so it is there as a whole or not at all. The hash
 in it finds damage, such as a student's program that wrote into its own installation; what is
-damaged is built anew.
+damaged is built again.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ _NEVER_CALLED = "setup()' was never called"
 _OF_SETUP = {
     _NEVER_CALLED: "setup() is never called, or refuses its arguments",
     "os.path.isabs(dest)": "data_files names an absolute folder; write 'share/<package>'",
-    "ast.literal_eval(output)": "setup.py prints something, which colcon takes for its answer",
+    "ast.literal_eval(output)": "setup.py prints something: colcon cannot read its answer then",
 }
 """What stands in a traceback of colcon's own code -> what is wrong in setup.py."""
 _INTERFACES = (".msg", ".srv", ".action")
@@ -104,7 +104,7 @@ def _last_words(log: str) -> str:
     """The first line of a package's log that tells of an error, or its last line."""
     lines = [line.strip() for line in log.splitlines() if line.strip() and not _AROUND.match(line)]
     errors = [line for line in lines if _ERROR.search(line)]
-    return [*errors[:1], *lines[-1:], "it says nothing"][0][:_MAX_MESSAGE]
+    return [*errors[:1], *lines[-1:], "there is no error message"][0][:_MAX_MESSAGE]
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ class _Place:
         return next((error for error in found if error is not None), None)
 
     def _callers(self) -> Iterator[tuple[str, str]]:
-        """What called the command that failed, the innermost first."""
+        """The callers of the command of CMake that failed, the innermost first."""
         for number in range(self.number + 1, min(self.number + 40, len(self.lines))):
             if self.lines[number].startswith("Call Stack"):
                 callers = map(_CMAKE_CALLER.match, replace(self, number=number)._block())

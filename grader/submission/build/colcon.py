@@ -1,4 +1,4 @@
-"""``colcon build``, and what else of a build is a program, bounded and in the sandbox."""
+"""``colcon build`` and the other programs of a build, within limits and in the sandbox."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 COMPILE_S = 60.0
 STOPPED = "Exception in job execution"
-"""What colcon says when its executor stops, whatever --continue-on-error says."""
+"""The message of colcon when its executor stops in spite of --continue-on-error."""
 UNTOUCHABLE = """\
 import ctypes, os, runpy, sys
 ctypes.CDLL(None).prctl(4, 0, 0, 0, 0)
@@ -53,7 +53,7 @@ class BuildLimits:
 
 @dataclass(frozen=True, kw_only=True)
 class BuildSetting:
-    """With what builds run, and who follows them.
+    """Settings of builds: ROS, limits, sandbox, and what is called with their progress.
 
     Attributes:
         sandbox: What everything runs in, or None.
@@ -100,7 +100,7 @@ class Colcon:
                     started.add(match[2])
                     self.setting.on_progress(f"building {match[2]}")
                 else:
-                    # colcon has the last word, whatever a package printed as if it were colcon.
+                    # The last such line is colcon's own, even if a package printed one before.
                     finished.discard(match[2])
 
         failed: set[str] = set()
@@ -121,7 +121,7 @@ class Colcon:
                 duration_s=total.duration_s + outcome.duration_s,
             )
             # Where setup.py raises before anything is built, colcon's executor stops with the
-            # exception, whatever --continue-on-error says; the others are still to be built.
+            # exception in spite of --continue-on-error; the others are still to be built.
             stopped = not outcome.ended_by_us and STOPPED in outcome.output
             if not stopped or started - finished <= failed:
                 return total
@@ -177,7 +177,7 @@ class Colcon:
 
     @cached_property
     def _include(self) -> Path:
-        """Copied before anything of the student's ran, which could put a link in its place."""
+        """A file for CMake, copied before the student's code could put a link in its place."""
         return Path(shutil.copy(_CMAKE_INCLUDE, self.scratch))
 
     def _run(
@@ -189,8 +189,8 @@ class Colcon:
     ) -> Outcome:
         """Run a part of the build, in the sandbox if there is one."""
         setting = self.setting
-        # Not the folder around the install space: what is written there afterwards is written by
-        # us, and would go wherever a link that was left there points to.
+        # Not the folder around the install space: rosgrade writes there afterwards, and would
+        # follow a link that was left there.
         folders = (self.scratch, self.root, self.install)
         with contextlib.ExitStack() as stack:
             room = None
@@ -221,7 +221,7 @@ class Colcon:
                 deep = [folder for folder in folders if cut_deep(folder)]
         if not deep or outcome.ended_by_us:
             return outcome
-        return replace(outcome, ended_by_us=f"it made more than {MOST_DEEP} folders in one another")
+        return replace(outcome, ended_by_us=f"it nested folders more than {MOST_DEEP} deep")
 
 
 def _colcon(ros: RosInstallation, path: str) -> list[str]:

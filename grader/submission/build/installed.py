@@ -85,7 +85,7 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
 def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> str | None:
     """See that an install space holds nothing that is dangerous to open or follow.
 
-    Symbolic links to what was handed in, or to nothing, go: nothing will be there.
+    Symbolic links to the submission's files, or to nothing, are removed: they will lead nowhere.
 
     Returns:
         Why it cannot be used at all, in which case it is removed, or None.
@@ -108,7 +108,7 @@ def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> s
                         planted.append(f"{_named(path, install)}, a link out to {target!r}")
                     path.unlink()
             elif not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
-                planted.append(f"{_named(path, install)}, which is no file, folder or link")
+                planted.append(f"{_named(path, install)}, which is not a file, folder or link")
                 path.unlink()
             total += status.st_size
             count += 1
@@ -122,7 +122,7 @@ def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> s
 
 
 def _named(path: Path, install: Path) -> str:
-    """In quotes: the name is the student's."""
+    """A path in quotes, since the student chose the name."""
     return repr(str(path.relative_to(install)))
 
 

@@ -25,7 +25,7 @@ _DOCUMENTS = (".md", ".rst", ".txt")
 _OTHERS = ("LICENSE", "README", "CHANGELOG", ".gitignore", MANIFEST)
 
 # What an author uses for interfaces alone; others would miss something where the package is alone.
-# No safety rests on this list: whatever such a build does, it serves the same files only.
+# No safety depends on this list: the result of such a build is only used for the same files.
 _HARMLESS = """
 add_compile_options add_definitions ament_export_dependencies ament_export_include_directories
 ament_lint_auto_find_test_dependencies ament_package cmake_minimum_required cmake_policy else

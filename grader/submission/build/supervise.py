@@ -1,7 +1,7 @@
 """Run one command and leave nothing of it behind: ``supervise.py COMMAND...``.
 
-A script of its own that imports nothing of ours, so that it starts quickly. It becomes the parent
-of every orphan below it (``PR_SET_CHILD_SUBREAPER``); so daemons are found whatever process group
+A script of its own that imports nothing of rosgrade, so it starts quickly. It becomes the parent
+of every orphan below it (``PR_SET_CHILD_SUBREAPER``); so daemons are found in any process group
 or session they made for themselves. It kills them when the command has ended, or when its own
 standard input is closed, which also happens when its caller dies.
 
@@ -75,7 +75,7 @@ def limit() -> None:
 
 
 def run(command: list[str]) -> int:
-    """Run the command until its end or ours; its status, or minus the signal that ended it."""
+    """Run the command until one of both ends; its status, or minus the signal that ended it."""
     try:
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, start_new_session=True)
     except OSError as error:
@@ -91,7 +91,7 @@ def main(command: list[str]) -> None:
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     limit()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        # Ctrl-C in the terminal reaches the caller, who closes our input.
+        # Ctrl-C in the terminal reaches the caller, who closes the standard input of this process.
         signal.signal(number, signal.SIG_IGN)
     status = run(command)
     kill_all()

@@ -13,7 +13,7 @@ from grader.submission.build.build_log import PYTHON_HEADERS
 
 TOOLS = {"cmake": "cmake", "c++": "g++", "make": "make"}
 """What every package needs that is not pure Python -> what it is called by Debian and Ubuntu."""
-_HINT = "a package that is not pure Python has to be built, and this machine cannot compile:"
+_HINT = "this machine cannot build packages that are not pure Python, because tools are missing:"
 # What CMake calls the libraries that rosdep installs for the packages of ROS 2 Jazzy.
 _LIBRARIES = """
 ALSA assimp Armadillo Boost Bullet Ceres console_bridge CURL Eigen3 fmt FLANN GLEW glfw3 GLUT GTest

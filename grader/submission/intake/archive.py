@@ -1,4 +1,4 @@
-"""Unpack a student's archive into a fresh folder, whatever it holds.
+"""Unpack a student's archive into a fresh folder, safely even if it is hostile.
 
 :mod:`zipfile` and :mod:`tarfile` only read the table of contents,
 :func:`~grader.submission.intake.members.admit` decides, and files are written here. So it does not

@@ -51,7 +51,7 @@ def zip_members(archive: zipfile.ZipFile) -> Iterator[Member]:
             raise Refused(f"{shown(name)}: is encrypted; hand in a zip without a password")
         # The rare methods cannot be read in small steps, which bounds memory.
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise Refused(f"{shown(name)}: is compressed by a rare method; make a plain zip")
+            raise Refused(f"{shown(name)}: has a rare compression method; make a plain zip")
         mode = info.external_attr >> 16 if info.create_system == _MADE_BY_UNIX else 0
         kind = _kind(name, mode)
         target = ""
@@ -134,7 +134,7 @@ def _member(info: tarfile.TarInfo, files: dict[str, Member]) -> Member:
         if first is None:
             raise Refused(
                 f"{shown(info.name)}: is a hard link to {shown(info.linkname)}, "
-                "which the archive does not hold before it"
+                "which does not stand before it in the archive"
             )
         return Member(first.place, info.name, Kind.FILE, first.size, first.executable)
     if info.issym():

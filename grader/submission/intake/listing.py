@@ -121,7 +121,7 @@ def _walk(
     with os.scandir(root / folder) as found:
         entries = sorted(found, key=lambda entry: entry.name)
     if depth < 0:
-        raise SubmissionError(f"{shown(folder)}: too many folders in one another")
+        raise SubmissionError(f"{shown(folder)}: folders are nested too deep")
     in_package = in_package or any(entry.name == MANIFEST for entry in entries)
     for entry in entries:
         path = join(folder, entry.name)
@@ -151,7 +151,7 @@ def _target(root: Path, path: str) -> str:
 
 def _leads_out(which: str) -> SubmissionError:
     return SubmissionError(
-        f"{which} leads out of the submission; put what it leads to there instead"
+        f"{which} leads out of the submission; put a copy of its target there instead"
     )
 
 

@@ -1,6 +1,6 @@
 """Open a submission: a folder or an archive becomes a private copy that no longer changes.
 
-So the student may go on editing, and nothing of ours can touch the original.
+So the student may go on editing, and rosgrade cannot change the original.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def check_path(path: Path | str) -> Path:
     if _URL.match(text):
         # A Path holds one of the two slashes.
         address = re.sub(r"^(\w+:)/+", r"\1//", text)
-        raise UsageError(f"{shown(address)}: is a URL; clone it with git and name the folder")
+        raise UsageError(f"{shown(address)}: is a URL; clone it with git and give the folder")
     source = Path(path)
     if not (source.is_dir() or source.is_file()):
         problem = "is neither a folder nor a file" if source.exists() else "does not exist"

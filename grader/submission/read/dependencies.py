@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from grader.submission.read.rosdistro import NOT_IN_JAZZY, PACKAGES, ROSDEP_KEYS
 
-# rosdep names keys after Debian packages; a wrong one of these is not for us to judge.
+# rosdep names keys after Debian packages; whether one of these is wrong is not judged.
 _SYSTEM_KEY = re.compile(
     r"python3?-.+|lib.+|.+-(dev|pip|tools|common|utils|plugins?|perl|py|python|java|bin)"
     r"|(gazebo|ignition|gz|qt|vtk|gstreamer|gcc|g\+\+|llvm|openjdk|ruby|perl|php|font|fonts|texlive"
@@ -59,7 +59,7 @@ def meant(name: str, more: Iterable[str] = ()) -> str | None:
 
 @lru_cache(maxsize=4096)
 def _folded(name: str) -> str:
-    """What stays of a name without case, separators and plural."""
+    """A name without case, separators and plural."""
     return re.sub(r"[^a-z0-9]", "", name.lower()).removesuffix("s")
 
 

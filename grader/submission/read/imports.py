@@ -59,7 +59,7 @@ def _dynamic(call: ast.Call) -> str:
 
 
 def _guarded(node: ast.AST) -> set[ast.AST]:
-    """The children without which the code still runs."""
+    """The children of a node without which the code still runs."""
     if isinstance(node, ast.Try) and any(map(_catches_import_error, node.handlers)):
         return {*node.body, *node.handlers}
     if isinstance(node, ast.If) and _last_name(node.test) == "TYPE_CHECKING":

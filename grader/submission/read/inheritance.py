@@ -43,9 +43,9 @@ class Family:
 
     def foreign(self, item: FoundClass) -> list[str]:
         """Classes that it inherits from packages that were not handed in."""
-        ours = ("rclpy", *sys.stdlib_module_names)
+        known = ("rclpy", *sys.stdlib_module_names)
         names = [name for name in self._ancestors(item) if self._split(name)[0] is None]
-        return sorted(name for name in names if "." in name and name.split(".")[0] not in ours)
+        return sorted(name for name in names if "." in name and name.split(".")[0] not in known)
 
     def _ancestors(self, item: FoundClass) -> list[str]:
         """Dotted names of everything that a class inherits."""

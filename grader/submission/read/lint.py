@@ -96,7 +96,7 @@ def newer_syntax(
 
 
 def _is_syntax_error(finding: LintFinding) -> bool:
-    """The code of a syntax error is a word, that of a rule begins with its family."""
+    """Whether a finding is a syntax error: its code is a word and does not begin with a family."""
     return not finding.code[:1].isupper()
 
 
@@ -129,12 +129,12 @@ def _check(
     except GraderFault as fault:
         return f"ruff could not be run: {fault}", found
     if outcome.ended_by_us:
-        return f"ruff was ended for its {outcome.ended_by_us}", found
+        return f"ruff was ended: too much {outcome.ended_by_us}", found
     return "ruff failed" if outcome.status else None, found
 
 
 def _findings(line: str, root: Path) -> Iterator[LintFinding]:
-    """What a line of ruff's output says; nothing for other output."""
+    """The findings in a line of ruff's output; none in other output."""
     try:
         found = json.loads(line)
         code, message = str(found["code"]), str(found["message"])

@@ -1,4 +1,4 @@
-"""Python source of a student as a syntax tree, without running it and whatever it holds."""
+"""Python source of a student as a syntax tree, safely and without running it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ except Exception:
 os._exit(ended)
 """
 _TOO_COMPLEX = "Python cannot parse this file: it is nested too deeply or holds too much"
-_TOO_MUCH = "not read: the submission holds too much Python"
+_TOO_MUCH = "not read: the submission holds too much Python code"
 # Before 3.11.5 two threads of CPython that parse at the same time count their depths together, and
 # one ends with a SystemError (python/cpython#106905); to catch warnings is for one at a time too.
 _ONE_AT_A_TIME = threading.Lock()

@@ -139,7 +139,7 @@ class TestRun:
         assert finding.status is Status.PASSED
         assert finding.evidence.spans[-1].end_s == STOP_S
 
-    def test_another_period_loses_and_is_told(self):
+    def test_another_period_loses_points_and_is_reported(self):
         runs = [("timer_1", 0.5 + 2 * index, 0.9 + 2 * index) for index in range(3)]
         words = failed("run", run(*runs), ["timer_1"], period="1 s")
         assert "`timer_1` starts every 2 s (median)" in words
@@ -195,7 +195,7 @@ class TestRun:
         free = run(*only(parallel(), "timer_1"), declarations=told)
         assert judged("run", free, ["timer_1"], period="1 s").status is Status.PASSED
 
-    def test_a_short_period_is_told_where_the_median_is_right_by_chance(self):
+    def test_a_short_period_is_reported_where_the_median_is_right_by_chance(self):
         """Two timers of 0.5 s that work 0.4 s, and a message in every second round of them."""
         runs, now_s = [], 1.0
         for number in range(7):
@@ -218,13 +218,13 @@ class TestRun:
         assert "too often" not in finding.observed
 
     @pytest.mark.parametrize("period_s", [1.2, 1.5])
-    def test_a_wrong_period_beside_the_work_of_others_is_told(self, period_s):
+    def test_a_wrong_period_beside_the_work_of_others_is_reported(self, period_s):
         mine = [("timer_1", 1 + period_s * i, 1.4 + period_s * i) for i in range(4)]
         others = [("timer_2", 1.2 + i, 1.6 + i) for i in range(5)]
         words = failed("run", run(*mine, *others), ["timer_1"], period="1 s")
         assert "`timer_1` starts every" in words
 
-    def test_a_period_a_little_longer_beside_messages_is_told(self):
+    def test_a_period_a_little_longer_beside_messages_is_reported(self):
         """Two timers of 1.1 s in one thread: a message fills what is left but for 0.1 s."""
         runs = []
         for number in range(1, 6):
@@ -236,7 +236,7 @@ class TestRun:
         words = failed("run", run(*runs, declarations=told), TIMERS, period="1 s", tolerance="7 %")
         assert "`timer_1` starts every 1.1 s" in words
 
-    def test_a_node_that_was_made_twice_is_told(self):
+    def test_a_node_that_was_made_twice_is_reported(self):
         runs = [
             ("timer_1", at_s + late_s, at_s + 0.4) for at_s in range(1, 6) for late_s in (0, 0.1)
         ]
@@ -301,24 +301,24 @@ class TestNearMisses:
     def test_no_report_at_all(self):
         assert EVENTS in failed("run", run(), TIMERS, period="1 s")
 
-    def test_another_name_of_a_callback_is_told(self):
+    def test_another_name_of_a_callback_is_reported(self):
         runs = [("Timer1", *item[1:]) for item in only(parallel(), "timer_1")]
         words = failed("run", run(*runs), ["timer_1"], period="1 s")
         assert "no report of `timer_1`, but reports of `Timer1`" in words
 
-    def test_other_words_in_a_report_are_told(self):
+    def test_other_words_in_a_report_are_reported(self):
         subject = run(messages={EVENTS: (report(1.0, "timer_1 started"),)})
         words = failed("run", subject, ["timer_1"], period="1 s")
         assert "no message on `/events` is a report" in words
         assert "there is 'timer_1 started', for example" in words
         assert "such as `timer_1 start`" in words
 
-    def test_starts_without_ends_are_told(self):
+    def test_starts_without_ends_are_reported(self):
         runs = [(name, begin, None) for name, begin, _ in only(parallel(), "timer_1")]
         words = failed("run", run(*runs), ["timer_1"], period="1 s")
         assert "`timer_1` reported 5 starts, but no ends" in words
 
-    def test_ends_without_starts_are_told(self):
+    def test_ends_without_starts_are_reported(self):
         subject = run(messages={EVENTS: (report(1.0, "timer_1 end"),)})
         words = failed("run", subject, ["timer_1"], period="1 s")
         assert "reported its end, but never its start" in words
@@ -333,7 +333,7 @@ class TestNearMisses:
         words = failed("run", run(*only(parallel(), "timer_1")), TIMERS, period="1 s")
         assert "`timer_2` never ran; reports came of `timer_1`" in words
 
-    def test_a_process_that_ended_is_told_first(self):
+    def test_a_process_that_ended_is_reported_first(self):
         words = failed(
             "run", run(("timer_1", 1.0, None), processes=(died(1, 1.4),),
                        log=output(traceback("AttributeError: no attribute 'evnts'"))),
@@ -347,7 +347,7 @@ class TestWork:
     def test_as_long_as_it_should(self):
         assert judged("work", run(*serial()), TIMERS, duration="400 ms").status is Status.PASSED
 
-    def test_milliseconds_in_place_of_seconds_are_told(self):
+    def test_milliseconds_in_place_of_seconds_are_reported(self):
         runs = [("timer_1", second, second + 0.0004) for second in (1, 2, 3)]
         words = failed("work", run(*runs), ["timer_1"], duration="400 ms")
         assert "works 400 us (median of 3 runs)" in words

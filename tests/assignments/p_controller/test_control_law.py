@@ -64,7 +64,7 @@ class TestLaw:
         verdict = law(commands)
         assert not (verdict.law is Law.PROPORTIONAL and verdict.r2 >= 0.9)
 
-    def test_a_gain_of_the_wrong_sign_is_told(self):
+    def test_a_gain_of_the_wrong_sign_is_reported(self):
         verdict = law([(e / 1.2, -0.8 * e / 1.2) for e in ERRORS])
         assert verdict.law is Law.WRONG_SIGN
 

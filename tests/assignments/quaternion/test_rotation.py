@@ -221,7 +221,7 @@ class TestZero:
         assert "test whether the length is 0 before you divide by it" in words
         assert "normalize" not in words.lower()
 
-    def test_a_node_that_dies_of_it_is_told_why(self):
+    def test_a_node_that_ends_of_it_gets_the_reason(self):
         words = failed(
             "axis_angle_to_quaternion", self.CASES, [QUARTER_X[1], None, None],
             processes=(died(1, 1.03),),
@@ -492,16 +492,16 @@ class TestPairing:
     conversion, asked = asked_of("axis_angle")
     answers = right(conversion, asked)
 
-    def test_late_answers_are_told(self):
+    def test_late_answers_are_reported(self):
         finding = judged(self.conversion, self.asked, self.answers, late_s=0.75)
         assert finding.status is Status.PASSED
 
-    def test_doubled_answers_are_told(self):
+    def test_doubled_answers_are_reported(self):
         doubled = [[one, one] for one in self.answers]
         assert judged(self.conversion, self.asked, doubled).status is Status.PASSED
 
     @pytest.mark.parametrize("copies", [3, 4, 10])
-    def test_however_often_everything_is_said(self, copies):
+    def test_an_answer_that_comes_several_times_passes(self, copies):
         several = [[one] * copies for one in self.answers]
         assert judged(self.conversion, self.asked, several).status is Status.PASSED
 
@@ -538,7 +538,7 @@ class TestPairing:
         finding = judged(self.conversion, self.asked, answers, stop_s=stop_s)
         assert finding.status is Status.PASSED
 
-    def test_a_machine_that_takes_the_time_is_our_fault(self):
+    def test_a_machine_that_takes_the_time_costs_no_point(self):
         answers = [*self.answers[:-1], None]
         end_s = 1.0 + STEP_S * len(answers)
         finding = judged(
@@ -558,7 +558,7 @@ class TestUnasked:
         )
         return {"messages": {"/quaternion": (*early, *healthy.on("/quaternion"))}}
 
-    def test_messages_that_nobody_asked_for(self):
+    def test_messages_without_a_question_are_reported(self):
         words = failed(
             "axis_angle_to_quaternion", [QUARTER_X[0]], [QUARTER_X[1]], **self.with_early(6)
         )
@@ -576,7 +576,7 @@ class TestSilence:
         words = failed("rpy_to_quaternion", [[1, 0, 0]] * 3, [None] * 3)
         assert "/orientation" in words
 
-    def test_nothing_was_sent_because_nobody_listens(self):
+    def test_nothing_was_sent_without_a_subscription(self):
         words = failed(
             "rpy_to_quaternion", [[1, 0, 0]], [None],
             sent={"/rpy": ()}, endpoints=(endpoint("/orientation"),),

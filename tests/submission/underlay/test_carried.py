@@ -1,4 +1,4 @@
-"""The packages that rosgrade carries along, under what students hand in."""
+"""rosgrade's interface packages as underlays of submissions."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_a_ros_that_has_the_package_is_left_as_it_is(named_ros: RosInstallation)
     assert store.completed(named_ros, ["example_interfaces"]) is named_ros
 
 
-def test_what_nobody_names_is_not_built(named_ros: RosInstallation) -> None:
+def test_packages_that_are_not_named_are_not_built(named_ros: RosInstallation) -> None:
     store = UnderlayStore(Path("/nowhere"), named_ros)
     assert store.completed(named_ros, ["rclpy", "turtlesim"]) is named_ros
 

@@ -47,10 +47,10 @@ class Join(StimulusModel):
         return {"kind": "JoinOrder", "topic": self.join, "after_s": self.after, **same}
 
     def mistakes(self, making: Making, scenario: ScenarioOfStimuli) -> Iterator[tuple[Place, str]]:
-        """Its name is another's, or it would hear the probe itself."""
+        """Its name is used already, or the probe itself publishes on its topic."""
         alike = [one for one in scenario.stimuli if isinstance(one, Join) and one.name == self.name]
         if alike[0] is not self:
-            yield ("name",), f"{self.name!r} stands twice"
+            yield ("name",), f"the name {self.name!r} is used twice"
         if self.exchanged in [one.exchanged for one in scenario.stimuli if one.key == "publish"]:
-            text = f"the probe publishes on {self.join!r} itself: a late joiner would hear that"
+            text = f"the probe publishes on {self.join!r} itself: a late joiner would receive that"
             yield ("join",), text

@@ -92,8 +92,8 @@ class Publish(StimulusModel):
         }
         names = [name for name, there in given.items() if there]
         if len(names) != 1:
-            told = f"not {' and '.join(names)}" if names else "but none of them is there"
-            raise ValueError(f"give the messages in one way of {', '.join(given)}, {told}")
+            lack = f"not {' and '.join(names)}" if names else "but none is given"
+            raise ValueError(f"give the messages by one of {', '.join(given)}, {lack}")
         if self.count is not None and self.message is None:
             raise ValueError("'count' says how often one 'message' is published")
         if self._is_several and not self._is_paced:
@@ -112,7 +112,7 @@ class Publish(StimulusModel):
 
     @property
     def _is_paced(self) -> bool:
-        """Whether it is said when the next message follows."""
+        """Whether the YAML says when the next message follows."""
         return self.every is not None or self.answer is not None
 
     @property

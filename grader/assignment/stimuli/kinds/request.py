@@ -180,7 +180,7 @@ def _value(name: str, value: Any, drawn: dict[str, float]) -> Any:
         raise StimulusError(str(error), place) from None
     types = {type(item) for item in (found if isinstance(found, list) else [found])}
     if not types <= {bool, int, float, str} or (len(types) != 1 and types != {int, float}):
-        text = f"{name}: expected a truth, a number, a text, or a list of one kind of these"
+        text = f"{name}: expected true or false, a number, a text, or a list of one of these"
         raise StimulusError(text, place)
     return found
 
@@ -232,7 +232,6 @@ def _times(item: CallService | ReadParameters | SetParameters | SendGoal) -> dic
 def _fields(
     value: Mapping[str, Any], item: CallService | SendGoal, making: Making, place: Place
 ) -> dict[str, Any]:
-    """The fields of a request or a goal."""
     folder = "srv" if isinstance(item, CallService) else "action"
     if f"/{folder}/" not in item.type:
         text = f"expected an interface in {folder}, such as package/{folder}/Name"
