@@ -15,7 +15,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from grader.assignment.model import CheckSpec, Counts
-from grader.checks.check import Subject
+from grader.checks.check import Parameters, Subject
 from grader.checks.doubt import is_doubtful
 from grader.diagnosis.not_built import why_lacking, why_not_built
 from grader.findings.finding import Finding, Status
@@ -222,11 +222,7 @@ def _judge(
     bound: BoundCheck, subject: SubmissionRecord | Recording, scenario: str | None
 ) -> ScenarioFinding:
     try:
-        judge, window = bound.check.judge, bound.spec.window
-        if window is not None and isinstance(subject, Recording):
-            finding = judged_in(window, judge, subject, bound.parameters)
-        else:
-            finding = judge(subject, bound.parameters)
+        finding = _found(bound, subject, bound.parameters)
         misuse = _misuse(finding)
         failed = not misuse and finding.status is Status.FAILED
         if failed:
@@ -244,12 +240,22 @@ def _judge(
     return ScenarioFinding(scenario, finding)
 
 
+def _found(
+    bound: BoundCheck, subject: SubmissionRecord | Recording, parameters: Parameters
+) -> Finding:
+    """What a check finds with some parameters, in its windows if it has any."""
+    window = bound.spec.window
+    if window is not None and isinstance(subject, Recording):
+        return judged_in(window, bound.check.judge, subject, parameters)
+    return bound.check.judge(subject, parameters)
+
+
 def _with_partial_credit(
     bound: BoundCheck, subject: SubmissionRecord | Recording, finding: Finding
 ) -> Finding:
     """The finding of a check that failed, with the credit that looser parameters give."""
     for share, parameters in bound.partial:
-        looser = bound.check.judge(subject, parameters)
+        looser = _found(bound, subject, parameters)
         if looser.status is Status.ERROR:
             return looser
         if looser.status is Status.PASSED and share > finding.credit:

@@ -6,7 +6,7 @@ from grader.assignment.load import load_assignment
 from grader.errors import AssignmentError
 from grader.grade import grade
 from tests.assignment.lessons import HEAD
-from tests.checks.builder import recording
+from tests.checks.builder import every, messages, recording
 
 CHECK = """\
   - id: period
@@ -19,11 +19,11 @@ CHECK = """\
 """
 
 
-def points(folder, tolerance, looser="5 %"):
+def points(folder, tolerance, looser="5 %", window="", **changes):
     (folder / "lesson").mkdir()
-    text = HEAD + CHECK.format(tolerance=tolerance).replace("5 %}}", f"{looser}}}}}")
+    text = HEAD + CHECK.format(tolerance=tolerance).replace("5 %}}", f"{looser}}}}}") + window
     (folder / "lesson" / "assignment.yaml").write_text(text)
-    run = recording(scenario="run")
+    run = recording(scenario="run", **changes)
     result = grade(load_assignment(folder / "lesson"), run.submission, {"run": run})
     return result.results[0]
 
@@ -40,6 +40,12 @@ def test_of_looser_parameters_that_fit_the_best_share_counts(tmp_path):
 
 def test_parameters_that_do_not_fit_either_give_nothing_more(tmp_path):
     assert points(tmp_path, "1 %", looser="2 %").points == 1.0
+
+
+def test_looser_parameters_are_judged_in_the_window_of_the_check(tmp_path):
+    published = messages(every(0.01, 40, 0.7) + every(0.3, 9, 2.0))
+    found = points(tmp_path, "1 %", window="    from: 1500 ms\n", messages=published)
+    assert found.points == 3.0
 
 
 @pytest.mark.parametrize(
