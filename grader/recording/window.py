@@ -42,6 +42,7 @@ def cut(recording: Recording, begin_ns: int, end_ns: int) -> Recording:
         incidents=inside(recording.incidents, attrgetter("time_ns")),
         calls=inside(recording.calls, attrgetter("requested_ns")),
         goals=inside(recording.goals, attrgetter("sent_ns")),
+        asked=inside(recording.asked, attrgetter("asked_ns")),
         matched_ns=None if recording.matched_ns is None else max(recording.matched_ns, begin_ns),
         stop_ns=min(recording.stop_ns, end_ns),
         # What a process did after the window does not matter in it.

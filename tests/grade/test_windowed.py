@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from grader.grade.windowed import judged_in
 from grader.recording.interaction import Service
 from grader.recording.model import Call, Ending, Recording
 from grader.recording.simulated import Truth
+from grader.recording.window import cut
 from tests.checks.builder import (
     CHECKS,
     NODE,
@@ -272,6 +274,39 @@ class TestEvents:
         found = judged(SILENT, run, after={"log": "late"}, before={"message": "/cmd_vel"})
         assert found.status is Status.FAILED
         assert "there was none before the run ended" in text(found)
+
+
+def test_all_that_happens_outside_of_a_window_is_cut_and_facts_stay() -> None:
+    stays = {
+        "scenario",
+        "seed",
+        "launched_ns",
+        "end_ns",
+        "submission",
+        "answers",
+        "joined",
+        "joins",
+    }
+    stays |= {
+        "unreadable",
+        "nodes",
+        "endpoints",
+        "processes",
+        "declarations",
+        "services",
+        "clients",
+    }
+    stays |= {"waits", "interventions", "breaches", "disturbance", "faults", "scene", "values"}
+    stays |= {"environment"}
+    moment = SimpleNamespace(
+        time_ns=at(1), stamp_ns=at(1), requested_ns=at(1), sent_ns=at(1), asked_ns=at(1), text=""
+    )
+    names = {field.name for field in fields(Recording)} - stays
+    cut_by_time = names - {"ending", "matched_ns", "stop_ns", "messages", "sent"}
+    run = recording(**{name: (moment,) for name in cut_by_time}, **{"messages": {}, "sent": {}})
+    after = cut(run, at(2), at(3))
+    assert {name for name in cut_by_time if getattr(after, name)} == set()
+    assert (after.matched_ns, after.stop_ns, after.launched_ns) == (at(2), at(3), run.launched_ns)
 
 
 def test_an_error_in_one_window_is_not_hidden_by_another() -> None:
