@@ -267,7 +267,7 @@ class TestEvents:
     def test_what_a_stimulus_did_not_send_is_not_the_students_silence(self):
         run = recording(endpoints=(*recording().endpoints, stimulus("/start")))
         found = judged(SILENT, run, after={"message": "/start"})
-        assert "has no subscription" in found.observed
+        assert "no subscription" in found.observed
 
     def test_events_in_the_wrong_order_are_told(self):
         run = recording(log=output("late", time_s=3.0), messages=messages([1.0]))
@@ -278,26 +278,10 @@ class TestEvents:
 
 def test_all_that_happens_outside_of_a_window_is_cut_and_facts_stay() -> None:
     stays = {
-        "scenario",
-        "seed",
-        "launched_ns",
-        "end_ns",
-        "submission",
-        "answers",
-        "joined",
-        "joins",
+        *"scenario seed launched_ns end_ns submission answers joined joins unreadable nodes".split(),
+        *"endpoints processes declarations services clients waits interventions breaches".split(),
+        *"disturbance faults scene values environment".split(),
     }
-    stays |= {
-        "unreadable",
-        "nodes",
-        "endpoints",
-        "processes",
-        "declarations",
-        "services",
-        "clients",
-    }
-    stays |= {"waits", "interventions", "breaches", "disturbance", "faults", "scene", "values"}
-    stays |= {"environment"}
     moment = SimpleNamespace(
         time_ns=at(1), stamp_ns=at(1), requested_ns=at(1), sent_ns=at(1), asked_ns=at(1), text=""
     )
