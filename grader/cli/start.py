@@ -31,8 +31,10 @@ def start(
 
     loaded = chosen_names(load_assignment(assignment), chosen)
     loaded = with_values(loaded, {**loaded.values, **loaded.given})
-    for name in loaded.values.keys() - loaded.given:
-        say(f"{name} is {loaded.values[name]} in what is written; choose with --set {name}=VALUE")
+    for name, variable in loaded.assignment.variables.items():
+        if name not in loaded.given and not variable.is_of_runs:
+            example = loaded.values[name]
+            say(f"{name} is {example} in these files; choose another with --set {name}=VALUE")
     for written in write_starter(loaded, folder):
         say(f"Written: {written}")
     say("\nNext, read the task, then grade your work after every save:\n")
