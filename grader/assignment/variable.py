@@ -146,11 +146,14 @@ def read_variables(source: Source) -> dict[str, Variable]:
         problems += mistakes
         if variable is None:
             continue
-        found[name] = variable
         places = _PLACE.findall(variable.match or "")
         if variable.match not in (None, ANY) and not {name} <= {*places} <= {*names}:
             text = f"{variable.match!r} must have {{{name}}} in it, and may have other variables"
             problems.append(source.problem((KEY, name, "match"), text))
+        if not {*_PLACE.findall(variable.of or "")} <= {*found}:
+            text = f"{variable.of!r} may have only variables in it that stand above {name!r}"
+            problems.append(source.problem((KEY, name, "of"), text))
+        found[name] = variable
     if problems:
         raise AssignmentError(source.file, problems)
     return found

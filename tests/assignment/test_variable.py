@@ -25,6 +25,7 @@ def with_variables(text: str) -> str:
         ("n: {match: 'group{n}_bot'}", "5: variables.n: the key 'example' is missing"),
         ("n: {match: group_bot, example: 7}", "5: variables.n.match: 'group_bot' must have {n}"),
         ("n: {match: 'g{n}{m}', example: 7}", "5: variables.n.match: 'g{n}{m}' must have {n} in"),
+        ("n: {match: any, of: '{m}', example: 7}", "5: variables.n.of: '{m}' may have only"),
         ("n: {match: 'g{n}', example: a b}", "5: variables.n: the 'example' must be of letters"),
         ("n: {match: 'g{n}', in: package, example: 7}", "Did you mean 'packages'?"),
     ],
