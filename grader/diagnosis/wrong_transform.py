@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.explanation import Symptom, explanation
+from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.process.process_exit import ended_early, why_crashed, why_ended
 from grader.findings.finding import Evidence, Moment
 from grader.findings.first_seen import endpoints_seen
 from grader.findings.wording import code, codes
-from grader.measure.transforms import Sent, sent
-from grader.recording.model import NS, Kind, Recording
+from grader.measure import declarations
+from grader.measure.compatibility import refusals
+from grader.measure.transforms import Sent, is_static, sent
+from grader.recording.model import NS, Kind, Qos, Recording
 from grader.spec.nearest_name import nearest
 from grader.spec.unit import format_duration
 
@@ -20,6 +26,7 @@ _STATIC = (
     "Use StaticTransformBroadcaster, or a publisher on /tf_static with QoSProfile(depth=1, "
     "durability=DurabilityPolicy.TRANSIENT_LOCAL)."
 )
+_MOVING = "Use TransformBroadcaster, or a publisher on /tf with the QoS 10."
 # A stamp may be that of the data that a transform is made of, or of the near future.
 _STAMP_S = 1.0
 _NAMES = "Set header.frame_id = '{0.parent}' and child_frame_id = '{0.child}', without slashes."
@@ -33,7 +40,6 @@ class NoTransform(Symptom[Cause]):
     topic: str
     parent: str
     child: str
-    is_static: bool = False
 
     @cached_property
     def there(self) -> list[Sent]:
@@ -64,12 +70,12 @@ class BadTransform(Symptom[Cause]):
     """A transform that may be of no use to tf2.
 
     Attributes:
-        is_timed: Its stamp is as it should be, or does not count.
+        known: Stamps of messages that it may be made of.
     """
 
     recording: Recording
     one: Sent
-    is_timed: bool
+    known: Collection[int | None] = ()
 
 
 def edge(parent: str, child: str) -> str:
@@ -84,15 +90,22 @@ def moment(recording: Recording, one: Sent, what: str) -> Evidence:
 
 
 @explanation(NoTransform)
-def volatile_static(symptom: NoTransform) -> Cause | None:
-    """The publisher on /tf_static is volatile, so a node that starts later gets nothing."""
+def process_crashed(symptom: NoTransform) -> Cause | None:
+    """The process ended with a failure, perhaps of a lookup before the first transform."""
+    return why_crashed(symptom.recording)
+
+
+@explanation(NoTransform)
+def refused_by_tf2(symptom: NoTransform) -> Cause | None:
+    """The publisher's QoS is not what tf2 requests: on /tf_static transient_local."""
     own = symptom.recording.student_endpoints(Kind.PUBLISHER, symptom.topic)
-    if not symptom.is_static or not any(one.qos.durability == "volatile" for one in own):
+    requested = Qos("reliable", "transient_local" if is_static(symptom.topic) else "volatile")
+    refused = [", ".join(refusals(one.qos, requested)) for one in own]
+    if not any(refused):
         return None
     return Cause(
-        f"the publisher on {code(symptom.topic)} is volatile: tf2 asks for transient_local and "
-        "gets nothing from it, and a node that starts later misses what was sent",
-        _STATIC,
+        f"tf2 gets nothing from the publisher on {code(symptom.topic)} ({max(refused)})",
+        _STATIC if is_static(symptom.topic) else _MOVING,
         Evidence(moments=endpoints_seen(symptom.recording, own)),
     )
 
@@ -101,7 +114,7 @@ def volatile_static(symptom: NoTransform) -> Cause | None:
 def other_topic(symptom: NoTransform) -> Cause | None:
     """It is on /tf instead of /tf_static, or the other way round."""
     found = symptom.edges.get((symptom.parent, symptom.child))
-    hint = _STATIC if symptom.is_static else "What moves is sent with TransformBroadcaster."
+    hint = _STATIC if is_static(symptom.topic) else _MOVING
     return symptom.instead(found, f"instead of {code(symptom.topic)}", hint)
 
 
@@ -122,9 +135,10 @@ def leading_slash(symptom: NoTransform) -> Cause | None:
 
 @explanation(NoTransform)
 def no_transform_at_all(symptom: NoTransform) -> Cause | None:
-    """Nothing is published on the topic."""
-    silent = not symptom.recording.on(symptom.topic)
-    return why_silent(symptom.recording, symptom.topic) if silent else None
+    """Nothing is published on the topic, or only by the simulated robot."""
+    recording, topic = symptom.recording, symptom.topic
+    found = why_no_endpoint(recording, Kind.PUBLISHER, topic)
+    return found or (None if recording.on(topic) else why_silent(recording, topic))
 
 
 @explanation(NoTransform)
@@ -167,7 +181,8 @@ def wrong_stamp(symptom: BadTransform) -> Cause | None:
     sent_ns, stamp_ns = symptom.one.message.stamp_ns, symptom.one.stamp_ns
     stolen_s = symptom.recording.stolen_s(min(stamp_ns, sent_ns), sent_ns)
     late_s = (sent_ns - stamp_ns) / NS
-    if symptom.is_timed or abs(late_s) <= _STAMP_S + stolen_s:
+    counts = not is_static(symptom.one.message.topic) and stamp_ns not in symptom.known
+    if not counts or abs(late_s) <= _STAMP_S + stolen_s:
         return None
     off = f"{format_duration(abs(late_s))} {'before' if late_s > 0.0 else 'after'}"
     seen = f"the stamp is {off} the moment of publishing: always the same, or of another clock"
@@ -177,3 +192,12 @@ def wrong_stamp(symptom: BadTransform) -> Cause | None:
         "of the message that it is made of: tf2 looks transforms up by their time.",
         moment(symptom.recording, symptom.one, "has a wrong stamp"),
     )
+
+
+def why_gone(recording: Recording, topic: str, seen: str) -> Cause | None:
+    """Why no publisher on a topic stayed until the end, or None if one did."""
+    own = recording.student_endpoints(Kind.PUBLISHER, topic)
+    processes = [declarations.process_of(recording, one.node) for one in own]
+    stays = any(one is not None and not ended_early(recording, one) for one in processes)
+    destroyed = why_unpublished(recording, topic, seen)
+    return destroyed or (None if stays else why_ended(recording, seen))

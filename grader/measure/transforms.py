@@ -38,6 +38,11 @@ class Sent:
         return finite and abs(length - 1.0) <= _UNIT
 
 
+def is_static(topic: str) -> bool:
+    """Whether it is a topic of static transforms, by its name."""
+    return topic.endswith("tf_static")
+
+
 def sent(recording: Recording, topics: Iterable[str]) -> Iterator[Sent]:
     """The transforms on some topics, in the order of their publishing on each."""
     for message in (one for topic in topics for one in recording.on(topic)):

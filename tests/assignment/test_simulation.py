@@ -53,6 +53,50 @@ def test_the_topics_of_the_robot_are_recorded_without_being_named(tmp_path: Path
     }
 
 
+def with_transforms(options: str, *checks: str, record: str = "[]") -> str:
+    """The assignment with ``topics: {tf: ...}`` and more checks."""
+    found = YAML.replace(
+        "    timeout", f"    topics: {{tf: {options}}}\n    record: {record}\n    timeout"
+    )
+    return found + "".join(
+        f"  - {{id: more_{number}, uses: {text}, points: 1}}\n"
+        for number, text in enumerate(checks)
+    )
+
+
+def test_transforms_of_the_robot_are_recorded_where_a_scenario_names_them(tmp_path: Path) -> None:
+    tree = "tf.tree, with: {root: odom, frames: [base_scan]}"
+    yaml = with_transforms("{enabled: true}", tree)
+    [scenario] = load_assignment(lesson(tmp_path, yaml)).assignment.scenarios
+    assert scenario.transform_topics == {"/tf": "volatile", "/tf_static": "transient_local"}
+    assert scenario.recorded_types["/tf_static"] == "tf2_msgs/msg/TFMessage"
+
+
+def test_checks_of_transforms_need_their_topics_a_pose_and_names_without_a_slash(
+    tmp_path: Path,
+) -> None:
+    edge = "parent: odom, child: base_footprint"
+    yaml = with_transforms(
+        "{enabled: false}",
+        f"tf.broadcast, with: {{{edge}, rate: 30 Hz}}",
+        f"tf.follows, with: {{{edge}, source: /pose}}",
+        "tf.static, with: {parent: /base_link, child: laser, rpy: [0, 0, 90]}",
+    )
+    told = refused(tmp_path, yaml)
+    assert "does not record '/tf'" in told
+    assert "does not record '/pose'" in told
+    assert "'/base_link' is not the name of a frame" in told
+    assert "90 has no unit" in told
+
+
+def test_without_a_world_a_transform_needs_a_topic_to_follow(tmp_path: Path) -> None:
+    topics = "[{topic: /tf, type: tf2_msgs/msg/TFMessage}]"
+    edge = "parent: odom, child: base_footprint"
+    yaml = with_transforms("{}", f"tf.follows, with: {{{edge}}}", record=topics)
+    yaml = yaml.replace("    world: world.yaml\n", "").replace("    topics: {tf: {}}\n", "")
+    assert "has no 'world', and so no simulated robot" in refused(tmp_path, yaml)
+
+
 def test_a_world_that_is_not_there_is_named_with_the_line_of_the_scenario(tmp_path: Path) -> None:
     told = refused(tmp_path, world=None)
     assert "assignment.yaml:7: scenarios[0].world: " in told

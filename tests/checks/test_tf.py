@@ -24,8 +24,11 @@ from tests.checks.builder import (
     failing,
     judge,
     message,
+    output,
+    process,
     recording,
     stimulus,
+    traceback,
 )
 
 TF, TF_STATIC, TYPE = "/tf", "/tf_static", transforms.TRANSFORMS
@@ -120,6 +123,9 @@ def odometry_of(time_s: float) -> dict[str, Any]:
 AXES = (("xyz", "place"), ("xyzw", "turn"))
 
 
+CRASH: dict[str, Any] = {"processes": (died(1),), "log": output(traceback("KeyError: 'x'"))}
+
+
 class TestStatic:
     def test_a_latched_transform_with_the_right_values_passes(self) -> None:
         right = transform("base_link", "laser", (0.1, 0.0, 0.2), TURNED)
@@ -144,7 +150,13 @@ class TestStatic:
         right = transform("base_link", "laser", (0.1, 0.0, 0.2), TURNED)
         volatile = Qos("reliable", "volatile", liveliness="automatic")
         found = failing("tf.static", static_run(right, qos=volatile), **PLACED)
-        assert "is volatile" in found and "TRANSIENT_LOCAL" in found
+        assert "durability volatile offered" in found and "TRANSIENT_LOCAL" in found
+
+    def test_another_process_may_end(self) -> None:
+        right = transform("base_link", "laser", (0.1, 0.0, 0.2), TURNED)
+        other = died(0, name="bot_publisher/once")
+        subject = static_run(right, processes=(other, process()))
+        assert judge("tf.static", subject, **PLACED).status is Status.PASSED
 
     def test_a_node_that_ends_after_it_sent_fails(self) -> None:
         right = transform("base_link", "laser", (0.1, 0.0, 0.2), TURNED)
@@ -241,6 +253,11 @@ class TestBroadcast:
         late = broadcasting(stamp=lambda t: t - 0.5)
         assert judge("tf.broadcast", late, **RIGHT).status is Status.PASSED
 
+    def test_a_best_effort_publisher_fails_as_tf2_gets_nothing_from_it(self) -> None:
+        lossy = Qos("best_effort", "volatile", liveliness="automatic")
+        subject = broadcasting(endpoints=(endpoint(TF, type=TYPE, qos=lossy),))
+        assert "reliability best_effort offered" in failing("tf.broadcast", subject, **RIGHT)
+
 
 class TestFollows:
     def test_one_that_follows_its_source_passes(self) -> None:
@@ -325,7 +342,7 @@ class TestTree:
             ([("a", "a")], {}, "a circle"),
             ([*FRAMES, ("a", "b"), ("b", "a")], {}, "a circle"),
             ([("/map", "odom")], {}, "a slash in front"),
-            (FRAMES, {"root": "odom"}, "the root `map`"),
+            (FRAMES, {"root": "odom"}, "the root is `map`"),
             (FRAMES, {"frames": ["camera"]}, "no frame `camera`"),
             (FRAMES, {"static": ["laser"]}, "the frame `laser` is on `/tf`"),
         ],
@@ -337,6 +354,11 @@ class TestTree:
         subject = self.of(static=self.FRAMES)
         found = failing("tf.tree", subject, static=["laser"])
         assert "is on `/tf_static`" in found
+
+    def test_a_program_that_crashed_is_told_first(self) -> None:
+        subject = replace(self.of(*self.FRAMES), **CRASH)
+        assert "KeyError" in failing("tf.tree", subject, frames=["camera"])
+        assert "KeyError" in failing("tf.static", subject, **PLACED)
 
     def test_where_nothing_is_sent_the_cause_is_that_of_no_messages(self) -> None:
         assert "'tf'" in failing("tf.tree", run(endpoints=(endpoint(),)))

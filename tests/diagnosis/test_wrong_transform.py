@@ -9,6 +9,7 @@ import pytest
 from grader.recording.model import Recording
 from tests.checks.builder import RELIABLE, endpoint, judge
 from tests.checks.test_tf import (
+    CRASH,
     ODOM,
     PLACED,
     TF,
@@ -28,7 +29,8 @@ BROADCAST = {**ODOM, "rate": "20 Hz"}
 @pytest.mark.parametrize(
     ("name", "subject"),
     [
-        ("volatile_static", run(qos=RELIABLE)),
+        ("process_crashed", run(**CRASH)),
+        ("refused_by_tf2", run(qos=RELIABLE)),
         ("other_topic", run(moving=on(TF, (0.7, [transform(*LASER)])))),
         ("exchanged_frames", static_run(transform("laser", "base_link"))),
         ("leading_slash", static_run(transform("/base_link", "laser"))),

@@ -7,9 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from pydantic import TypeAdapter
 
 from grader.errors import AssignmentError
 from grader.spec.source import parse_source
+from sim.coordinates import RollPitchYaw
 from sim.description import Layout, NoReturn, SimulatorOptions
 from sim.motion import Pose
 
@@ -108,3 +110,22 @@ def test_reading_a_world_needs_neither_ros_nor_numpy() -> None:
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
     program = "import sys, sim.world, sim.description\nsys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
+
+
+def test_the_fixed_frames_are_those_of_a_turtlebot3() -> None:
+    burger = SimulatorOptions()
+    assert [(parent, child) for parent, child, *_ in burger.fixed_frames] == [
+        ("base_footprint", "base_link"),
+        ("base_link", "base_scan"),
+    ]
+    waffle = SimulatorOptions.model_validate(
+        {"robot": {"model": "waffle"}, "odometry": {"child_frame": "base_link"}}
+    )
+    [(parent, child, _, height_m)] = waffle.fixed_frames
+    assert (parent, child, height_m) == ("base_link", "base_scan", 0.122)
+
+
+def test_roll_pitch_and_yaw_are_written_as_they_are_read() -> None:
+    angles = TypeAdapter(RollPitchYaw)
+    read = angles.validate_python([0, "90 deg", "0.5 rad"])
+    assert angles.validate_json(angles.dump_json(read)) == read

@@ -15,10 +15,14 @@ from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.messages import following, messages
 from grader.checks.need import Need, Recorded, SimulatedRobot
 from grader.checks.timing import timing
-from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.explanation import cause_of, explain
-from grader.diagnosis.process.process_exit import why_ended
-from grader.diagnosis.wrong_transform import BadTransform, NoTransform, edge, volatile_static
+from grader.diagnosis.wrong_transform import (
+    BadTransform,
+    NoTransform,
+    edge,
+    refused_by_tf2,
+    why_gone,
+)
 from grader.findings.finding import Finding
 from grader.findings.value import FieldPath
 from grader.findings.wording import code
@@ -49,17 +53,17 @@ class EdgeParameters(Parameters):
     child: FrameName = Field(description="The child frame, `child_frame_id`.")
     topic: TopicName = Field("/tf", description="Topic of the transforms.")
 
-    def alone(self, recording: Recording, *, is_static: bool = False) -> Recording:
+    def alone(self, recording: Recording) -> Recording:
         """The run with these transforms as the only messages on their topic.
 
         The check ends here if there is none, or tf2 cannot use one.
         """
-        symptom = NoTransform(recording, self.topic, self.parent, self.child, is_static)
-        stop_if(volatile_static(symptom) if symptom.wanted else cause_of(symptom))
+        symptom = NoTransform(recording, self.topic, self.parent, self.child)
+        stop_if(refused_by_tf2(symptom) if symptom.wanted else cause_of(symptom))
         heard = (*recording.messages.values(), *recording.sent.values())
         known = {stamp_of(one.value) for items in heard for one in items}
         for one in symptom.wanted:
-            stop_if(explain(BadTransform(recording, one, is_static or one.stamp_ns in known)))
+            stop_if(explain(BadTransform(recording, one, known)))
         # Others may have come between: these are numbered anew.
         own = (
             replace(one.message, value=one.value, sequence=number)
@@ -92,9 +96,9 @@ def static(recording: Recording, parameters: Static) -> Finding:
     The publisher must be transient_local and stay until the end. A quaternion and its negative are
     the same rotation. The stamp does not count.
     """
-    alone = parameters.alone(recording, is_static=True)
+    alone = parameters.alone(recording)
     gone = f"{parameters.words} was sent, but its publisher is gone"
-    stop_if(why_unpublished(recording, parameters.topic, gone) or why_ended(recording, gone))
+    stop_if(why_gone(recording, parameters.topic, gone))
     place, turn = dict(zip("xyz", parameters.position, strict=True)), quaternion(*parameters.rpy)
     amounts = {f"translation.{axis}": parameters.tolerance for axis in place}
     # A part of a quaternion changes by at most half of the angle.

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Recorded
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.process.process_exit import why_crashed
 from grader.diagnosis.wrong_transform import edge, moment
 from grader.findings.finding import Finding
 from grader.findings.wording import code, codes, counted
-from grader.measure.transforms import roots, sent
+from grader.measure.transforms import Sent, roots, sent
 from grader.recording.model import Recording
 from grader.spec.name import FrameName, TopicName
 
@@ -45,37 +48,51 @@ def tree(recording: Recording, parameters: Tree) -> Finding:
     there = list(sent(recording, (parameters.topic, parameters.static_topic)))
     if not there:
         stop_if(why_silent(recording, parameters.topic))
-    parents = {one.child: one for one in reversed(there)}
+    cause = _why_wrong(recording, parameters, there) or _why_no_tree(recording, parameters, there)
+    stop_if(cause and (why_crashed(recording) or cause))
+    frames = {name for one in there for name in (one.parent, one.child)}
+    seen = f"{counted(len(frames), 'frame')} below {codes(roots(there))}"
+    return Finding.passed(parameters.asked_for, seen, moment(recording, there[0], "sent"))
+
+
+def _why_wrong(recording: Recording, parameters: Tree, there: Sequence[Sent]) -> Cause | None:
+    """What a single transform has that no tree may have."""
+    parents = {one.child: one.parent for one in reversed(there)}
     for one in there:
-        first = parents[one.child]
-        static = one.message.topic == parameters.static_topic
-        wrong, hint = "", ""
-        if one.parent != first.parent:
-            wrong = f"has two parents, {code(first.parent)} and {code(one.parent)}"
+        wrong = ""
+        if one.parent != parents[one.child]:
+            wrong = f"has two parents, {code(parents[one.child])} and {code(one.parent)}"
             hint = "A frame has one parent. Turn one of the transforms round, or leave it out."
         elif one.parent.startswith("/") or one.child.startswith("/"):
             wrong = "has a slash in front of a name"
             hint = "Frames are no topics: write their names without the slash."
-        elif parameters.static is not None and static != (one.child in parameters.static):
+        elif parameters.static is not None and (one.message.topic == parameters.static_topic) != (
+            one.child in parameters.static
+        ):
             wrong = f"is on {code(one.message.topic)}"
             hint = "What never changes is static, and sent once; what moves is not (REP-105)."
         if wrong:
             seen = f"{edge(one.parent, one.child)}: the frame {code(one.child)} {wrong}"
-            stop_if(Cause(seen, hint, moment(recording, one, "sent")))
-    evidence = moment(recording, there[0], "sent")
-    found = roots(there)
-    wanted = parameters.root
-    missing = [name for name in parameters.frames if name not in {*parents, *found}]
-    circle = next((f"{code(one)} is above itself: a circle" for one in found if one in parents), "")
-    if circle or len(found) != 1 or missing or wanted not in (None, *found):
-        lack = f"no frame {codes(missing, last='or')}" if missing else f"the root {codes(found)}"
-        several = f"{len(found)} trees, with the roots {codes(found)}"
-        return Finding.failed(
-            parameters.asked_for,
-            circle or (lack if len(found) == 1 else several),
-            "Publish a transform for each frame, from its parent. Each frame but the root is the "
-            "child of one transform. `ros2 run tf2_tools view_frames` draws them.",
-            evidence,
-        )
-    seen = f"{counted(len(parents) + 1, 'frame')} below {codes(found)}"
-    return Finding.passed(parameters.asked_for, seen, evidence)
+            return Cause(seen, hint, moment(recording, one, "sent"))
+    return None
+
+
+def _why_no_tree(recording: Recording, parameters: Tree, there: Sequence[Sent]) -> Cause | None:
+    """Why all transforms together are not the tree."""
+    children, found = {one.child for one in there}, roots(there)
+    missing = [name for name in parameters.frames if name not in {*children, *found}]
+    if children & set(found):
+        seen = f"{codes(children & set(found))} is above itself: a circle of frames"
+    elif len(found) > 1:
+        seen = f"{len(found)} trees, with the roots {codes(found)}"
+    elif missing:
+        seen = f"no frame {codes(missing, last='or')}"
+    elif parameters.root not in (None, *found):
+        seen = f"the root is {codes(found)}"
+    else:
+        return None
+    return Cause(
+        seen,
+        "Publish one transform for each frame but the root, from its parent.",
+        moment(recording, there[0], "sent"),
+    )

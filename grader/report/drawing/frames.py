@@ -7,7 +7,7 @@ from itertools import islice
 
 from markupsafe import Markup
 
-from grader.measure.transforms import Sent, roots, sent
+from grader.measure.transforms import Sent, is_static, roots, sent
 from grader.recording.model import NS, Recording
 from grader.report.drawing import svg
 
@@ -65,4 +65,4 @@ def _note(found: list[Sent]) -> str:
     first, last = found[0].message, found[-1].message
     span_s = (last.stamp_ns - first.stamp_ns) / NS
     moving = f"{(len(found) - 1) / span_s:.3g} Hz" if span_s > 0.0 else "once"
-    return "static" if first.topic.endswith("_static") else moving
+    return "static" if is_static(first.topic) else moving
