@@ -269,7 +269,7 @@ class TestFollows:
         [
             (lambda yaw: -yaw, "the yaw with the wrong sign"),
             (lambda yaw: yaw / 2, "half of the yaw"),
-            (lambda _: 0.0, "the same number in every message"),
+            (lambda _: 0.0, "from message to message"),
         ],
     )
     def test_a_wrong_heading_is_explained(self, turn: Any, words: str) -> None:
