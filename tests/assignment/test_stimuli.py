@@ -364,7 +364,7 @@ def serve(rest: str, name: str = "/go", type: str = "x/action/Drive") -> str:
     "stimulus",
     [
         serve(""),
-        serve("answers: [{when: {to.x: 1}, accept: false}, {takes: forever, cancel: reject}]"),
+        serve("answers: [{when: {to.x: 1}, status: rejected}, {takes: forever, cancel: reject}]"),
         serve("answers: [{feedback: [{distance: 30 cm}], every: 100 ms, status: aborted}]"),
         serve("answers: [{delay: forever}, {response: {success: true}}]", "/e", SET_BOOL),
         serve("after: 1 s", "/e", SET_BOOL),

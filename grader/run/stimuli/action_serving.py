@@ -69,7 +69,7 @@ class ServingAction(Serving):
 
     def _decide(self, message: Any) -> GoalResponse:
         number, answer = self.ask(message)
-        if answer is None or not answer["accept"]:
+        if answer is None or answer["status"] == "rejected":
             self.note(number, ends=True, status="rejected")
             return GoalResponse.REJECT
         self._goals.append(_Goal(message, number, answer))

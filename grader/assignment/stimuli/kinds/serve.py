@@ -74,7 +74,6 @@ class GoalAnswer(Answer):
 
     parts: ClassVar[dict[str, int]] = {"when": 0, "result": 1, "feedback": 2}
 
-    accept: bool = Field(True, description="Whether the goal is accepted.")
     takes: _Lasting = Field(
         0.0,
         description="Time from the acceptance to the end of the goal, by default as long as its "
@@ -85,7 +84,9 @@ class GoalAnswer(Answer):
         (), description="Feedback messages, one after another; the last one is repeated."
     )
     every: Duration = Field(0.1, description="Time between two feedback messages.")
-    status: Literal["succeeded", "aborted"] = Field("succeeded", description="How the goal ends.")
+    status: Literal["succeeded", "aborted", "rejected"] = Field(
+        "succeeded", description="How the goal ends; one that is `rejected` is never accepted."
+    )
     result: dict[str, Any] = Field(
         default_factory=dict, description="The fields of the result, whatever the status."
     )
@@ -95,6 +96,10 @@ class GoalAnswer(Answer):
     drive: DriveTo | None = Field(
         None, description="Drive the simulated robot to the pose of the goal, which then succeeds."
     )
+
+
+def _seconds(lasting: float | Literal["forever"]) -> float:
+    return math.inf if lasting == "forever" else lasting
 
 
 class Serve(StimulusModel):
@@ -139,17 +144,15 @@ class Serve(StimulusModel):
             inside = ("answers", number, *place)
             return read_message(value, self.type, find, making.drawn, inside)
 
-        found = answer.model_dump()
-        for key in ("delay", "takes"):
-            if found.get(key) == "forever":
-                found[key] = math.inf
+        found = {**answer.model_dump(), "delay": _seconds(answer.delay)}
         if isinstance(answer, GoalAnswer):
-            if "takes" not in answer.model_fields_set:
-                found["takes"] = len(answer.feedback) * answer.every
+            is_given = "takes" in answer.model_fields_set
+            lasts_s = len(answer.feedback) * answer.every
+            found["takes"] = _seconds(answer.takes) if is_given else lasts_s
             if answer.drive is not None:
                 read({answer.drive.to: {}}, 0, "drive", "to")
-            if answer.drive is not None and answer.drive.distance is not None:
-                read({answer.drive.distance: 0.0}, 2, "drive", "distance")
+                if answer.drive.distance is not None:
+                    read({answer.drive.distance: 0.0}, 2, "drive", "distance")
         for key, part in answer.parts.items():
             value = getattr(answer, key)
             if isinstance(value, tuple):
@@ -175,9 +178,9 @@ class ServeService(Serve):
     """Offer a service that the student's node calls.
 
     Each answer of the list is given once, in order, to a request with its `when`. The last one that
-    fits is given again and again. A request that none fits gets a response of zeros. Requests and
-    responses are in the recording's `served_calls`. Values may use `$name` of `random` and
-    quantities such as `30 deg`. The stimulus is `done` 1 s after every answer was given.
+    fits is given again and again. A request that none fits gets a response of zeros. Values may use
+    `$name` of `random` and quantities such as `30 deg`. What was asked is in the recording's
+    `asked`. The stimulus is `done` 1 s after every answer was given.
     """
 
     heading = "serve a service"
@@ -195,9 +198,9 @@ class ServeService(Serve):
 class ServeAction(Serve):
     """Offer an action that the student's node sends goals to.
 
-    Answers are chosen as those of a served service are. A goal that none fits is rejected. Goals,
-    cancel requests and what became of them are in the recording's `served_goals`. The stimulus is
-    `done` 1 s after every answer was given and its goal has ended.
+    Answers are chosen as those of a served service are. A goal that none fits is rejected. Goals
+    and cancel requests are in the recording's `asked`. The stimulus is `done` 1 s after every
+    answer was given and its goal has ended.
     """
 
     heading = "serve an action"
