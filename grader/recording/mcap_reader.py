@@ -19,6 +19,7 @@ from mcap_ros2.decoder import DecoderFactory
 from pydantic import TypeAdapter
 
 from grader.errors import UsageError
+from grader.recording.interface import FEEDBACK
 from grader.recording.mcap_writer import CHANNELS, FORMAT, JOIN, SENT, TOPIC, RawMessage
 from grader.recording.model import Message, Recording
 from grader.submission.record import SubmissionRecord
@@ -154,6 +155,9 @@ def _message(schema: Schema, channel: Channel, record: Record) -> Message:
 @lru_cache(maxsize=64)
 def _decoder(name: str, encoding: str, definition: bytes) -> Callable[[bytes], Any]:
     """The decoder of a type's messages; each recording of a class has the same types."""
+    if name.endswith(FEEDBACK):
+        # The library allows no underscore in the name of a message.
+        name, definition = name.replace("_F", "F"), definition.replace(b"_Feedback", b"Feedback")
     schema = Schema(id=0, name=name, encoding=encoding, data=definition)
     decode = DecoderFactory().decoder_for("cdr", schema)
     if decode is None:

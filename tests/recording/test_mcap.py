@@ -14,7 +14,8 @@ from mcap_ros2.decoder import DecoderFactory
 
 from grader.errors import UsageError
 from grader.recording.event import Disturbance, Intervention, Wait
-from grader.recording.interaction import Feedback, Goal, Service
+from grader.recording.interaction import Asked, Feedback, Goal, Service
+from grader.recording.interface import concatenated_definition, definition_finder
 from grader.recording.mcap_reader import read_recording
 from grader.recording.mcap_writer import RawMessage, write_recording
 from grader.recording.model import (
@@ -88,6 +89,10 @@ def a_recording(**changes: object) -> Recording:
             Call("/gone", "x/srv/Go", 2_800, request={}, error="no server"),
         ),
         services=(Service("/go", "x/srv/Go", "/bot_publisher", 1_650, 9_100),),
+        clients=(Service("/add", "x/srv/Add", "/bot_publisher", 1_660),),
+        asked=(
+            Asked("/add", "x/srv/Add", {"a": 1}, 2_000, "answered", None, FED, None, 2_010, {}),
+        ),
         goals=(Goal("/fib", "x/action/Fib", {"order": 2}, 3_000, True, 3_010, FED, STATUSES),),
         waits=(Wait("a node", 10.0, 1_000, 1_500),),
         joins=(Join("late", "/cmd_vel", "geometry_msgs/msg/Twist", Qos("reliable"), 4_000, 4_500),),
@@ -135,6 +140,23 @@ def test_messages_come_back_decoded_in_the_order_of_their_source_stamps(tmp_path
         "angular": {"x": 3.0, "y": 4.0, "z": 5.0},
     }
     assert second.value["angular"]["z"] == 0.5
+
+
+def test_the_feedback_of_an_action_is_a_message_like_any_other(tmp_path: Path) -> None:
+    share = tmp_path / "share"
+    for name, text in (
+        ("x/action/Fib.action", "int32 order\n---\n---\nint32[] sequence # so far\n"),
+        ("unique_identifier_msgs/msg/UUID.msg", "uint8[16] uuid\n"),
+    ):
+        (share / name).parent.mkdir(parents=True)
+        (share / name).write_text(text)
+    kind, topic = "x/action/Fib_FeedbackMessage", "/fib/_action/feedback"
+    definition = concatenated_definition(kind, definition_finder([tmp_path]))
+    cdr = CDR_HEADER + bytes(range(16)) + struct.pack("<I2i", 2, 5, 8)
+    message = RawMessage(topic, kind, cdr, 3_000, 3_050, 1)
+    write_recording(tmp_path / "run.mcap", a_recording(), [message], {kind: definition})
+    (found,) = read_recording(tmp_path / "run.mcap").on(topic)
+    assert (found.type, found.value["feedback"]) == (kind, {"sequence": [5, 8]})
 
 
 def test_a_message_of_other_bytes_than_its_type_has_is_counted_and_hurts_no_other(
