@@ -278,7 +278,7 @@ class TestFollows:
             return {**pose_of(time_s), "turn": facing(yaw)}
 
         found = failing("tf.follows", broadcasting(wrong), **OF_ODOMETRY)
-        assert words in found and "yaw(rotation)" in found
+        assert words in found and "Copy the newest pose" in found
 
     def test_exchanged_axes_are_explained(self) -> None:
         def wrong(time_s: float) -> dict[str, Any]:

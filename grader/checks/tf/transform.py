@@ -25,7 +25,8 @@ from grader.diagnosis.wrong_transform import (
 )
 from grader.findings.finding import Finding
 from grader.findings.value import FieldPath
-from grader.findings.wording import code
+from grader.findings.wording import code, listing
+from grader.measure.motion.quantities import degrees, metres
 from grader.measure.transforms import quaternion, stamp_of
 from grader.recording.model import Message, Recording
 from grader.recording.simulated import Truth
@@ -47,7 +48,6 @@ class EdgeParameters(Parameters):
     """Base of the parameters of a check of one transform."""
 
     needs: ClassVar[tuple[Need, ...]] = (Recorded(),)
-    asks = "{self.words}"
 
     parent: FrameName = Field(description="The parent frame, `header.frame_id`.")
     child: FrameName = Field(description="The child frame, `child_frame_id`.")
@@ -88,6 +88,10 @@ class Static(EdgeParameters):
     tolerance: PositiveLength = Field(0.01, description="Largest error of x, y and z.")
     angle: Angle = Field(0.02, description="Largest error of the rotation.")
 
+    def _asked(self) -> str:
+        place, turn = ", ".join(map(metres, self.position)), ", ".join(map(degrees, self.rpy))
+        return f"{self.words}: x, y, z = {place}; roll, pitch, yaw = {turn}"
+
 
 @check("tf.static", Subject.RECORDING, Static)
 def static(recording: Recording, parameters: Static) -> Finding:
@@ -99,7 +103,8 @@ def static(recording: Recording, parameters: Static) -> Finding:
     alone = parameters.alone(recording)
     gone = f"{parameters.words} was sent, but its publisher is gone"
     stop_if(why_gone(recording, parameters.topic, gone))
-    place, turn = dict(zip("xyz", parameters.position, strict=True)), quaternion(*parameters.rpy)
+    place = dict(zip("xyz", parameters.position, strict=True))
+    turn = {part: round(number, 6) for part, number in quaternion(*parameters.rpy).items()}
     amounts = {f"translation.{axis}": parameters.tolerance for axis in place}
     # A part of a quaternion changes by at most half of the angle.
     amounts |= {f"rotation.{part}": parameters.angle / 2.0 for part in turn}
@@ -107,7 +112,7 @@ def static(recording: Recording, parameters: Static) -> Finding:
     found = messages.equal.judge(
         alone, messages.Equal(topic=parameters.topic, value=wanted, tolerance=amounts)
     )
-    return replace(found, expected=f"{parameters.words}: {found.expected.partition(' (')[0]}")
+    return replace(found, expected=parameters.asked_for)
 
 
 class Broadcast(EdgeParameters):
@@ -156,6 +161,13 @@ class Follows(EdgeParameters):
     angle: Angle = Field(0.02, description="Largest error of each angle.")
     within: Duration = Field(0.2, description="Largest age of the pose.", validate_default=False)
 
+    def _asked(self) -> str:
+        source = (
+            f"of the pose on {code(self.source)}" if self.source else "of the robot's true pose"
+        )
+        limits = f"within {metres(self.tolerance)} and {degrees(self.angle)}"
+        return f"{self.words} has {listing(self.fields)} {source} ({limits})"
+
     def named_fields(self) -> Iterator[NamedFields]:
         """Those of the source."""
         for field, text in self.fields.items():
@@ -190,7 +202,11 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         within=parameters.within,
     )
     found = following.follows.judge(alone, wanted)
-    return replace(found, expected=f"{parameters.words}: {found.expected}")
+    hint = found.hint and (
+        "Copy the newest pose into translation and rotation of the transform, in the callback "
+        "that gets it."
+    )
+    return replace(found, expected=parameters.asked_for, hint=hint)
 
 
 def _odometry(one: Truth) -> dict[str, Any]:
