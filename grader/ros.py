@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+import sysconfig
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -95,6 +96,9 @@ class RosInstallation:
             ahead["LD_LIBRARY_PATH"] += [*(prefix / "lib" for prefix in self.prefixes), *libraries]
             # The wheels' start-up hook would set LD_LIBRARY_PATH and execute Python again.
             result["_ROS_WHEELS_BOOTSTRAP_COMPLETE"] = "1"
+            if "rclcpp" in self.packages:
+                # Libraries that every node loads have symbols which only an interpreter defines.
+                result["LD_PRELOAD"] = str(_libpython())
         for name, paths in ahead.items():
             parts = [*map(str, paths), *filter(None, result.get(name, "").split(os.pathsep))]
             if parts:
@@ -105,6 +109,20 @@ class RosInstallation:
 def site_packages(prefix: Path) -> list[Path]:
     """Folders of an install space that Python imports from."""
     return sorted(prefix.glob("lib/python3*/site-packages"))
+
+
+def _libpython() -> Path:
+    """The shared library of this Python."""
+    known = {name: str(value or "") for name, value in sysconfig.get_config_vars().items()}
+    name, folder = known["INSTSONAME"], Path(known["LIBDIR"])
+    for file in (folder / name, folder / known.get("MULTIARCH", "") / name):
+        if ".so" in name and file.is_file():
+            return file
+    version = f"{sys.version_info.major}.{sys.version_info.minor}"
+    raise GraderFault(
+        f"nodes in C++ need the shared library of Python, which is not here ({name}): sudo apt "
+        f"install libpython{version}"
+    )
 
 
 def is_sourced(environ: Mapping[str, str]) -> bool:

@@ -14,7 +14,7 @@ from grader.submission.underlay.store import UnderlayStore
 
 _MARK = "# Written by `rosgrade underlay`: runs ros2 from the underlay in rosgrade's cache."
 _NAMED = re.compile(r"\bros2 [a-z]")
-_PATHS = {"AMENT_PREFIX_PATH", "PYTHONPATH", "LD_LIBRARY_PATH"}
+_OF_PYTHON = ("PATH", "PYTHONNOUSERSITE")
 
 REMEDY = "`rosgrade underlay add ros2cli` builds it in about a minute, from sources on GitHub"
 
@@ -34,15 +34,12 @@ def write_command(ros: RosInstallation, store: UnderlayStore) -> Path | None:
         return None
     environment = replace(ros, underlays=tuple(prefix for _, prefix in kept)).environment({})
     lines = ["#!/bin/sh", _MARK]
-    for name in sorted(_PATHS & environment.keys()):
+    for name, value in sorted(environment.items()):
         # A workspace that was sourced in the shell comes first.
-        value = shlex.quote(environment[name])
-        lines.append(f'export {name}="${{{name}:+${name}:}}"{value}')
-    plain = ("ROS_DISTRO", "ROS_VERSION", "ROS_PYTHON_VERSION", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
-    lines += [f"export {name}={shlex.quote(environment[name])}" for name in plain]
-    lines.append(
-        f'exec {shlex.quote(str(ros.python))} {shlex.quote(str(program / "bin/ros2"))} "$@"'
-    )
+        sourced = f'"${{{name}:+${name}:}}"' if name.endswith("PATH") else ""
+        if name not in _OF_PYTHON:
+            lines.append(f"export {name}={sourced}{shlex.quote(value)}")
+    lines.append(f'exec {shlex.join([str(ros.python), str(program / "bin/ros2")])} "$@"')
     is_new = not file.exists()
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
     file.chmod(0o755)
