@@ -267,9 +267,8 @@ def _add_ros2(venv: Path, environ: Mapping[str, str]) -> None:
     except OSError as error:
         problem = str(error)
     if problem:
-        _say(
-            f"there is no ros2 yet ({problem}); to get it: {VENV}/bin/rosgrade underlay add ros2cli"
-        )
+        reason = problem.replace("rosgrade: error: ", "")
+        _say(f"no ros2 yet ({reason}); to get it: {VENV}/bin/rosgrade underlay add ros2cli")
 
 
 def _clean(environ: Mapping[str, str]) -> Dict[str, str]:

@@ -251,13 +251,14 @@ def test_a_set_up_without_the_sources_of_ros2_says_in_one_line_how_to_get_it(
 ) -> None:
     rosgrade = tmp_path / "bin/rosgrade"
     rosgrade.parent.mkdir()
-    rosgrade.write_text("#!/bin/sh\necho fetching >&2\necho 'no network' >&2\nexit 3\n")
+    rosgrade.write_text(
+        "#!/bin/sh\necho fetching >&2\necho 'rosgrade: error: no network' >&2\nexit 3\n"
+    )
     rosgrade.chmod(0o755)
     bootstrap._add_ros2(tmp_path, os.environ)
     told = capsys.readouterr().out.splitlines()
     assert told[1:] == [
-        "rosgrade: there is no ros2 yet (no network); to get it: "
-        ".venv/bin/rosgrade underlay add ros2cli"
+        "rosgrade: no ros2 yet (no network); to get it: .venv/bin/rosgrade underlay add ros2cli"
     ]
 
 

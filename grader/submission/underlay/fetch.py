@@ -117,13 +117,10 @@ def _git(arguments: list[str], folder: Path, wall_s: float, name: str) -> str:
     if done.ended_by_us:
         raise GraderFault(
             f"{name}: the server did not answer within {wall_s:.0f} s (git {arguments[0]}); try "
-            "again, or look at the network. What is complete stays"
+            "again later: what is complete stays"
         )
     if done.status:
         lines = done.output.strip().split("\n")
         reason = next((line for line in lines if line.startswith("fatal: ")), lines[-1])
-        raise GraderFault(
-            f"{name}: git {arguments[0]} failed: {reason.removeprefix('fatal: ')}. What is "
-            "complete stays"
-        )
+        raise GraderFault(f"{name}: git {arguments[0]} failed: {reason.removeprefix('fatal: ')}")
     return done.output
