@@ -14,7 +14,7 @@ from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import ended_early, why_crashed, why_ended
 from grader.findings.finding import Evidence, Moment
 from grader.findings.first_seen import endpoints_seen
-from grader.findings.wording import code, codes
+from grader.findings.wording import code, codes, counted
 from grader.measure import declarations
 from grader.measure.compatibility import refusals
 from grader.measure.transforms import Sent, is_static, sent
@@ -107,6 +107,25 @@ def refused_by_tf2(symptom: NoTransform) -> Cause | None:
         f"tf2 gets nothing from the publisher on {code(symptom.topic)} ({max(refused)})",
         _STATIC if is_static(symptom.topic) else _MOVING,
         Evidence(moments=endpoints_seen(symptom.recording, own)),
+    )
+
+
+@explanation(NoTransform)
+def overwritten(symptom: NoTransform) -> Cause | None:
+    """Late joiners miss it on /tf_static: its publisher keeps only messages that came later."""
+    recording, topic = symptom.recording, symptom.topic
+    queues = declarations.queues(recording, Kind.PUBLISHER, topic)
+    ends = (one for one in recording.endpoints if one.topic == topic)
+    alone = len(queues) == len([one for one in ends if one.kind is Kind.PUBLISHER]) == 1
+    depth = queues[0].depth if alone and queues[0].history == "keep_last" else None
+    kept = recording.on(topic)[-(depth or 0) :]
+    if not is_static(topic) or not symptom.wanted or symptom.wanted[-1].message in kept:
+        return None
+    return Cause(
+        "a node that starts later does not get it: the publisher keeps "
+        f"{counted(len(kept), 'message')}, and published others after it",
+        "Publish all static transforms in one message: sendTransform() takes a list.",
+        moment(recording, symptom.wanted[-1], "sent"),
     )
 
 

@@ -18,6 +18,8 @@ from grader.recording.model import Message, Qos, Recording
 from tests.checks.builder import (
     LAUNCH_NS,
     at,
+    declarations,
+    declared,
     died,
     drive,
     endpoint,
@@ -151,6 +153,21 @@ class TestStatic:
         volatile = Qos("reliable", "volatile", liveliness="automatic")
         found = failing("tf.static", static_run(right, qos=volatile), **PLACED)
         assert "durability volatile offered" in found and "TRANSIENT_LOCAL" in found
+
+    @pytest.mark.parametrize(("depth", "publishers"), [(1, 1), (2, 1), (1, 2)])
+    def test_a_later_message_must_not_take_its_place(self, depth: int, publishers: int) -> None:
+        right = transform("base_link", "laser", (0.1, 0.0, 0.2), TURNED)
+        sent = on(TF_STATIC, (0.7, [right]), (0.8, [transform("base_link", "camera")]))
+        queue = {"topic": TF_STATIC, "history": "keep_last", "depth": depth}
+        subject = run(
+            static=sent,
+            declarations=(*declarations(), *(declared("publisher", **queue),) * publishers),
+        )
+        if depth == publishers == 1:
+            found = failing("tf.static", subject, **PLACED)
+            assert "keeps 1 message, and published others after it" in found
+        else:
+            assert judge("tf.static", subject, **PLACED).status is Status.PASSED
 
     def test_another_process_may_end(self) -> None:
         right = transform("base_link", "laser", (0.1, 0.0, 0.2), TURNED)

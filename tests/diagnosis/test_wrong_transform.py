@@ -6,13 +6,15 @@ from typing import Any
 
 import pytest
 
+from grader.diagnosis.wrong_transform import NoTransform, overwritten
 from grader.recording.model import Recording
-from tests.checks.builder import RELIABLE, endpoint, judge
+from tests.checks.builder import RELIABLE, declared, endpoint, judge
 from tests.checks.test_tf import (
     CRASH,
     ODOM,
     PLACED,
     TF,
+    TF_STATIC,
     TIMES,
     broadcasting,
     on,
@@ -44,6 +46,14 @@ def test_a_static_transform_is_explained(name: str, subject: Recording) -> None:
     with answers() as found:
         judge("tf.static", subject, **PLACED)
     assert name in {entry.partition(".")[2] for entry in found}
+
+
+def test_a_transform_that_later_ones_replaced_is_explained() -> None:
+    # Asked directly by tf.static, for the transform is there.
+    queue = {"topic": TF_STATIC, "history": "keep_last", "depth": 1}
+    sent = on(TF_STATIC, (0.7, [transform(*LASER)]), (0.8, [transform("base_link", "camera")]))
+    subject = run(static=sent, declarations=(declared("publisher", **queue),))
+    assert overwritten(NoTransform(subject, TF_STATIC, *LASER)) is not None
 
 
 def test_a_wrong_stamp_is_explained() -> None:

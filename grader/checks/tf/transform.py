@@ -20,6 +20,7 @@ from grader.diagnosis.wrong_transform import (
     BadTransform,
     NoTransform,
     edge,
+    overwritten,
     refused_by_tf2,
     why_gone,
 )
@@ -59,7 +60,8 @@ class EdgeParameters(Parameters):
         The check ends here if there is none, or tf2 cannot use one.
         """
         symptom = NoTransform(recording, self.topic, self.parent, self.child)
-        stop_if(refused_by_tf2(symptom) if symptom.wanted else cause_of(symptom))
+        unheard = refused_by_tf2(symptom) or overwritten(symptom)
+        stop_if(unheard if symptom.wanted else cause_of(symptom))
         heard = (*recording.messages.values(), *recording.sent.values())
         known = {stamp_of(one.value) for items in heard for one in items}
         for one in symptom.wanted:
