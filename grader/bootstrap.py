@@ -252,15 +252,8 @@ def _install_lock(venv: Path, lock_text: str) -> None:
 def _add_ros2(venv: Path, environ: Mapping[str, str]) -> None:
     """Build the command `ros2`, which no wheel has, where its sources can be had; else say how."""
     _say("building the command ros2 (a minute; not where github.com cannot be reached)")
-    command = [
-        str(venv / "bin" / "rosgrade"),
-        "underlay",
-        "add",
-        "--quiet",
-        "--wait",
-        "10",
-        "ros2cli",
-    ]
+    rosgrade = str(venv / "bin" / "rosgrade")
+    command = [rosgrade, "underlay", "add", "--quiet", "--wait", "10", "ros2cli"]
     try:
         done = _run(command, _clean(environ))
         problem = "" if not done.returncode else (done.stdout.splitlines() or ["no reason"])[-1]
