@@ -17,7 +17,9 @@ from grader.findings.wording import code
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.spec.source import Model, read_source
+from grader.submission.read.rosdistro import PYTHON_MODULES
 from grader.submission.record import SourceError
+from grader.submission.underlay.definition import sets_with
 
 _LOG_LINES = 15
 
@@ -219,7 +221,9 @@ def machine_lacks_it(symptom: ProcessExit) -> Cause | None:
     if newer:
         name, needs = newer
     elif lacking:
-        name, needs = lacking, f"`sudo apt install ros-jazzy-{lacking.replace('_', '-')}`"
+        sets = ", ".join(sets_with(PYTHON_MODULES.get(lacking, (lacking,))))
+        apt = f"`sudo apt install ros-jazzy-{lacking.replace('_', '-')}`"
+        name, needs = lacking, f"`underlays: [{sets}]` in assignment.yaml" if sets else apt
     else:
         return None
     return Cause(

@@ -6,6 +6,7 @@ comes with rosgrade. The other keys are rosgrade's, and optional.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -79,6 +80,11 @@ class Underlay:
 def named_sets() -> tuple[str, ...]:
     """Names of the sets that come with rosgrade."""
     return tuple(sorted(file.stem for file in SETS.glob(f"*{SUFFIX}")))
+
+
+def sets_with(packages: Collection[str]) -> list[str]:
+    """The named sets that have one of some packages."""
+    return [name for name in named_sets() if not find_underlay(name).listed.isdisjoint(packages)]
 
 
 def find_underlay(given: str, beside: Path = Path()) -> Underlay:

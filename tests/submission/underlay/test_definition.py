@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.errors import AssignmentError, UsageError
-from grader.submission.underlay.definition import find_underlay, named_sets
+from grader.submission.underlay.definition import find_underlay, named_sets, sets_with
 
 REPOSITORY = "repositories:\n  a/b:\n    type: git\n    url: https://example.org/b.git\n"
 
@@ -51,3 +51,8 @@ def test_a_repository_without_a_version_is_refused_with_its_line(tmp_path: Path)
 def test_an_unknown_name_is_told_the_nearest(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"no underlay 'tf'\. Did you mean 'tf2'\?"):
         find_underlay("tf", tmp_path)
+
+
+def test_the_set_that_has_a_package_is_found() -> None:
+    assert sets_with({"tf2_ros_py", "turtlesim"}) == ["tf2"]
+    assert sets_with({"turtlesim"}) == []
