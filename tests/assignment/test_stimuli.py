@@ -45,7 +45,8 @@ DEFINITIONS = {
     "std_srvs/srv/SetBool": "bool data # switch\n---\nbool success\nstring message\n",
     "x/action/Fibonacci": "int32 order\n---\nint32[] sequence\n---\nint32[] sequence\n",
     "x/srv/Go": "geometry_msgs/Vector3 to\n---\n",
-    "x/action/Drive": "geometry_msgs/Vector3 to\n---\n---\nfloat32 distance\n",
+    "x/msg/Empty": "",
+    "x/action/Drive": "geometry_msgs/Vector3 to\nx/Empty head\n---\n---\nfloat32 distance\n",
     "bot_msgs/msg/Three": "uint8 ONE=1\nfloat64[3] values\nint8[<=2] few\nstring<=4 name\n",
 }
 
@@ -382,6 +383,7 @@ def test_servers_that_fit_are_read(found: Found, stimulus: str) -> None:
         (serve("answers: [{response: {}}]"), r"16: .*unknown key 'response'"),
         (serve("answers: [{takes: ever}]"), r"16: .*takes: .*forever"),
         (serve("answers: [{drive: {to: to, distance: to}}]"), r"16: .*no field 'to'. It has: dist"),
+        (serve("answers: [{drive: {to: head}}]"), r"16: .*'head' of the goal has no position"),
         (serve("answers: [{drive: {to: to}}]"), r"16: .*only in a 'world', which is missing"),
         (serve("") + serve(""), r"'/go' stands twice: give one server several 'answers'"),
         (serve("", type="std_msgs/msg/String"), r"an interface in srv or action"),

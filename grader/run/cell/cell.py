@@ -91,6 +91,7 @@ class Cell:
             from grader.run.cell.simulator import SimulatedRobot
 
             self._robot = SimulatedRobot(probe.node, order.simulator)
+        self._faults: list[str] = []
         self._context = StimulusContext(
             probe,
             self._graph,
@@ -99,11 +100,11 @@ class Cell:
             order.limits,
             self._start_again,
             self._waits,
+            self._faults,
             self._robot,
         )
         self._player = Player(order.stimuli, self._context)
         self._ending = EndingConditions(probe, self._output, self._robot, self._player)
-        self._faults: list[str] = []
         self._next_graph = 0.0
         self._matched_ns: int | None = None
 

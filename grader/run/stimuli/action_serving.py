@@ -58,10 +58,10 @@ class ServingAction(Serving):
             node,
             self._interface,
             self._order.name,
-            self._execute,
+            self.noting_faults(self._execute),
             callback_group=group,
-            goal_callback=self._decide,
-            cancel_callback=self._cancel,
+            goal_callback=self.noting_faults(self._decide),
+            cancel_callback=self.noting_faults(self._cancel),
         )
 
     def _of(self, handle: Any) -> _Goal:

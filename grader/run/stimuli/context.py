@@ -47,6 +47,7 @@ class StimulusContext:
     limits: RunLimits
     start: Callable[[str], None]
     waits: list[Wait]
+    faults: list[str]
     robot: SimulatedRobot | None = None
     asked: list[Asked] = field(default_factory=list)
     joins: dict[str, Join] = field(default_factory=dict)

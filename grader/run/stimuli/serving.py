@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -94,6 +94,19 @@ class Serving(Playing):
         through = len(self._given) == len(self._order.answers) and not waits
         return through and time.time_ns() - (self.last_ns or 0) > _LINGER_NS
 
+    def noting_faults(self, callback: Callable[..., Any]) -> Callable[..., Any]:
+        """The callback, whose exceptions make the run a fault: no client must lose by them."""
+
+        def called(*arguments: Any) -> Any:
+            try:
+                return callback(*arguments)
+            except Exception as error:
+                if self._context.probe.recording:
+                    self._context.faults.append(f"the server {self._order.name} failed: {error!r}")
+                raise
+
+        return called
+
     def ask(self, message: Any) -> tuple[int, Mapping[str, Any] | None]:
         """Note a request or a goal; its number, and the answer to it after its delay.
 
@@ -142,7 +155,8 @@ class ServingService(Serving):
     def create(self, node: Any, group: ReentrantCallbackGroup) -> None:
         """Create the service."""
         name = self._order.name
-        node.create_service(self._interface, name, self._answer, callback_group=group)
+        answer = self.noting_faults(self._answer)
+        node.create_service(self._interface, name, answer, callback_group=group)
 
     def _answer(self, message: Any, response: Any) -> Any:
         number, answer = self.ask(message)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
@@ -21,6 +21,8 @@ from grader.spec.name import InterfaceName, TopicName
 from grader.spec.quantity import Duration, DurationOrZero, Speed
 from grader.spec.source import Model
 
+_POSITIONS = ("x", "position.x", "pose.position.x", "pose.pose.position.x")
+"""Where messages of poses have their position."""
 _Lasting = DurationOrZero | Literal["forever"]
 _After = Annotated[
     DurationOrZero,
@@ -98,6 +100,14 @@ class GoalAnswer(Answer):
     )
 
 
+def _fits(read: Callable[..., Any], path: str) -> bool:
+    try:
+        read({path: 0.0}, 0)
+    except StimulusError:
+        return False
+    return True
+
+
 def _seconds(lasting: float | Literal["forever"]) -> float:
     return math.inf if lasting == "forever" else lasting
 
@@ -150,7 +160,11 @@ class Serve(StimulusModel):
             lasts_s = len(answer.feedback) * answer.every
             found["takes"] = _seconds(answer.takes) if is_given else lasts_s
             if answer.drive is not None:
-                read({answer.drive.to: {}}, 0, "drive", "to")
+                to = answer.drive.to
+                read({to: {}}, 0, "drive", "to")
+                if not any(_fits(read, f"{to}.{x}") for x in _POSITIONS):
+                    place: Place = ("answers", number, "drive", "to")
+                    raise StimulusError(f"the field {to!r} of the goal has no position", place)
                 if answer.drive.distance is not None:
                     read({answer.drive.distance: 0.0}, 2, "drive", "distance")
         for key, part in answer.parts.items():
