@@ -226,6 +226,7 @@ def _(need: needs.Recorded, user: _User) -> Iterator[_Lack]:
     topic, interface = user.value(need.topic), user.value(need.type)
     if topic is None or user.value(need.kind) == "subscription":
         return
+    topic += need.suffix
     for scenario in user.scenarios:
         recorded = scenario.recorded_types
         if need.or_sent:

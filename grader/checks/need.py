@@ -47,6 +47,8 @@ class Recorded(Need):
     """Parameter with its type, if the check expects one."""
     kind: str | None = None
     """Parameter with the student's end: messages to a subscription need not be recorded."""
+    suffix: str = ""
+    """Added to the parameter to get the name of the topic."""
     or_sent: bool = False
     """Whether a topic that a stimulus publishes on will do as well."""
 

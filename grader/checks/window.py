@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
 from grader.checks.check import NamedFields, Parameters
-from grader.checks.need import Called, Recorded, SimulatedRobot
+from grader.checks.need import Recorded, SimulatedRobot
 from grader.findings.fields import unlike, words
-from grader.findings.value import EXACT
+from grader.findings.value import EXACT, value_at
 from grader.findings.wording import code
-from grader.recording.model import NS, Call, Recording
+from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 from grader.spec.name import QualifiedNodeName, TopicName
 from grader.spec.unit import format_duration
@@ -22,14 +22,6 @@ Interval = tuple[int, int]
 """Beginning and end in ns; the end is not in it."""
 
 _STILL = 1e-3
-# What a transition leads to when it succeeds, by its label and by its id in lifecycle_msgs.
-_LEADS_TO = {
-    **dict.fromkeys(("configure", 1, "deactivate", 4), "inactive"),
-    **dict.fromkeys(("cleanup", 2), "unconfigured"),
-    **dict.fromkeys(("activate", 3), "active"),
-    **dict.fromkeys(("shutdown", "unconfigured_shutdown", "inactive_shutdown", 5, 6), "finalized"),
-    **dict.fromkeys(("active_shutdown", 7), "finalized"),
-}
 _ROBOT: dict[str, Callable[[Truth], bool]] = {
     "touches": lambda step: step.contact is not None,
     "moves": lambda step: max(abs(step.linear_m_s), abs(step.angular_rad_s)) > _STILL,
@@ -42,7 +34,7 @@ class Phase(Parameters):
 
     needs = (
         Recorded("message", or_sent=True),
-        Called("node", suffix="/change_state"),
+        Recorded("node", suffix="/transition_event"),
         SimulatedRobot("robot"),
     )
 
@@ -56,8 +48,8 @@ class Phase(Parameters):
     )
     lifecycle: Literal["unconfigured", "inactive", "active", "finalized"] | None = Field(
         None,
-        description="State of a lifecycle `node`, by the answers to the scenario's calls of "
-        "`change_state` and `get_state`.",
+        description="State of a lifecycle `node`, by its topic `transition_event`, which the "
+        "scenario records as `lifecycle_msgs/msg/TransitionEvent`.",
     )
     node: QualifiedNodeName | None = Field(None, description="The lifecycle node.")
     robot: Literal["touches", "moves", "rests"] | None = Field(
@@ -111,31 +103,11 @@ class Phase(Parameters):
             for line in sorted(recording.log, key=lambda one: one.time_ns):
                 if self.log.casefold() in line.text.casefold():
                     yield line.time_ns, True
-        else:
-            yield from (
-                (at_ns, state == self.lifecycle) for at_ns, state in self._states(recording)
-            )
-
-    def _states(self, recording: Recording) -> list[tuple[int, str]]:
-        """The node's states, and since when; an empty one from the request of a transition on."""
-        get, change = f"{self.node}/get_state", f"{self.node}/change_state"
-        born = [one.appeared_ns for one in recording.services if one.name == get]
-        found = [(at_ns, "unconfigured") for at_ns in born[:1]]
-        for call in recording.calls:
-            if call.service == change:
-                found.append((call.requested_ns, ""))
-            if call.service == change and (call.response or {}).get("success") is True:
-                found.append((call.answered_ns or 0, _LEADS_TO.get(transition(call), "")))
-            elif call.service == get and call.answered_ns is not None:
-                state = (call.response or {}).get("current_state", {})
-                found.append((call.answered_ns, state.get("label", "")))
-        return sorted(found, key=lambda one: one[0])
-
-
-def transition(call: Call) -> str | int:
-    """The label, or else the id, of the transition that a call of ``change_state`` asks for."""
-    asked: Mapping[str, Any] = (call.request or {}).get("transition", {})
-    return str(asked.get("label", "")) or int(asked.get("id", 0))
+        elif any(one.name == f"{self.node}/get_state" for one in recording.services):
+            yield recording.launched_ns, self.lifecycle == "unconfigured"
+            for event in recording.on(f"{self.node}/transition_event"):
+                state = value_at(event.value, "goal_state.label")
+                yield event.stamp_ns, state == self.lifecycle
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from grader.checks.window import Phase, Window, transition
+from grader.checks.lifecycle.lifecycle import transition, why_not_managed
+from grader.checks.window import Phase, Window
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.no_answer import why_unanswered
+from grader.diagnosis.no_endpoint import SERVICE
 from grader.diagnosis.no_messages import why_not_sent, why_silent
-from grader.diagnosis.no_node import why_not_node
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.fields import difference_words, unlike
 from grader.findings.finding import Evidence, Finding
@@ -19,6 +21,8 @@ from grader.findings.wording import code, counted, listing
 from grader.grade.model import SEVERITY
 from grader.recording.model import Kind, Owner, Recording
 from grader.recording.window import cut
+
+_ANSWER_S = 1.0
 
 
 def judged_in(
@@ -62,17 +66,29 @@ def _why_not(recording: Recording, phase: Phase) -> Cause:
         seen = f"none of {counted(len(messages), 'message')} on {code(topic)}: the last has {wrong}"
         shown = Evidence(moments=first_seen(recording, messages))
     elif phase.node is not None:
-        asked = [
-            f"{transition(one)} {'succeeded' if (one.response or {}).get('success') else 'failed'}"
-            for one in recording.calls
-            if one.service == f"{phase.node}/change_state"
-        ]
-        seen = f"{code(phase.node)} was never {phase.lifecycle}: {listing(asked, 'then')}"
-        hint = (
-            "Inherit from rclpy.lifecycle.LifecycleNode; on_configure() and the other callbacks "
-            "return TransitionCallbackReturn.SUCCESS."
-        )
-        missing = why_not_node(recording, phase.node)
+        missing = why_not_managed(recording, phase.node)
         if missing is not None:
             return missing
+        changes = [one for one in recording.calls if one.service == f"{phase.node}/change_state"]
+        answers = {True: "succeeded", False: "failed", None: "was not answered"}
+        results = [(one.response or {}).get("success") for one in changes]
+        steps = [
+            f"{transition(one)} {answers[result]}"
+            for one, result in zip(changes, results, strict=True)
+        ]
+        seen = f"{code(phase.node)} was never {phase.lifecycle}"
+        seen += f": {listing(steps, 'then')}" if steps else ""
+        if True in results and not recording.on(f"{phase.node}/transition_event"):
+            return Cause.to_repeat(f"{seen}, but the probe received none of its events")
+        bad = [one for one, result in zip(changes, results, strict=True) if result is not True]
+        if bad and bad[0].answered_ns is None:
+            asked = (SERVICE, bad[0].service, bad[0].requested_ns, _ANSWER_S)
+            return why_unanswered(recording, seen, *asked)
+        if bad:
+            hint = (
+                "The callbacks of transitions (on_configure, on_activate, ...) must return "
+                "TransitionCallbackReturn.SUCCESS."
+            )
+            # What failed later, or ended the process, came of it.
+            return Cause(seen, hint, shown)
     return why_ended(recording, seen) or Cause(seen, hint, shown)

@@ -15,10 +15,11 @@ packages:
 scenarios:
   - id: run
     launch: [{executable: bot}]
-    record: [{topic: /speed, type: std_msgs/msg/Float64}]
+    record:
+      - {topic: /speed, type: std_msgs/msg/Float64}
+      - {topic: /bot/transition_event, type: lifecycle_msgs/msg/TransitionEvent}
     stimuli:
       - {publish: /start, type: std_msgs/msg/Float64, message: {data: 1.0}}
-      - {call: /bot/change_state, type: lifecycle_msgs/srv/ChangeState}
     timeout: 9 s
 checks:
   - id: it
@@ -32,7 +33,7 @@ Found = Callable[..., list[str]]
 @pytest.fixture
 def found(mistakes: Callable[[str], list[str]], ros_with: Callable[..., None]) -> Found:
     """Load the lesson with a check that has a window."""
-    ros_with({"std_msgs/msg/Float64": "float64 data\n"})
+    ros_with({"std_msgs/msg/Float64": "float64 data\n", "lifecycle_msgs/msg/TransitionEvent": ""})
     return lambda window, uses=COUNT: mistakes(
         LESSON.replace("USES", uses) + "".join(f"    {line}\n" for line in window.splitlines())
     )
@@ -62,7 +63,10 @@ def test_a_window_that_can_open_is_accepted(found: Found, window: str) -> None:
         ("after: {message: /sped}", "after.message: the scenario 'run' does not record '/sped'."),
         ("after: {message: /speed, fields: {dat: 1}}", "after.fields: /speed (std_msgs/msg/Float6"),
         ("after: {message: /start, fields: {data: up}}", "'up' is expected of it"),
-        ("while: {lifecycle: inactive, node: bod}", "while.node: no stimulus of the scenario"),
+        (
+            "while: {lifecycle: inactive, node: bod}",
+            "does not record '/bod/transition_event'",
+        ),
         ("while: {lifecycle: inactive}", "'lifecycle' and 'node' go together"),
         ("while: {lifecycle: idle, node: bot}", "expected 'unconfigured', 'inactive', 'active' or"),
         ("while: {log: a, robot: moves}", "give one of: message, lifecycle, robot, log"),

@@ -13,7 +13,7 @@ from grader.checks.window import Phase, Window
 from grader.findings.finding import Finding, Status
 from grader.grade.windowed import judged_in
 from grader.recording.interaction import Service
-from grader.recording.model import Call, Ending, Recording
+from grader.recording.model import NS, Call, Ending, Recording
 from grader.recording.simulated import Truth
 from grader.recording.window import cut
 from tests.checks.builder import (
@@ -22,6 +22,7 @@ from tests.checks.builder import (
     at,
     died,
     every,
+    message,
     messages,
     output,
     recording,
@@ -33,6 +34,7 @@ from tests.checks.builder import (
 )
 
 NAMES = {"configure": 1, "cleanup": 2, "activate": 3, "deactivate": 4}
+LEADS_TO = {1: "inactive", 2: "unconfigured", 3: "active", 4: "inactive"}
 SILENT = ("messages.count", {"topic": "/cmd_vel", "exactly": 0})
 STEADY = ("timing.period", {"topic": "/cmd_vel", "period": "300 ms", "at_least": 4})
 
@@ -47,36 +49,35 @@ def judged(check: tuple[str, Mapping[str, Any]], run: Recording, **window: Any) 
     return judged_in(Window(**phases), entry.judge, run, parameters)
 
 
-def change(time_s: float, name: str, success: bool | None = True, by_id: bool = False) -> Call:
-    asked = {"id": NAMES[name], "label": "" if by_id else name}
+def change(time_s: float, name: str, success: bool | None = True) -> Call:
     return Call(
         f"{NODE}/change_state",
         "lifecycle_msgs/srv/ChangeState",
         at(time_s),
         None if success is None else at(time_s + 0.1),
-        {"transition": asked},
+        {"transition": {"id": NAMES[name], "label": ""}},
         None if success is None else {"success": success},
     )
 
 
-def asked_state(time_s: float, label: str) -> Call:
-    return Call(
-        f"{NODE}/get_state",
-        "lifecycle_msgs/srv/GetState",
-        at(time_s),
-        at(time_s + 0.01),
-        {},
-        {"current_state": {"id": 0, "label": label}},
-    )
-
-
-def managed(*calls: Call, times: Sequence[float] = (), **changes: Any) -> Recording:
+def managed(
+    *calls: Call, times: Sequence[float] = (), told: bool = True, **changes: Any
+) -> Recording:
+    """A lifecycle node that tells of each transition twice: when it begins, and at its end."""
     names = (f"{NODE}/change_state", f"{NODE}/get_state")
     services = tuple(Service(name, "x/srv/X", NODE, at(0.4)) for name in names)
-    return recording(calls=calls, services=services, messages=messages(times), **changes)
+    events = []
+    for one in calls if told else ():
+        began_s = (one.requested_ns - at(0)) / NS
+        succeeded = one.response is not None and one.response["success"]
+        done = LEADS_TO[(one.request or {})["transition"]["id"]] if succeeded else "errorprocessing"
+        events += [message(began_s + 0.01, {"goal_state": {"label": "changing"}})]
+        events += [message(began_s + 0.02, {"goal_state": {"label": done}})]
+    topics = {f"{NODE}/transition_event": tuple(events), **messages(times)}
+    return recording(calls=calls, services=services, messages=topics, **changes)
 
 
-def inactive(run: Recording, state: str = "inactive") -> list[tuple[float, float]]:
+def inactive(run: Recording, state: str = "inactive") -> list[tuple[float, ...]]:
     window = Window(while_=Phase(lifecycle=state, node=NODE))
     return [
         tuple(round(run.since_launch_s(one), 3) for one in interval)
@@ -92,21 +93,22 @@ class TestLifecycle:
     @pytest.mark.parametrize(
         ("state", "wanted"),
         [
-            ("unconfigured", [(0.4, 1.0)]),
-            ("inactive", [(1.1, 2.0), (3.1, 4.5)]),
-            ("active", [(2.1, 3.0)]),
+            ("unconfigured", [(0.4, 1.01)]),
+            ("inactive", [(1.02, 2.01), (3.02, 4.5)]),
+            ("active", [(2.02, 3.01)]),
             ("finalized", []),
         ],
     )
-    def test_a_state_lasts_from_the_answer_to_the_next_request(self, state, wanted):
+    def test_a_state_lasts_as_the_node_itself_tells(self, state, wanted):
         assert inactive(managed(*LIFE), state) == wanted
-        by_id = (change(1, "configure", by_id=True), change(2, "activate", by_id=True), LIFE[2])
-        assert inactive(managed(*by_id), state) == wanted
 
-    def test_after_a_failed_transition_the_state_is_what_the_node_says(self):
-        failed = (change(1, "configure"), change(2, "activate", success=False))
-        assert inactive(managed(*failed)) == [(1.1, 2.0)]
-        assert inactive(managed(*failed, asked_state(3, "inactive"))) == [(1.1, 2.0), (3.01, 4.5)]
+    def test_an_answer_that_comes_late_moves_no_window(self):
+        late = tuple(replace(one, answered_ns=at(4)) for one in LIFE)
+        assert inactive(managed(*late), "active") == [(2.02, 3.01)]
+
+    def test_what_the_node_told_but_the_probe_missed_is_no_mistake_of_the_student(self):
+        found = judged(SILENT, managed(*LIFE, told=False), while_=WHILE_INACTIVE)
+        assert found.status is Status.ERROR and found.disturbed
 
     def test_silent_while_inactive(self):
         good = managed(*LIFE, times=every(0.1, 8, 2.11))
@@ -123,21 +125,20 @@ class TestLifecycle:
         assert [moment.time_s for moment in found.evidence.moments] == [spoken_s]
 
     def test_a_message_during_the_transition_costs_nothing(self):
-        run = managed(*LIFE, times=[1.05, 2.05, 3.05])
+        run = managed(*LIFE, times=[1.015, 2.015, 3.015])
         assert judged(SILENT, run, while_=WHILE_INACTIVE).status is Status.PASSED
 
     @pytest.mark.parametrize(
         ("calls", "words"),
         [
             ((change(1, "configure", success=False),), "was never inactive: configure failed"),
-            ((change(1, "configure", success=None),), "was never inactive: configure failed"),
+            ((change(1, "configure", success=None),), "never inactive: configure was not answered"),
         ],
     )
     def test_a_state_that_never_comes_is_no_pass(self, calls, words):
         found = judged(SILENT, managed(*calls), while_=WHILE_INACTIVE)
         assert found.status is Status.FAILED
-        assert words in found.observed
-        assert "LifecycleNode" in found.hint
+        assert words in found.observed and found.hint
         assert found.expected == f"a time while `{NODE}` is inactive: this is judged then"
 
     def test_a_node_that_is_not_there_is_the_cause(self):
@@ -145,6 +146,17 @@ class TestLifecycle:
         found = judged(SILENT, managed(*LIFE), while_=other)
         assert found.status is Status.FAILED
         assert found.observed == "found the node `/bot_publisher`"
+
+    def test_an_ordinary_node_is_told_from_one_with_other_states(self):
+        found = judged(SILENT, recording(), while_=WHILE_INACTIVE)
+        assert "is no lifecycle node" in found.observed
+
+    def test_what_came_of_a_failed_transition_is_not_the_cause(self):
+        calls = (change(1, "configure", success=False), change(2, "activate", success=None))
+        run = managed(*calls, processes=(died(1, exited_s=2.1),), ending=Ending.EXITED)
+        found = judged(SILENT, run, while_=WHILE_INACTIVE)
+        assert "configure failed then activate was not answered" in found.observed
+        assert "ended" not in found.observed
 
     def test_a_process_that_ended_is_the_cause(self):
         run = managed(change(1, "configure", None), processes=(died(1),), ending=Ending.EXITED)
@@ -207,7 +219,7 @@ class TestTimes:
 
 class TestEvents:
     def test_a_log_record_counts_when_it_was_logged_not_when_it_was_read(self):
-        record = "[INFO] [1700000001.050000000] [bot]: ready"
+        record = "[INFO] [1700000001.015000000] [bot]: ready"
         run = managed(*LIFE, log=output(record, time_s=1.3))
         never = ("log.contains", {"text": "ready", "at_least": 0, "at_most": 0})
         assert judged(never, run, while_=WHILE_INACTIVE).status is Status.PASSED

@@ -21,6 +21,8 @@ from grader.recording.model import Call, Recording
 from grader.spec.name import QualifiedNodeName
 
 _ANSWER_S = 1.0
+# By their ids in lifecycle_msgs/msg/Transition.
+_TRANSITIONS = ("create", "configure", "cleanup", "activate", "deactivate", *("shutdown",) * 3)
 
 
 class State(Parameters):
@@ -51,26 +53,16 @@ def state(recording: Recording, parameters: State) -> Finding:
     lacks the package lifecycle_msgs, the check ends as an error.
     """
     node, service = parameters.node, f"{parameters.node}/get_state"
-    stop_if(why_not_node(recording, node))
-    if not offered(recording, SERVICE, service):
-        stop_if(
-            Cause(
-                f"{code(node)} is no lifecycle node: it has no service {code(service)}",
-                "Inherit from rclpy.lifecycle.LifecycleNode instead of Node.",
-                Evidence(moments=nodes_seen(recording)),
-            )
-        )
+    stop_if(why_not_managed(recording, node))
     calls = judged_calls(recording, service)
     stop_if(why_slow(recording, calls, _ANSWER_S))
-    seen = [_text(call.response, "current_state") for call in calls]
+    seen = [_state(call) for call in calls]
     if len(seen) < len(parameters.states):
         text = f"the scenario asks for the state only {counted(len(seen), 'time')}"
         return Finding.error(parameters.asked_for, text)
     changes = [call for call in recording.calls if call.service == f"{node}/change_state"]
     steps = [(call.requested_ns, f"is {label}") for call, label in zip(calls, seen, strict=True)]
-    steps += [
-        (call.requested_ns, f"transition {_text(call.request, 'transition')}") for call in changes
-    ]
+    steps += [(call.requested_ns, f"transition {transition(call)}") for call in changes]
     shown = timeline(recording, f"The lifecycle of {node}", steps)
     for number, (wanted, label) in enumerate(zip(parameters.states, seen, strict=False)):
         if label != wanted:
@@ -87,7 +79,7 @@ def _otherwise(
     hint = "The node must begin unconfigured, and must not change its state by itself."
     for call in last_change:
         if (call.response or {}).get("success") is not True:
-            observed += f", after the transition {_text(call.request, 'transition')} failed"
+            observed += f", after the transition {transition(call)} failed"
             hint = (
                 "The callback of a transition (on_configure, on_activate, ...) must return "
                 "TransitionCallbackReturn.SUCCESS, and call super() where it activates publishers."
@@ -95,7 +87,27 @@ def _otherwise(
     return Finding.failed(parameters.asked_for, observed, hint, shown)
 
 
-def _text(fields: Mapping[str, Any] | None, key: str) -> str:
-    """The label, or else the number, of a state or transition."""
-    found = (fields or {}).get(key, {})
+def _state(call: Call) -> str:
+    """The label, or else the number, of the state in an answer."""
+    found = (call.response or {}).get("current_state", {})
     return str(found.get("label") or found.get("id", ""))
+
+
+def transition(call: Call) -> str:
+    """The label of the transition that a call of ``change_state`` asks for."""
+    asked: Mapping[str, Any] = (call.request or {}).get("transition", {})
+    number = asked.get("id", 0)
+    return asked.get("label") or dict(enumerate(_TRANSITIONS)).get(number, str(number))
+
+
+def why_not_managed(recording: Recording, node: str) -> Cause | None:
+    """Why a lifecycle node is not there, or not one; None if it is."""
+    service = f"{node}/get_state"
+    missing = why_not_node(recording, node)
+    if missing is not None or offered(recording, SERVICE, service):
+        return missing
+    return Cause(
+        f"{code(node)} is no lifecycle node: it has no service {code(service)}",
+        "Inherit from rclpy.lifecycle.LifecycleNode instead of Node.",
+        Evidence(moments=nodes_seen(recording)),
+    )
