@@ -10,7 +10,7 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.explanation import Symptom, explanation
 from grader.diagnosis.no_endpoint import why_no_endpoint
-from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.no_messages import NoMessages, never_matched, why_silent
 from grader.diagnosis.process.process_exit import ended_early, why_crashed, why_ended
 from grader.findings.finding import Evidence, Moment
 from grader.findings.first_seen import endpoints_seen
@@ -57,6 +57,11 @@ class NoTransform(Symptom[Cause]):
         """Parent and child -> the first transform between them."""
         return {(one.parent, one.child): one for one in reversed(self.there)}
 
+    @property
+    def hint(self) -> str:
+        """What publishes on the topic as tf2 requests it."""
+        return _STATIC if is_static(self.topic) else _MOVING
+
     def instead(self, one: Sent | None, why: str, hint: str = _NAMES) -> Cause | None:
         """Another transform is there, if it is."""
         if one is None:
@@ -101,13 +106,9 @@ def refused_by_tf2(symptom: NoTransform) -> Cause | None:
     own = symptom.recording.student_endpoints(Kind.PUBLISHER, symptom.topic)
     requested = Qos("reliable", "transient_local" if is_static(symptom.topic) else "volatile")
     refused = [", ".join(refusals(one.qos, requested)) for one in own]
-    if not any(refused):
-        return None
-    return Cause(
-        f"tf2 gets nothing from the publisher on {code(symptom.topic)} ({max(refused)})",
-        _STATIC if is_static(symptom.topic) else _MOVING,
-        Evidence(moments=endpoints_seen(symptom.recording, own)),
-    )
+    seen = f"tf2 gets nothing from the publisher on {code(symptom.topic)}"
+    evidence = Evidence(moments=endpoints_seen(symptom.recording, own))
+    return Cause(f"{seen} ({max(refused)})", symptom.hint, evidence) if any(refused) else None
 
 
 @explanation(NoTransform)
@@ -133,8 +134,7 @@ def overwritten(symptom: NoTransform) -> Cause | None:
 def other_topic(symptom: NoTransform) -> Cause | None:
     """It is on /tf instead of /tf_static, or the other way round."""
     found = symptom.edges.get((symptom.parent, symptom.child))
-    hint = _STATIC if is_static(symptom.topic) else _MOVING
-    return symptom.instead(found, f"instead of {code(symptom.topic)}", hint)
+    return symptom.instead(found, f"instead of {code(symptom.topic)}", symptom.hint)
 
 
 @explanation(NoTransform)
@@ -154,9 +154,10 @@ def leading_slash(symptom: NoTransform) -> Cause | None:
 
 @explanation(NoTransform)
 def no_transform_at_all(symptom: NoTransform) -> Cause | None:
-    """Nothing is published on the topic, or only by the simulated robot."""
+    """Nothing is published on the topic, or only by others, such as the simulated robot."""
     recording, topic = symptom.recording, symptom.topic
     found = why_no_endpoint(recording, Kind.PUBLISHER, topic)
+    found = found or never_matched(NoMessages(recording, topic))
     return found or (None if recording.on(topic) else why_silent(recording, topic))
 
 

@@ -30,6 +30,7 @@ from tests.checks.builder import (
     process,
     recording,
     stimulus,
+    taken,
     traceback,
 )
 
@@ -168,6 +169,14 @@ class TestStatic:
             assert "keeps 1 message, and published others after it" in found
         else:
             assert judge("tf.static", subject, **PLACED).status is Status.PASSED
+
+    def test_where_the_machine_kept_the_publisher_from_its_match_the_run_is_repeated(self) -> None:
+        robot = transform("odom", "base_footprint")
+        held = declared("held", topic=TF_STATIC, matched=False)
+        busy = taken(0.1, 1.0, waited_s=0.9)
+        subject = static_run(robot, declarations=(*declarations(), held), disturbance=busy)
+        finding = judge("tf.static", subject, **PLACED)
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
 
     def test_another_process_may_end(self) -> None:
         right = transform("base_link", "laser", (0.1, 0.0, 0.2), TURNED)
@@ -361,7 +370,7 @@ class TestTree:
             ([("/map", "odom")], {}, "a slash in front"),
             (FRAMES, {"root": "odom"}, "the root is `map`"),
             (FRAMES, {"frames": ["camera"]}, "no frame `camera`"),
-            (FRAMES, {"static": ["laser"]}, "the frame `laser` is on `/tf`"),
+            (FRAMES, {"static": ["laser"]}, "of the frame `laser` is on `/tf`"),
         ],
     )
     def test_what_is_no_such_tree_fails(self, edges: Any, parameters: Any, words: str) -> None:

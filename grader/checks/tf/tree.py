@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from pydantic import Field
 
@@ -14,7 +14,7 @@ from grader.diagnosis.process.process_exit import why_crashed
 from grader.diagnosis.wrong_transform import edge, moment
 from grader.findings.finding import Finding
 from grader.findings.wording import code, codes, counted
-from grader.measure.transforms import Sent, roots, sent
+from grader.measure.transforms import Sent, is_static, roots, sent
 from grader.recording.model import Recording
 from grader.spec.name import FrameName, TopicName
 
@@ -48,51 +48,37 @@ def tree(recording: Recording, parameters: Tree) -> Finding:
     there = list(sent(recording, (parameters.topic, parameters.static_topic)))
     if not there:
         stop_if(why_silent(recording, parameters.topic))
-    cause = _why_wrong(recording, parameters, there) or _why_no_tree(recording, parameters, there)
-    stop_if(cause and (why_crashed(recording) or cause))
+    for seen, hint, one in _faults(parameters, there):
+        stop_if(why_crashed(recording) or Cause(seen, hint, moment(recording, one, "sent")))
     frames = {name for one in there for name in (one.parent, one.child)}
     seen = f"{counted(len(frames), 'frame')} below {codes(roots(there))}"
     return Finding.passed(parameters.asked_for, seen, moment(recording, there[0], "sent"))
 
 
-def _why_wrong(recording: Recording, parameters: Tree, there: Sequence[Sent]) -> Cause | None:
-    """What a single transform has that no tree may have."""
-    parents = {one.child: one.parent for one in reversed(there)}
+def _faults(parameters: Tree, there: Sequence[Sent]) -> Iterator[tuple[str, str, Sent]]:
+    """What is wrong with the tree, what to try, and a transform that shows it."""
+    parents, found = {one.child: one.parent for one in reversed(there)}, roots(there)
     for one in there:
-        wrong = ""
+        name, topic = code(one.child), one.message.topic
         if one.parent != parents[one.child]:
-            wrong = f"has two parents, {code(parents[one.child])} and {code(one.parent)}"
+            both = codes((parents[one.child], one.parent))
             hint = "A frame has one parent. Turn one of the transforms round, or leave it out."
-        elif one.parent.startswith("/") or one.child.startswith("/"):
-            wrong = "has a slash in front of a name"
+            yield f"the frame {name} has two parents, {both}", hint, one
+        if one.parent.startswith("/") or one.child.startswith("/"):
             hint = "Frames are no topics: write their names without the slash."
-        elif parameters.static is not None and (one.message.topic == parameters.static_topic) != (
-            one.child in parameters.static
-        ):
-            wrong = f"is on {code(one.message.topic)}"
+            yield f"{edge(one.parent, one.child)} has a slash in front of a name", hint, one
+        static = parameters.static
+        if static is not None and is_static(topic) != (one.child in static):
             hint = "What never changes is static, and sent once; what moves is not (REP-105)."
-        if wrong:
-            seen = f"{edge(one.parent, one.child)}: the frame {code(one.child)} {wrong}"
-            return Cause(seen, hint, moment(recording, one, "sent"))
-    return None
-
-
-def _why_no_tree(recording: Recording, parameters: Tree, there: Sequence[Sent]) -> Cause | None:
-    """Why all transforms together are not the tree."""
-    children, found = {one.child for one in there}, roots(there)
-    missing = [name for name in parameters.frames if name not in {*children, *found}]
-    if children & set(found):
-        seen = f"{codes(children & set(found))} is above itself: a circle of frames"
-    elif len(found) > 1:
-        seen = f"{len(found)} trees, with the roots {codes(found)}"
-    elif missing:
-        seen = f"no frame {codes(missing, last='or')}"
-    elif parameters.root not in (None, *found):
-        seen = f"the root is {codes(found)}"
-    else:
-        return None
-    return Cause(
-        seen,
-        "Publish one transform for each frame but the root, from its parent.",
-        moment(recording, there[0], "sent"),
-    )
+            yield f"the transform of the frame {name} is on {code(topic)}", hint, one
+    hint = "Publish one transform for each frame but the root, from its parent."
+    circle = [name for name in found if name in parents]
+    missing = [name for name in parameters.frames if name not in {*parents, *found}]
+    if circle:
+        yield f"{codes(circle)} is above itself: a circle of frames", hint, there[0]
+    if len(found) > 1:
+        yield f"{len(found)} trees, with the roots {codes(found)}", hint, there[0]
+    if missing:
+        yield f"no frame {codes(missing, last='or')}", hint, there[0]
+    if parameters.root not in (None, *found):
+        yield f"the root is {codes(found)}", hint, there[0]
