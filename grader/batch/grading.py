@@ -72,7 +72,6 @@ class Grading:
         check_installed(self._libraries)
         self._build_limits = _build_limits(loaded.assignment.build_limits)
         self._type_support = TypeSupport(loaded, runner.ros, cache)
-        self._type_support.check()
         self._scenarios = loaded.assignment.scenarios
         self._builds = threading.BoundedSemaphore(cpu_count())
         self._stop = threading.Event()

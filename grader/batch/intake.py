@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import subprocess
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +25,7 @@ from grader.batch.handed_in import (
 from grader.batch.roster import Roster, Student
 from grader.batch.roster_match import matched, unique
 from grader.errors import GraderFault, RosgradeError, SubmissionError, UsageError
+from grader.submission.git import run_git
 from grader.submission.intake.archive import SUFFIXES, unpack
 from grader.submission.intake.members import MIB, ArchiveLimits
 from grader.submission.intake.paths import shown
@@ -105,29 +105,11 @@ def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn |
 
 
 def _clone(url: str, target: Path) -> str:
-    safe = ["-c", "core.hooksPath=/dev/null", "-c", "protocol.ext.allow=never"]
     options = ["--quiet", "--depth", "1", "--no-recurse-submodules"]
-    quiet = {"GIT_TERMINAL_PROMPT": "0", "GIT_LFS_SKIP_SMUDGE": "1", "LC_ALL": "C"}
     try:
-        subprocess.run(
-            ["git", *safe, "clone", *options, "--", url, str(target)],
-            env={**os.environ, **quiet},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=_CLONE_LIMIT_S,
-            check=True,
-        )
-    except FileNotFoundError:
-        return "git is not installed"
-    except subprocess.TimeoutExpired:
-        return f"git clone took longer than {_CLONE_LIMIT_S:.0f} s"
-    except subprocess.CalledProcessError as error:
-        # Advice follows below the reason.
-        lines = error.stderr.strip().split("\n")
-        reason = next((line for line in lines if line.startswith("fatal: ")), lines[-1])
-        return f"git clone failed: {shown(reason.removeprefix('fatal: '))}"
+        run_git(["clone", *options, "--", url, str(target)], target.parent, _CLONE_LIMIT_S)
+    except GraderFault as fault:
+        return str(fault)
     return ""
 
 

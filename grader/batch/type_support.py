@@ -45,20 +45,17 @@ class TypeSupport:
     """The underlays of an assignment; nothing is built before they are asked for."""
 
     def __init__(self, loaded: LoadedAssignment, ros: RosInstallation, cache: Path) -> None:
-        """Set up; nothing is built yet."""
+        """Set up; nothing is built yet.
+
+        Raises:
+            MissingUnderlay: The assignment needs one that is not on this machine.
+        """
+        UnderlayStore(cache, ros).fetched(underlays_of(loaded))
         self._loaded = loaded
         self._ros = ros
         self._cache = cache
         self._lock = threading.Lock()
         self._found: dict[bool, RosInstallation] = {}
-
-    def check(self) -> None:
-        """See that all is there that has to be fetched.
-
-        Raises:
-            MissingUnderlay: It is not.
-        """
-        UnderlayStore(self._cache, self._ros).fetched(underlays_of(self._loaded))
 
     def student(self, on_build: Say = _silent) -> RosInstallation:
         """The ROS installation that submissions are built and run with."""

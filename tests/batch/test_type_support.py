@@ -92,9 +92,9 @@ def arms(folder: Path, more: str = "") -> LoadedAssignment:
 
 def test_an_underlay_that_is_not_there_ends_grading_before_it_begins(tmp_path: Path) -> None:
     installation = RosInstallation("wheels", tmp_path / "python", (tmp_path,))
-    support = TypeSupport(arms(tmp_path, "underlays: [tf2]\n"), installation, tmp_path)
+    loaded = arms(tmp_path, "underlays: [tf2]\n")
     with pytest.raises(MissingUnderlay, match=r"'tf2' .* rosgrade underlay add tf2$"):
-        support.check()
+        TypeSupport(loaded, installation, tmp_path)
 
 
 def test_an_underlay_that_does_not_exist_is_told_with_its_line(tmp_path: Path) -> None:
