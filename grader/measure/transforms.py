@@ -33,9 +33,9 @@ class Sent:
     @property
     def is_valid(self) -> bool:
         """Whether tf2 takes it: finite, and its quaternion has the length 1."""
-        length = math.fsum(part * part for part in self.value["rotation"].values())
+        length = math.hypot(*self.value["rotation"].values())
         finite = all(map(math.isfinite, self.value["translation"].values()))
-        return finite and abs(length - 1.0) <= _UNIT
+        return finite and abs(length * length - 1.0) <= _UNIT
 
 
 def is_static(topic: str) -> bool:

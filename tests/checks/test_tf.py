@@ -201,6 +201,8 @@ class TestStatic:
             ((0.1, 0.0, 0.2), (0.0, 0.0, TURNED[2], 0.0), "w is not set"),
             ((0.1, 0.0, 0.2), (0.0, 0.0, TURNED[2], 1.0), "w is not set"),
             ((math.nan, 0.0, 0.2), TURNED, "tf2 ignores the transform"),
+            ((0.1, 0.0, 0.2), (1.3e154,) * 4, "tf2 ignores the transform"),
+            ((0.1, 0.0, 0.2), (math.inf, 0.0, math.nan, 1.0), "tf2 ignores the transform"),
         ],
     )
     def test_wrong_numbers_are_explained(self, place: Any, turn: Any, words: str) -> None:
