@@ -94,7 +94,7 @@ class Interfaces:
     def _files(self, package: str, kind: str) -> Iterator[tuple[str, Path]]:
         own = [self.own[package]] if package in self.own else []
         for folder in (*own, *(prefix / "share" / package for prefix in self.prefixes or ())):
-            for file in sorted((folder / kind).glob(f"*.{kind}")):
+            for file in (folder / kind).glob(f"*.{kind}"):
                 yield fill_text(file.stem, self.values), file
 
 
