@@ -11,6 +11,7 @@ import shutil
 import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -101,9 +102,11 @@ class ScriptedRunner(Runner):
         self._outcomes: Iterator[Recording | Exception] = iter(outcomes)
         self.alone: list[bool] = []
         self.remaps: list[object] = []
+        self.scenarios: list[Any] = []
 
     def run(self, *arguments: object, alone: bool = False, **more: object) -> None:
         outcome = next(self._outcomes)
+        self.scenarios.append(arguments[1])
         self.alone.append(alone)
         self.remaps.append(more["remaps"])
         if isinstance(outcome, Exception):
@@ -154,6 +157,54 @@ def test_a_disturbed_run_is_repeated_alone(grade: Grade) -> None:
     assert graded.grade.full_points
     assert runner.alone == [False, True]
     assert graded.runs == {"run": 2}
+
+
+NAMED = (
+    YAML.replace(
+        "packages:",
+        """variables:
+  topic: {match: any, in: publishers, of: geometry_msgs/msg/Twist, example: /cmd_vel}
+  bot: {match: "{bot}", in: packages, column: Team, example: red}
+packages:""",
+    )
+    .replace("topic: /cmd_vel,", 'topic: "{topic}",')
+    .replace("{name: bot,", '{name: "{bot}",')
+)
+
+
+@pytest.fixture
+def named(tmp_path: Path) -> LoadedAssignment:
+    folder = tmp_path / "lesson"
+    folder.mkdir()
+    (folder / "assignment.yaml").write_text(NAMED, encoding="utf-8")
+    return load_assignment(folder)
+
+
+@pytest.mark.parametrize(("topic", "runs"), [("/cmd_vel", 1), ("/speed", 2)])
+def test_a_run_is_repeated_with_the_name_that_it_showed(
+    named: LoadedAssignment, tmp_path: Path, topic: str, runs: int
+) -> None:
+    right = recording()
+    run = dataclasses.replace(
+        right, endpoints=(dataclasses.replace(right.endpoints[0], topic=topic),)
+    )
+    runner = ScriptedRunner(*[run] * runs)
+    prepared = Prepared(record=SUBMISSION, install=tmp_path / "install")
+    graded = Grading(named, runner, tmp_path / "cache").grade_prepared(prepared, tmp_path)
+    assert graded.grade.full_points
+    assert [one.record[0].topic for one in runner.scenarios] == ["/cmd_vel", topic][:runs]
+
+
+def test_what_has_not_the_name_of_the_roster_is_not_run(
+    named: LoadedAssignment, tmp_path: Path
+) -> None:
+    record = dataclasses.replace(SUBMISSION, given=(("bot", "blue"),))
+    prepared = Prepared(record=record, install=None)
+    graded = Grading(named, ScriptedRunner(), tmp_path / "cache").grade_prepared(prepared, tmp_path)
+    assert graded.grade.graded and graded.grade.score == 0
+    assert "blue" in graded.grade.result("alive").decisive.finding.expected
+    again = regrade(named, find(tmp_path))
+    assert again.grade.assignment.packages[0].name == "blue"
 
 
 def test_a_wrong_name_is_put_right_in_one_more_run(tmp_path: Path) -> None:
