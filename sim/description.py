@@ -288,6 +288,14 @@ class SimulatorOptions(Model):
         scan = ("base_link", self.lidar.frame, self.lidar.pose, _SCAN_Z_M[robot])
         return [(base, "base_link", ORIGIN, _BASE_Z_M), scan] if base != "base_link" else [scan]
 
+    @property
+    def transforms(self) -> set[tuple[str, str]]:
+        """Parent and child of each transform that the robot publishes."""
+        if not self.topics.tf.enabled:
+            return set()
+        fixed = {(parent, child) for parent, child, _, _ in self.fixed_frames}
+        return {(self.odometry.frame, self.odometry.child_frame), *fixed}
+
     def start(self, world_start: Pose) -> Pose:
         """Where the robot starts in a world with this ``start``."""
         return self.robot.pose if self.robot.pose is not None else world_start

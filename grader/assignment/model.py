@@ -30,7 +30,7 @@ from grader.spec.name import (
 from grader.spec.quantity import Duration, DurationOrZero, PositiveLength, Ratio
 from grader.spec.source import Model
 from grader.spec.unit import parse_any
-from sim.description import LidarOptions, OdometryOptions, RobotOptions, Topics
+from sim.description import LidarOptions, OdometryOptions, RobotOptions, SimulatorOptions, Topics
 
 
 class RandomRange(Model):
@@ -263,6 +263,13 @@ class Scenario(Model):
         tf = self.topics.tf
         named = self.world is not None and "tf" in self.topics.model_fields_set and tf.enabled
         return {tf.topic: tf.durability, tf.static_topic: "transient_local"} if named else {}
+
+    @property
+    def simulator(self) -> SimulatorOptions:
+        """Everything about the simulator but the world."""
+        return SimulatorOptions(
+            robot=self.robot, lidar=self.lidar, odometry=self.odometry, topics=self.topics
+        )
 
     @property
     def recorded_types(self) -> dict[str, str]:

@@ -240,6 +240,18 @@ def _(need: needs.Recorded, user: _User) -> Iterator[_Lack]:
 
 
 @_lacks.register
+def _(need: needs.OwnTransform, user: _User) -> Iterator[_Lack]:
+    edge = user.value(need.parent), user.value(need.child)
+    for scenario in user.scenarios:
+        if scenario.world is not None and edge in scenario.simulator.transforms:
+            text = (
+                f"the robot of the scenario {scenario.id!r} publishes this transform itself: write "
+                "'topics: {tf: {enabled: false}}' there"
+            )
+            yield ("with", need.child), text
+
+
+@_lacks.register
 def _(need: needs.Published, user: _User) -> Iterator[_Lack]:
     for scenario in user.scenarios:
         topics = [one.publish for one in scenario.stimuli if isinstance(one, Publish)]

@@ -54,6 +54,15 @@ class Recorded(Need):
 
 
 @dataclass(frozen=True)
+class OwnTransform(Need):
+    """A transform that the simulated robot does not publish itself."""
+
+    words = "no simulated robot that publishes the transform from `{parent}` to `{child}`"
+    parent: str = "parent"
+    child: str = "child"
+
+
+@dataclass(frozen=True)
 class Published(Need):
     """A topic that a stimulus publishes on."""
 

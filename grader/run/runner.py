@@ -167,20 +167,13 @@ def _simulator(
     scenario: Scenario, worlds: Path, values: dict[str, float], seed: int
 ) -> SimulatorOrder | None:
     from grader.assignment.random_values import world_values
-    from sim.description import SimulatorOptions
 
     if scenario.world is None:
         return None
-    options = SimulatorOptions(
-        robot=scenario.robot,
-        lidar=scenario.lidar,
-        odometry=scenario.odometry,
-        topics=scenario.topics,
-    )
     return SimulatorOrder(
         world=str((worlds / scenario.world).resolve()),
         values=world_values(scenario, values),
-        options=options.model_dump_json(),
+        options=scenario.simulator.model_dump_json(),
         seed=seed,
     )
 

@@ -89,6 +89,13 @@ def test_checks_of_transforms_need_their_topics_a_pose_and_names_without_a_slash
     assert "90 has no unit" in told
 
 
+def test_what_the_robot_publishes_itself_is_not_asked_of_a_student(tmp_path: Path) -> None:
+    topics = "[{topic: /tf, type: tf2_msgs/msg/TFMessage}]"
+    edge = "parent: odom, child: base_footprint"
+    yaml = with_transforms("{}", f"tf.broadcast, with: {{{edge}, rate: 30 Hz}}", record=topics)
+    assert "publishes this transform itself: write 'topics: {tf:" in refused(tmp_path, yaml)
+
+
 def test_without_a_world_a_transform_needs_a_topic_to_follow(tmp_path: Path) -> None:
     topics = "[{topic: /tf, type: tf2_msgs/msg/TFMessage}]"
     edge = "parent: odom, child: base_footprint"

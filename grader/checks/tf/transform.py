@@ -13,7 +13,7 @@ from pydantic import Field
 
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.messages import following, messages
-from grader.checks.need import Need, Recorded, SimulatedRobot
+from grader.checks.need import Need, OwnTransform, Recorded, SimulatedRobot
 from grader.checks.timing import timing
 from grader.diagnosis.explanation import cause_of, explain
 from grader.diagnosis.wrong_transform import (
@@ -48,7 +48,7 @@ _POSE: dict[_Number, str] = {
 class EdgeParameters(Parameters):
     """Base of the parameters of a check of one transform."""
 
-    needs: ClassVar[tuple[Need, ...]] = (Recorded(),)
+    needs: ClassVar[tuple[Need, ...]] = (Recorded(), OwnTransform())
 
     parent: FrameName = Field(description="The parent frame, `header.frame_id`.")
     child: FrameName = Field(description="The child frame, `child_frame_id`.")
@@ -149,7 +149,7 @@ def broadcast(recording: Recording, parameters: Broadcast) -> Finding:
 class Follows(EdgeParameters):
     """Parameters of tf.follows."""
 
-    needs = (Recorded(), Recorded("source"), SimulatedRobot(unless="source"))
+    needs = (Recorded(), OwnTransform(), Recorded("source"), SimulatedRobot(unless="source"))
 
     source: TopicName | None = Field(
         None,
