@@ -114,7 +114,7 @@ class Package(Model):
 class Launch(Model):
     """A process to start like `ros2 run`, or a launch file to start like `ros2 launch`.
 
-    A launch file needs a sourced ROS 2: the wheels have no `ros2 launch`.
+    Where ROS 2 comes from wheels, a launch file needs `underlays: [launch]`.
     """
 
     executable: str | None = Field(None, description="Name of the executable (entry point).")
@@ -138,6 +138,11 @@ class Launch(Model):
     )
     arguments: tuple[str, ...] = Field(
         (), description="Arguments of the program; for a launch file `name:=value`."
+    )
+    after: DurationOrZero = Field(
+        0.0,
+        description="When it is started, counted from the start of the scenario. At least one of "
+        "its processes is started at once.",
     )
 
     @model_validator(mode="after")

@@ -69,6 +69,11 @@ def _scenario(assignment: Assignment, scenario: Scenario) -> Iterator[tuple[Plac
     for number, launch in enumerate(scenario.launch):
         for place, text in _launch(assignment, launch):
             yield ("launch", number, *place), text
+        if launch.after >= scenario.timeout:
+            limit = format_duration(scenario.timeout)
+            yield ("launch", number, "after"), f"the scenario ends after {limit} at the latest"
+    if all(launch.after > 0.0 for launch in scenario.launch):
+        yield ("launch",), "nothing is started at once: one launch is without 'after'"
     topics = [recorded.topic for recorded in scenario.record]
     for number, topic in enumerate(topics):
         if topic in topics[:number]:

@@ -16,10 +16,17 @@ GO = b"go\n"
 
 @dataclass(frozen=True)
 class ProcessCommand:
-    """A process of the student to start; its name is ``package/executable``."""
+    """A process of the student to start; its name is ``package/executable``.
+
+    Attributes:
+        after_s: When, in seconds since the start of the run.
+        is_launch_file: It starts others, as ``ros2 launch`` does.
+    """
 
     name: str
     argv: tuple[str, ...]
+    after_s: float = 0.0
+    is_launch_file: bool = False
 
 
 @dataclass(frozen=True)

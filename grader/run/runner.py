@@ -83,7 +83,8 @@ def launch_file_program(ros: RosInstallation, package: str, file: str) -> tuple[
             return (str(ros.python), str(ros2), "launch", package, file)
     raise GraderFault(
         f"{package}/{file} is a launch file, and this ROS ({ros.source}) has no `ros2 launch`: "
-        "source a ROS 2 Jazzy that has the package ros2launch"
+        "write `underlays: [launch]` into assignment.yaml, and get it with `rosgrade underlay add "
+        "launch`"
     )
 
 
@@ -107,11 +108,17 @@ def process_command(
     package = launch.package or assignment.packages[0].name
     if launch.executable is None:
         program = launch_file_program(ros, package, launch.program)
+        # It says itself how topics of its nodes are called.
+        topics = {}
     else:
         place = f"lib/{package}/{launch.executable}"
         program = _program(ros, install / files.get(place, place))
-    arguments = ros_arguments(launch, values, topics)
-    return ProcessCommand(name=f"{package}/{launch.program}", argv=(*program, *arguments))
+    return ProcessCommand(
+        name=f"{package}/{launch.program}",
+        argv=(*program, *ros_arguments(launch, values, topics)),
+        after_s=launch.after,
+        is_launch_file=launch.file is not None,
+    )
 
 
 def _program(ros: RosInstallation, file: Path) -> tuple[str, ...]:

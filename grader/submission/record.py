@@ -166,6 +166,8 @@ class PackageRecord:
         groups: Groups that package.xml makes it a member of (REP-149).
         cmake: Its CMakeLists.txt, or None.
         definitions: Its ``.msg``, ``.srv`` and ``.action`` files, and others beside them.
+        shared: What it installed in ``share/<package>/``, by paths in there -> path in the
+            submission of a Python file such as a launch file, else an empty text; at most 1000.
         registered: Whether ROS finds what was installed, in ament's index of packages.
         sources: What its Python code says; tests, launch files and setup.py left aside.
         lint: What ruff says of the same files, or None where it did not run.
@@ -192,6 +194,7 @@ class PackageRecord:
     cmake: str | None = None
     definitions: tuple[Definition, ...] = ()
     generated: tuple[Definition, ...] = ()
+    shared: tuple[tuple[str, str], ...] = ()
     registered: bool = True
     sources: tuple[SourceFile, ...] = ()
     lint: Lint | None = None

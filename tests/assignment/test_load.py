@@ -170,6 +170,16 @@ checks:
             "10: scenarios[0].launch[0]: the key 'package' is missing: there is not exactly one "
             "package (other, bot)",
         ),
+        (
+            "{executable: bot_pub}",
+            "{executable: bot_pub, after: 1 s}",
+            "9: scenarios[0].launch: nothing is started at once: one launch is without 'after'",
+        ),
+        (
+            "[{executable: bot_pub}]",
+            "[{executable: bot_pub}, {executable: bot_pub, after: 5 s}]",
+            "9: scenarios[0].launch[1].after: the scenario ends after 5 s at the latest",
+        ),
     ],
 )
 def test_a_launch_names_what_is_handed_in(found: Found, old: str, new: str, said: str) -> None:

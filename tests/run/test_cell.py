@@ -24,7 +24,7 @@ from grader.recording.model import NS, Ending, Kind, Owner, Recording
 from grader.run.environment import cell_environment
 from tests.checks.builder import judge
 from tests.run import nodes
-from tests.run.conftest import RunNode, running
+from tests.run.conftest import EXECUTABLE, RunNode, running
 
 pytestmark = pytest.mark.ros
 
@@ -374,3 +374,11 @@ def test_a_cell_that_is_stopped_is_a_fault_of_the_machine_within_bounds(
         run_node(nodes.timed(), progress, until={"elapsed": "300 s"}, timeout="300 s")
     assert time.monotonic() - began_s < 120.0
     assert run_node(nodes.timed()).ending is Ending.UNTIL
+
+
+def test_a_launch_with_after_starts_later_and_the_run_waits_for_it(run_node: RunNode) -> None:
+    later = {"executable": EXECUTABLE, "name": "second", "after": "1.5 s"}
+    source = nodes.timed()
+    recording = run_node(source, launch=[{"executable": EXECUTABLE}, later], until={"messages": 1})
+    first, second = recording.processes
+    assert second.started_ns - first.started_ns > 1.4 * NS

@@ -62,6 +62,20 @@ def test_what_ros2_run_and_python_find_is_listed(tree: Tree) -> None:
     assert found.origins == {"bot_publisher/node.py": "src/bot/bot_publisher/node.py"}
 
 
+def test_what_is_shared_is_told_with_the_students_launch_files(tree: Tree) -> None:
+    root = install(tree)
+    (root / "share/bot_publisher/launch").mkdir(parents=True)
+    (root / "share/bot_publisher/launch/bot.launch.py").write_text("y = 2\n")
+    (root / "share/bot_publisher/package.xml").touch()
+    sources = {"src/bot/launch/bot.launch.py": hash_of(b"y = 2\n")}
+    assert inspect(root, ["bot_publisher"], sources).shared == {
+        "bot_publisher": (
+            ("package.xml", ""),
+            ("launch/bot.launch.py", "src/bot/launch/bot.launch.py"),
+        )
+    }
+
+
 def test_links_pipes_and_giant_metadata_are_not_read(tree: Tree) -> None:
     root = install(tree)
     metadata = root / SITE / "bot_publisher-0.0.0-py3.12.egg-info/entry_points.txt"

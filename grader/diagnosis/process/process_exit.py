@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from grader.diagnosis.process.missing_library import lacking_package
 from grader.diagnosis.process.newer_names import newer_name
 from grader.diagnosis.process.raised import Failure, fatal_failure, in_brackets, student_place
 from grader.findings.finding import Evidence, Moment
-from grader.findings.wording import code
+from grader.findings.wording import code, codes
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.spec.source import Model, read_source
@@ -22,6 +23,10 @@ from grader.submission.record import SourceError
 from grader.submission.underlay.definition import sets_with
 
 _LOG_LINES = 15
+# As `ros2 launch` says it.
+_NO_LAUNCH_FILE = re.compile(
+    r"file '(?P<file>[^']+)' was not found in the share directory of package '(?P<package>[^']+)'"
+)
 
 
 class Table(Model):
@@ -181,6 +186,34 @@ def limit_exceeded(symptom: ProcessExit) -> Cause | None:
     if symptom.killed is not signal.SIGKILL or breach is None:
         return None
     return Cause(f"{symptom.seen}: {breach}", TABLE.hints[breach.what], symptom.evidence)
+
+
+@explanation(ProcessExit)
+def launch_file_not_installed(symptom: ProcessExit) -> Cause | None:
+    """The launch file is not installed: data_files in setup.py or install() in CMake lacks it."""
+    lines = (_NO_LAUNCH_FILE.search(line) for line in symptom.evidence.log)
+    found = next(filter(None, lines), None)
+    if found is None or symptom.failure is not None:
+        return None
+    name, package = found["file"], symptom.recording.submission.package(found["package"])
+    own = [path for path in symptom.recording.submission.files if path.endswith(f"/{name}")]
+    there = [path for path, _ in package.shared if "launch" in path] if package else []
+    seen = f"{symptom.seen}: the package {code(found['package'])} installed no {code(name)}"
+    if own:
+        seen += f", which is in the submission as {codes(own)}"
+    elif there:
+        seen += f"; it installed {codes(there)}"
+    if package and package.build_type == "ament_cmake":
+        how = "install(DIRECTORY launch DESTINATION share/${PROJECT_NAME}) in CMakeLists.txt"
+    else:
+        how = (
+            "in data_files of setup.py: ('share/' + package_name + '/launch', "
+            "glob('launch/*launch.*'))"
+        )
+    hint = f"A launch file has to be installed: write {how}, and build again."
+    return Cause(
+        seen, hint if own else f"Name the launch file {code(name)}. {hint}", symptom.evidence
+    )
 
 
 @explanation(ProcessExit)

@@ -170,6 +170,12 @@ def submission_path(installed: str, submission: SubmissionRecord) -> str | None:
     The longest of the known installed paths that the given path ends with wins.
     """
     known = [pair for package in submission.packages for pair in package.files]
+    known += [
+        (f"share/{package.name}/{new}", old)
+        for package in submission.packages
+        for new, old in package.shared
+        if old
+    ]
     fitting = [pair for pair in known if _ends_with(installed, pair[0])]
     return max(fitting, key=lambda pair: len(pair[0]))[1] if fitting else None
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from grader.recording.event import Wait
-from grader.recording.model import Ending, Endpoint, Kind, Owner, Recording
+from grader.recording.model import NS, Ending, Endpoint, Kind, Owner, Recording
 from grader.run.cell.domain import joined_domains
 from grader.run.cell.ending import EndingConditions, ExitBarrier
 from grader.run.cell.graph import GraphObserver
@@ -22,6 +22,7 @@ from grader.run.host.machine_faults import MachineFaults
 from grader.run.host.watchdog import Watchdog
 from grader.run.order import CellOrder, ProcessCommand
 from grader.run.process.descendants import Family
+from grader.run.process.launched import launched
 from grader.run.process.output import OutputReader
 from grader.run.process.student import StudentProcesses
 from grader.run.stimuli.context import StimulusContext
@@ -105,7 +106,10 @@ class Cell:
         )
         self._player = Player(order.stimuli, self._context)
         self._ending = EndingConditions(probe, self._output, self._robot, self._player)
+        # Started later, the first to start last.
+        self._later = sorted(order.commands, key=lambda one: one.after_s)[::-1]
         self._next_graph = 0.0
+        self._launched_ns = 0
         self._matched_ns: int | None = None
 
     def run(self) -> Recording:
@@ -114,7 +118,7 @@ class Cell:
         if self._watchdog is not None:
             self._watchdog.start()
         machine_faults = MachineFaults()
-        launched_ns = time.time_ns()
+        self._launched_ns = time.time_ns()
         try:
             ending = self._observe()
             self._probe.recording = False
@@ -131,7 +135,13 @@ class Cell:
         written = self._output.close(_PIPES_LIMIT_S)
         log = sorted((*written, *self._probe.logs), key=lambda line: line.time_ns)
         disturbance = self._meter.stop()
-        processes = self._students.records()
+        processes, lines, declarations = launched(
+            {one.name for one in self._order.commands if one.is_launch_file},
+            stop_ns,
+            self._students.records(),
+            log,
+            self._output.declarations,
+        )
         out_of_memory = machine_faults.out_of_memory(processes, breaches)
         ended = out_of_memory or self._students.ended_from_outside(breaches)
         found = (machine_faults.clock_was_set(), ended)
@@ -142,7 +152,7 @@ class Cell:
             scenario=self._order.scenario,
             seed=self._order.seed,
             ending=ending,
-            launched_ns=launched_ns,
+            launched_ns=self._launched_ns,
             matched_ns=self._matched_ns,
             stop_ns=stop_ns,
             end_ns=time.time_ns(),
@@ -150,8 +160,8 @@ class Cell:
             nodes=self._graph.nodes,
             endpoints=tuple(map(self._with_heartbeats, self._graph.endpoints)),
             processes=processes,
-            log=tuple(log),
-            declarations=self._output.declarations,
+            log=lines,
+            declarations=declarations,
             calls=tuple(sorted(calls, key=lambda call: call.requested_ns)),
             services=self._graph.services,
             clients=self._graph.clients,
@@ -209,8 +219,10 @@ class Cell:
         self._find_foreign()
         return Ending.FAULT if self._faults else ending
 
-    def _launch(self) -> Ending | None:
-        for command in self._order.commands:
+    def _launch(self, since_launch_s: float = 0.0) -> Ending | None:
+        """Start what is due; those of one time in the order of the scenario."""
+        while self._later and self._later[-1].after_s <= since_launch_s:
+            command = self._later.pop()
             tell("launching", process=command.name)
             try:
                 self._start(command)
@@ -220,6 +232,10 @@ class Cell:
                 )
                 return Ending.NOT_STARTED
         return None
+
+    def _all_ended(self) -> bool:
+        """Whether no process runs, and none is still to be started."""
+        return not self._students.poll() and not self._later
 
     def _start_again(self, name: str) -> None:
         self._probe.counts_servers = False
@@ -246,7 +262,7 @@ class Cell:
                 return None
             if self._faults:
                 return Ending.FAULT
-            if not self._students.poll():
+            if self._all_ended():
                 return self._last_look(seen)
             if watch.elapsed_s > limit_s:
                 return Ending.NO_NODE
@@ -278,11 +294,11 @@ class Cell:
                 return None
             if self._faults:
                 return Ending.FAULT
-            if not self._students.poll():
+            if self._all_ended():
                 return self._last_look(self._match)
             if self._graph.changed_ns != changed_ns:
                 changed_ns, since_change = self._graph.changed_ns, Stopwatch(self._meter)
-            if since_change.elapsed_s > settle_s:
+            if since_change.elapsed_s > settle_s and not self._later:
                 if not self._player.asks:
                     return Ending.NO_MATCH
                 # What it should publish is not there; it may still answer requests.
@@ -308,9 +324,10 @@ class Cell:
             self._match()
             if self._faults:
                 return Ending.FAULT
-            if self._ending.met(self._order.until, watch) or self._ending.is_over():
+            is_met = not self._later and self._ending.met(self._order.until, watch)
+            if is_met or self._ending.is_over():
                 return Ending.UNTIL
-            if not self._students.poll() and not self._player.keeps_run:
+            if self._all_ended() and not self._player.keeps_run:
                 # What a process published before it ended may still be on its way.
                 for _ in self._ticks_for(2 * _GRAPH_PERIOD_S):
                     pass
@@ -362,6 +379,8 @@ class Cell:
                 _raise_if_abandoned()
             self._exit_barrier.give()
             self._player.tick()
+            if self._later:
+                self._launch((time.time_ns() - self._launched_ns) / NS)
 
     def _find_foreign(self) -> None:
         names = sorted({n.name for n in self._graph.nodes if n.owner is Owner.FOREIGN})

@@ -2,13 +2,14 @@
 
 Python imports a module of this name at start, before the student's code. It wraps a few methods
 of rclpy once the student imports them, and reports each use as one JSON line on a pipe of the
-cell, which Python programs that this one starts get as well. It changes nothing else, with three
+cell, which Python programs that this one starts get as well. It changes nothing else, with four
 exceptions:
 
 - A publisher on a topic that the probe listens to is held until it is matched: a volatile
   publisher that publishes in a constructor otherwise writes before discovery has matched it.
 - A MultiThreadedExecutor that takes as many threads as there are CPUs gets four at least, and
   os.cpu_count() says four at least, because right code would look serial on a small machine.
+- `ros2 launch` shows the traceback of a launch file that raises.
 - An EventsExecutor of the wheels waits in slices, because without a limit it never calls anything.
 
 Only the standard library may be used here, as little as possible of it, and an error must
@@ -104,6 +105,20 @@ def _patch_multiprocessing(module: Any) -> None:
     module.spawnv_passfds = started
 
 
+def _patch_launch(module: Any) -> None:
+    """Show the traceback of a launch file that raises: without --debug, launch keeps it back."""
+    traceback = module.traceback
+
+    class Shown:
+        @staticmethod
+        def format_exc() -> str:
+            text: str = traceback.format_exc()
+            sys.stderr.write(text)
+            return text
+
+    module.traceback = Shown
+
+
 def _patch_rclpy(module: Any) -> None:
     # By name: it stands on this module.
     __import__("rosgrade_rclpy").PATCHES[module.__name__](module)
@@ -112,6 +127,7 @@ def _patch_rclpy(module: Any) -> None:
 _PATCHES = {
     "subprocess": _patch_subprocess,
     "multiprocessing.util": _patch_multiprocessing,
+    "launch.launch_service": _patch_launch,
     **dict.fromkeys(
         (
             "rclpy.context",

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
-from itertools import takewhile
+from itertools import islice, takewhile
 from pathlib import Path
 
 from grader.ros import site_packages
@@ -24,6 +24,7 @@ _INDEX = Path("share", "ament_index", "resource_index", "packages")
 _MAX_METADATA_BYTES = 256 * 1024
 _MAX_HASHED_BYTES = 16 * 2**20
 _MOST_COPIES = 100
+_MOST_SHARED = 1000
 _DISTRIBUTION = re.compile(r"(?P<name>.+?)-[^-]+(-py3[.\d]*)?\.(egg-info|dist-info)")
 
 
@@ -38,6 +39,8 @@ class InstallSpace:
             ``lib/<package>/...`` for scripts.
         origins: Path of each Python file -> the student's file that it was copied from.
         definitions: Package -> the interfaces that it generates.
+        shared: Package -> what is in ``share/<package>``, with the student's file of the same
+            content, for Python files.
         registered: Packages that are in ament's index of packages, where ROS looks for them.
     """
 
@@ -47,6 +50,7 @@ class InstallSpace:
     python: Mapping[str, str]
     origins: Mapping[str, str]
     definitions: Mapping[str, tuple[Definition, ...]]
+    shared: Mapping[str, tuple[tuple[str, str], ...]]
     registered: frozenset[str]
 
 
@@ -54,6 +58,7 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
     """Look at an install space; what is not a regular file there does not count."""
     executables = {}
     definitions = {}
+    shared = {}
     python: dict[str, str] = {}
     for package in packages:
         programs = list(regular_files(install / "lib" / package))
@@ -61,7 +66,14 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
             sorted({path.name for path in programs if os.access(path, os.X_OK)})
         )
         python |= {path.relative_to(install).as_posix(): _hash(path) for path in programs}
-        definitions[package] = tuple(_definitions(install / "share" / package))
+        share = install / "share" / package
+        definitions[package] = tuple(_definitions(share))
+        paths = list(islice(regular_files(share), _MOST_SHARED))
+        digests = {str(path): _hash(path) for path in paths if path.suffix == ".py"}
+        own = match_files(digests, sources)
+        shared[package] = tuple(
+            (path.relative_to(share).as_posix(), own.get(str(path), "")) for path in paths
+        )
     entry_points = {}
     for site in site_packages(install):
         modules = (path for path in regular_files(site) if path.suffix == ".py")
@@ -78,6 +90,7 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
         python,
         match_files(python, sources),
         definitions,
+        shared,
         frozenset(path.name for path in regular_files(install / _INDEX)),
     )
 

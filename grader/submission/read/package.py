@@ -270,6 +270,9 @@ def _with_executables(
             record,
             files=tuple(sorted(files)),
             generated=installed.definitions.get(package.name, ())[:_MOST_DEFINITIONS],
+            shared=tuple(
+                (shown(new), shown(old)) for new, old in installed.shared.get(package.name, ())
+            ),
             registered=package.name in installed.registered,
             executables=installed.executables.get(package.name, ()),
             misplaced_executables=tuple(

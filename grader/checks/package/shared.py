@@ -1,0 +1,55 @@
+"""Check of the files that a package installs beside its programs: launch files, parameters."""
+
+from __future__ import annotations
+
+from fnmatch import fnmatchcase
+
+from pydantic import Field
+
+from grader.checks.check import Subject, check, stop_if
+from grader.checks.package.package import OfPackage
+from grader.diagnosis.not_built import existing_package, why_not_built
+from grader.findings.finding import Finding
+from grader.findings.wording import code, codes
+from grader.submission.record import SubmissionRecord
+
+
+class File(OfPackage):
+    """Parameters of package.file."""
+
+    asks = "the package installs `share/{self.package}/{self.path}`"
+
+    path: str = Field(
+        min_length=1,
+        description="Path below `share/<package>/`, such as `launch/robot.launch.py`; `*` and `?` "
+        "stand for any text and any character, as in `config/*.yaml`.",
+    )
+
+
+@check("package.file", Subject.SUBMISSION, File)
+def file(submission: SubmissionRecord, parameters: File) -> Finding:
+    """The package installs a file, such as a launch file or a parameter file.
+
+    Judged by what the build installed in `share/<package>/`.
+    """
+    stop_if(why_not_built(submission, parameters.package))
+    package, asked = existing_package(submission, parameters.package), parameters.asked_for
+    installed = [path for path, _ in package.shared]
+    found = [path for path in installed if fnmatchcase(path, parameters.path)]
+    if found:
+        return Finding.passed(asked, f"it installs {codes(found)}")
+    if not installed:
+        # Each package installs its package.xml.
+        return Finding.error(asked, "what it installs was not recorded: grade again")
+    folder, _, name = parameters.path.rpartition("/")
+    handed_in = [path for path in submission.files if fnmatchcase(path.rpartition("/")[2], name)]
+    seen = f"it installs {codes(installed)}"
+    if handed_in:
+        seen = f"{codes(handed_in)} is handed in, but not installed; {seen}"
+    line = f"(os.path.join('share', package_name, '{folder}'), glob('{parameters.path}'))"
+    how = f"{code(line)} in data_files of setup.py"
+    if package.build_type == "ament_cmake":
+        line = f"install(DIRECTORY {folder} DESTINATION share/${{PROJECT_NAME}})"
+        how = f"{code(line)} in CMakeLists.txt"
+    hint = f"Write {how}."
+    return Finding.failed(asked, seen, hint if handed_in else f"Add the file. {hint}")

@@ -1,0 +1,57 @@
+"""package.file, and the explanation of a launch file that is not installed."""
+
+from __future__ import annotations
+
+from grader.findings.finding import Status
+from grader.recording.model import Ending
+from tests.checks.builder import died, failing, judge, output, package, recording, submission
+
+NAME = "bot_publisher"
+LAUNCH = {"package": NAME, "path": "launch/*.launch.py"}
+MANIFEST = ("package.xml", "")
+
+
+def test_an_installed_file_passes() -> None:
+    shared = (MANIFEST, ("launch/bot.launch.py", "src/bot_publisher/launch/bot.launch.py"))
+    finding = judge("package.file", submission(package(shared=shared)), **LAUNCH)
+    assert finding.status is Status.PASSED
+    assert "`launch/bot.launch.py`" in finding.observed
+
+
+def test_a_file_that_is_handed_in_but_not_installed_is_named() -> None:
+    subject = submission(package(shared=(MANIFEST,)), files=("bot/launch/bot.launch.py",))
+    text = failing("package.file", subject, **LAUNCH)
+    assert "`bot/launch/bot.launch.py` is handed in, but not installed" in text
+    assert "data_files" in text
+
+
+def test_a_missing_file_of_a_cmake_package_is_to_be_added_and_installed() -> None:
+    subject = submission(package(shared=(MANIFEST,), build_type="ament_cmake"))
+    text = failing("package.file", subject, **LAUNCH)
+    assert "Add the file" in text
+    assert "install(DIRECTORY launch DESTINATION" in text
+
+
+def test_a_record_from_before_there_was_this_check_is_an_error() -> None:
+    assert judge("package.file", submission(), **LAUNCH).status is Status.ERROR
+
+
+def test_launch_file_not_installed() -> None:
+    name = f"{NAME}/bot.launch.py"
+    said = (
+        f"file 'bot.launch.py' was not found in the share directory of package '{NAME}' which is "
+        "at '/ws/install/share/bot_publisher'"
+    )
+    for files, expected in (
+        (("src/launch/bot.launch.py",), "which is in the submission as `src/launch/bot.launch.py`"),
+        ((), "it installed `launch/robot.launch.py`"),
+    ):
+        shared = (("launch/robot.launch.py", ""),)
+        run = recording(
+            processes=(died(1, name=name),),
+            nodes=(),
+            ending=Ending.EXITED,
+            log=output(said, name=name),
+            submission=submission(package(shared=shared), files=files),
+        )
+        assert expected in failing("node.exists", run, name="/bot")
