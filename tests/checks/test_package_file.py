@@ -1,10 +1,9 @@
-"""package.file, and the explanation of a launch file that is not installed."""
+"""package.file."""
 
 from __future__ import annotations
 
 from grader.findings.finding import Status
-from grader.recording.model import Ending
-from tests.checks.builder import died, failing, judge, output, package, recording, submission
+from tests.checks.builder import failing, judge, package, submission
 
 NAME = "bot_publisher"
 LAUNCH = {"package": NAME, "path": "launch/*.launch.py"}
@@ -34,24 +33,3 @@ def test_a_missing_file_of_a_cmake_package_is_to_be_added_and_installed() -> Non
 
 def test_a_record_from_before_there_was_this_check_is_an_error() -> None:
     assert judge("package.file", submission(), **LAUNCH).status is Status.ERROR
-
-
-def test_launch_file_not_installed() -> None:
-    name = f"{NAME}/bot.launch.py"
-    said = (
-        f"file 'bot.launch.py' was not found in the share directory of package '{NAME}' which is "
-        "at '/ws/install/share/bot_publisher'"
-    )
-    for files, expected in (
-        (("src/launch/bot.launch.py",), "which is in the submission as `src/launch/bot.launch.py`"),
-        ((), "it installed `launch/robot.launch.py`"),
-    ):
-        shared = (("launch/robot.launch.py", ""),)
-        run = recording(
-            processes=(died(1, name=name),),
-            nodes=(),
-            ending=Ending.EXITED,
-            log=output(said, name=name),
-            submission=submission(package(shared=shared), files=files),
-        )
-        assert expected in failing("node.exists", run, name="/bot")
