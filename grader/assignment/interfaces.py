@@ -27,7 +27,6 @@ from grader.spec.nearest_name import did_you_mean, nearest_or_all
 from grader.spec.source import Source
 from grader.submission.read.rosdistro import PACKAGES
 from grader.submission.underlay.definition import find_underlay
-from grader.submission.underlay.store import UnderlayStore
 
 FOLDER = "interfaces"
 """Beside ``assignment.yaml``: our copy of the interface packages that the student writes."""
@@ -64,8 +63,12 @@ class Interfaces:
         files += [file for one in named if one.folder for file in one.folder.rglob(_MANIFEST)]
         try:
             installation = ros.find()
-            store = UnderlayStore(resources.cache_folder(), installation)
-            prefixes: Sequence[Path] | None = [*store.fetched(named), *installation.prefixes]
+            prefixes: Sequence[Path] | None = installation.prefixes
+            if named:
+                from grader.submission.underlay.store import UnderlayStore
+
+                store = UnderlayStore(resources.cache_folder(), installation)
+                prefixes = [*store.fetched(named), *installation.prefixes]
         except GraderFault:
             prefixes = None
         own = {fill_text(file.parent.name, values): file.parent for file in files}
