@@ -14,7 +14,7 @@ from grader.recording.interaction import Feedback
 from grader.run.stimuli.context import plays
 from grader.run.stimuli.driving import Target, command, distance_m, target
 from grader.run.stimuli.filling import filled, plain
-from grader.run.stimuli.serving import Serving
+from grader.run.stimuli.serving import ServeServiceOrder, Serving
 from sim.motion import Twist
 
 _STEP_S = 0.02
@@ -23,13 +23,8 @@ _ENDS = {"succeeded": "succeed", "aborted": "abort", "canceled": "canceled"}
 
 
 @dataclass(frozen=True)
-class ServeActionOrder:
-    """Offer an action; each answer has the keys of the YAML, times in s, perhaps infinite."""
-
-    name: str
-    type: str
-    answers: tuple[dict[str, Any], ...]
-    after_s: float = 0.0
+class ServeActionOrder(ServeServiceOrder):
+    """The same of an action."""
 
 
 @dataclass

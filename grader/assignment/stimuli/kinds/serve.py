@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -24,13 +24,6 @@ from grader.spec.source import Model
 _POSITIONS = ("x", "position.x", "pose.position.x", "pose.pose.position.x")
 """Where messages of poses have their position."""
 _Lasting = DurationOrZero | Literal["forever"]
-_After = Annotated[
-    DurationOrZero,
-    Field(
-        description="When the server appears, counted from the first match; by default before the "
-        "launch. A client that does not wait for it loses its request."
-    ),
-]
 
 
 class Answer(Model):
@@ -121,7 +114,11 @@ class Serve(StimulusModel):
     """The answer where none is given."""
 
     serve: TopicName = Field(description="Fully qualified name.")
-    after: _After = 0.0
+    after: DurationOrZero = Field(
+        0.0,
+        description="When the server appears, counted from the first match; by default before the "
+        "launch. A client that does not wait for it loses its request.",
+    )
     type: InterfaceName
     answers: tuple[Any, ...] = ()
 
