@@ -15,7 +15,7 @@ def test_launch_file_not_installed() -> None:
         "at '/ws/install/share/bot_publisher'"
     )
     for files, expected in (
-        (("src/launch/bot.launch.py",), "which is in the submission as `src/launch/bot.launch.py`"),
+        (("src/launch/bot.launch.py",), "which is handed in as `src/launch/bot.launch.py`"),
         ((), "it installed `launch/robot.launch.py`"),
     ):
         shared = (("launch/robot.launch.py", ""),)

@@ -10,7 +10,7 @@ from grader.checks.check import Subject, check, stop_if
 from grader.checks.package.package import OfPackage
 from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Finding
-from grader.findings.wording import code, codes
+from grader.findings.wording import codes
 from grader.submission.record import SubmissionRecord
 
 
@@ -42,14 +42,12 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding:
         # Each package installs its package.xml.
         return Finding.error(asked, "what it installs was not recorded: grade again")
     folder, _, name = parameters.path.rpartition("/")
-    handed_in = [path for path in submission.files if fnmatchcase(path.rpartition("/")[2], name)]
-    seen = f"it installs {codes(installed)}"
-    if handed_in:
-        seen = f"{codes(handed_in)} is handed in, but not installed; {seen}"
-    line = f"(os.path.join('share', package_name, '{folder}'), glob('{parameters.path}'))"
-    how = f"{code(line)} in data_files of setup.py"
+    own = [path for path in submission.files if fnmatchcase(path.rpartition("/")[2], name)]
+    seen = f"{codes(own)} is handed in, but not installed; " if own else ""
+    line = (
+        f"('share/{package.name}/{folder}', glob('{parameters.path}'))` in data_files of setup.py"
+    )
     if package.build_type == "ament_cmake":
-        line = f"install(DIRECTORY {folder} DESTINATION share/${{PROJECT_NAME}})"
-        how = f"{code(line)} in CMakeLists.txt"
-    hint = f"Write {how}."
-    return Finding.failed(asked, seen, hint if handed_in else f"Add the file. {hint}")
+        line = f"install(DIRECTORY {folder} DESTINATION share/${{PROJECT_NAME}})` in CMakeLists.txt"
+    hint = f"{'' if own else 'Add the file. '}Write `{line}."
+    return Finding.failed(asked, f"{seen}it installs {codes(installed)}", hint)

@@ -195,24 +195,19 @@ def launch_file_not_installed(symptom: ProcessExit) -> Cause | None:
     found = next(filter(None, lines), None)
     if found is None or symptom.failure is not None:
         return None
-    name, package = found["file"], symptom.recording.submission.package(found["package"])
+    name, package = found["file"], found["package"]
     own = [path for path in symptom.recording.submission.files if path.endswith(f"/{name}")]
-    there = [path for path, _ in package.shared if "launch" in path] if package else []
-    seen = f"{symptom.seen}: the package {code(found['package'])} installed no {code(name)}"
-    if own:
-        seen += f", which is in the submission as {codes(own)}"
-    elif there:
-        seen += f"; it installed {codes(there)}"
-    if package and package.build_type == "ament_cmake":
-        how = "install(DIRECTORY launch DESTINATION share/${PROJECT_NAME}) in CMakeLists.txt"
-    else:
-        how = (
-            "in data_files of setup.py: ('share/' + package_name + '/launch', "
-            "glob('launch/*launch.*'))"
-        )
-    hint = f"A launch file has to be installed: write {how}, and build again."
+    record = symptom.recording.submission.package(package)
+    there = [path for path, _ in record.shared if "launch" in path] if record else []
+    handed_in = f", which is handed in as {codes(own)}" if own else ""
+    installed = f"; it installed {codes(there)}" if there else ""
     return Cause(
-        seen, hint if own else f"Name the launch file {code(name)}. {hint}", symptom.evidence
+        f"{symptom.seen}: the package {code(package)} installed no {code(name)}"
+        f"{handed_in}{installed}",
+        f"Name the launch file {code(name)}, and install it: "
+        f"('share/{package}/launch', glob('launch/*')) in data_files of setup.py, or "
+        "install(DIRECTORY launch DESTINATION share/${PROJECT_NAME}) in CMakeLists.txt.",
+        symptom.evidence,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from grader.recording.model import Declaration, LogLine, Process
 
@@ -23,18 +23,11 @@ _PROGRAM = re.compile(r"\S+/lib/[^/\s]+/[^/\s]+(\s|$)")
 @dataclass
 class _Child:
     name: str
-    pid: int
     begun_ns: int
     died_ns: int | None = None
     exit_code: int = 0
-    command: str = ""
-    declared: list[Declaration] = field(default_factory=list)
-
-    @property
-    def has_node(self) -> bool:
-        names = [str(one.data.get("node")) for one in self.declared if one.kind == "node"]
-        # The command `ros2` hides its own.
-        return any(not name.rpartition("/")[2].startswith("_") for name in names)
+    is_program: bool = False
+    has_node: bool = False
 
 
 def launched(
@@ -54,58 +47,47 @@ def launched(
         stop_ns: When SIGINT was sent.
     """
     lines, declared, more = list(log), list(declarations), []
-    for process in processes:
-        if process.name not in files:
-            continue
-        children = _children(process, log, declarations)
-        for number, line in enumerate(lines):
-            match = _WRITTEN.fullmatch(line.text) if line.process == process.name else None
-            if match and match["name"] in {child.name for child in children.values()}:
-                # Which of both streams it was, launch does not say.
-                lines[number] = replace(
-                    line, process=match["name"], stream="stderr", text=match["text"]
-                )
-        own = {pid: child.name for pid, child in children.items() if child.has_node}
-        for position, item in enumerate(declared):
-            if item.process == process.name and item.data.get("pid") in own:
-                declared[position] = replace(item, process=own[item.data["pid"]])
-        # A program of a package that died may have had no node yet.
-        for child in children.values():
-            early = child.died_ns is not None and child.died_ns < stop_ns
+    for launch in (one for one in processes if one.name in files):
+        children: dict[int, _Child] = {}
+        for number, line in enumerate(log):
+            if line.process == launch.name:
+                lines[number] = _read(line, children, stop_ns)
+        for item in declarations:
+            # The command `ros2` hides its own nodes.
+            named = item.kind == "node" and "/_" not in str(item.data.get("node"))
+            if named and item.process == launch.name and item.data.get("pid") in children:
+                children[item.data["pid"]].has_node = True
+        nodes = {pid: child for pid, child in children.items() if child.has_node}
+        for number, item in enumerate(declarations):
+            if item.process == launch.name and item.data.get("pid") in nodes:
+                declared[number] = replace(item, process=nodes[item.data["pid"]].name)
+        for pid, child in children.items():
             if child.has_node:
-                started = {"pid": child.pid}
-                declared.append(Declaration(child.begun_ns, child.name, "started", started))
-            elif not (early and _PROGRAM.match(child.command)):
-                continue
-            more.append(_record(child, process, early=early))
+                declared.append(Declaration(child.begun_ns, child.name, "started", {"pid": pid}))
+            # A program that died may have had no node yet.
+            if child.has_node or (child.died_ns is not None and child.is_program):
+                more.append(_record(pid, child, launch))
     return (*processes, *more), tuple(lines), tuple(declared)
 
 
-def _children(
-    process: Process, log: Sequence[LogLine], declarations: Sequence[Declaration]
-) -> dict[int, _Child]:
-    """What a launch file started, by process id."""
-    found: dict[int, _Child] = {}
-    for line in log:
-        if line.process != process.name:
-            continue
-        if begun := _BEGUN.fullmatch(line.text):
-            pid = int(begun["pid"])
-            found[pid] = _Child(begun["name"], pid, line.time_ns)
-        elif (died := _DIED.fullmatch(line.text)) and int(died["pid"]) in found:
-            child = found[int(died["pid"])]
-            child.died_ns, child.exit_code = line.time_ns, int(died["code"])
-            child.command = died["command"]
-    for item in declarations:
-        if item.process == process.name and item.data.get("pid") in found:
-            found[item.data["pid"]].declared.append(item)
-    return found
+def _read(line: LogLine, children: dict[int, _Child], stop_ns: int) -> LogLine:
+    """Note what launch says of a process; a line that one of them wrote becomes its own."""
+    if begun := _BEGUN.fullmatch(line.text):
+        children[int(begun["pid"])] = _Child(begun["name"], line.time_ns)
+    died = _DIED.fullmatch(line.text) if line.time_ns < stop_ns else None
+    if died and (child := children.get(int(died["pid"]))):
+        child.died_ns, child.exit_code = line.time_ns, int(died["code"])
+        child.is_program = bool(_PROGRAM.match(died["command"]))
+    written = _WRITTEN.fullmatch(line.text)
+    if written and written["name"] in {child.name for child in children.values()}:
+        # Which of both streams it was, launch does not say.
+        return replace(line, process=written["name"], stream="stderr", text=written["text"])
+    return line
 
 
-def _record(child: _Child, launch: Process, *, early: bool) -> Process:
-    alike = replace(launch, name=child.name, pid=child.pid, started_ns=child.begun_ns, survivors=())
-    if not early:
-        return alike
-    return replace(
-        alike, exited_ns=child.died_ns, exit_code=child.exit_code, stopped_by="itself", stop_s=None
-    )
+def _record(pid: int, child: _Child, launch: Process) -> Process:
+    found = replace(launch, name=child.name, pid=pid, started_ns=child.begun_ns, survivors=())
+    if child.died_ns is None:
+        return found
+    found = replace(found, exited_ns=child.died_ns, exit_code=child.exit_code)
+    return replace(found, stopped_by="itself", stop_s=None)
