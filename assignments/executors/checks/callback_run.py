@@ -3,34 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from grader.findings.finding import Span
-from grader.recording.model import NS, Message, Recording
+from grader.measure import callback_runs
+from grader.measure.callback_runs import Run
+from grader.recording.model import Message, Recording
 
 _REPORT = re.compile(r"\s*(\S(?:.*\S)?)\s+(start|end)\s*")
-# Clocks of one machine may step by so much; what overlaps overlaps for much longer.
-_SLACK_NS = 1_000_000
-_MOST_SPANS = 400
-
-
-@dataclass(frozen=True)
-class Run:
-    """One call of a callback.
-
-    Attributes:
-        end_ns: Source timestamp of its end; None if none was reported.
-    """
-
-    callback: str
-    begin_ns: int
-    end_ns: int | None
-
-    @property
-    def seconds(self) -> float | None:
-        """How long it lasted."""
-        return None if self.end_ns is None else (self.end_ns - self.begin_ns) / NS
 
 
 @dataclass(frozen=True)
@@ -57,71 +38,20 @@ class Reports:
 
 
 def read_reports(messages: Sequence[Message]) -> Reports:
-    """Put starts and ends together.
-
-    Calls of one callback that overlap each other take equally long, so the first that began is
-    the first that ends.
-    """
-    began: dict[str, list[int]] = {}
-    runs: list[Run] = []
+    """Put starts and ends together."""
+    events: list[callback_runs.Event] = []
     strange: list[str] = []
-    orphans: list[str] = []
     for message in messages:
         text = message.value.get("data")
         found = _REPORT.fullmatch(text) if isinstance(text, str) else None
         if found is None:
             strange.append(str(text))
-            continue
-        callback, what = found.groups()
-        waiting = began.setdefault(callback, [])
-        if what == "start":
-            waiting.append(message.stamp_ns)
-        elif waiting:
-            runs.append(Run(callback, waiting.pop(0), message.stamp_ns))
         else:
-            orphans.append(callback)
-    runs += [Run(callback, begin_ns, None) for callback, all_ in began.items() for begin_ns in all_]
-    return Reports(
-        tuple(sorted(runs, key=lambda run: run.begin_ns)), tuple(strange), tuple(orphans)
-    )
-
-
-@dataclass(frozen=True)
-class Overlap:
-    """Two runs at the same time."""
-
-    one: Run
-    other: Run
-    seconds: float
-
-
-def overlaps(runs: Iterable[Run], least_s: float = 0.0) -> Iterator[Overlap]:
-    """Pairs of runs that overlap, in the order of their beginning.
-
-    Args:
-        least_s: How long they must overlap; beyond what clocks may be off.
-    """
-    active: list[Run] = []
-    for run in sorted(runs, key=lambda item: item.begin_ns):
-        active = [item for item in active if (item.end_ns or 0) > run.begin_ns]
-        for item in active:
-            both_ns = min(item.end_ns or 0, run.end_ns or 0) - run.begin_ns
-            if both_ns > _SLACK_NS and both_ns >= least_s * NS:
-                yield Overlap(item, run, both_ns / NS)
-        active.append(run)
+            events.append((found[1], found[2] == "start", message.stamp_ns))
+    runs, orphans = callback_runs.paired(events)
+    return Reports(tuple(runs), tuple(strange), tuple(orphans))
 
 
 def spans(recording: Recording, reports: Reports, wrong: Iterable[Run] = ()) -> tuple[Span, ...]:
-    """Runs as bars to draw; a run without an end lasts until the end of the observation."""
-    marked = set(wrong)
-    return tuple(
-        Span(
-            run.callback,
-            recording.since_launch_s(run.begin_ns),
-            recording.since_launch_s(
-                run.end_ns if run.end_ns is not None else max(recording.stop_ns, run.begin_ns)
-            ),
-            wrong=run in marked,
-        )
-        for run in reports.runs[:_MOST_SPANS]
-    )
+    """The reported runs as bars to draw."""
+    return callback_runs.spans(recording, reports.runs, wrong)

@@ -10,19 +10,13 @@ from grader.checks.check import Subject, check
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code, codes, counted, listing
 from grader.diagnosis.exchanged_executables import why_exchanged
+from grader.measure.callback_runs import Overlap, Run, overlaps
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
 
 from . import concurrency
-from .callback_run import (
-    Overlap,
-    Reports,
-    Run,
-    overlaps,
-    read_reports,
-    spans,
-)
+from .callback_run import Reports, read_reports, spans
 from .missing_reports import Reported, why_reports_are_missing
 
 

@@ -10,12 +10,13 @@ from pydantic import Field
 from grader.checks.check import Subject, check
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code, codes, counted
+from grader.measure.callback_runs import Run
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
 
 from . import concurrency
-from .callback_run import Reports, Run, read_reports, spans
+from .callback_run import Reports, read_reports, spans
 from .missing_reports import Reported, why_reports_are_missing
 
 # From and until when, in nanoseconds.

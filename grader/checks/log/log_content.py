@@ -88,7 +88,7 @@ def _number(text: str) -> str:
     return text
 
 
-def _printed(recording: Recording) -> list[LogLine]:
+def printed(recording: Recording) -> list[LogLine]:
     """Lines of output until the end of the observation that no logger wrote."""
     return [
         line
@@ -176,7 +176,7 @@ class Contains(Matching):
 
     def of(self, recording: Recording) -> list[Logged]:
         """The records, and what was printed if that counts."""
-        lines = _printed(recording) if self.printed else []
+        lines = printed(recording) if self.printed else []
         return sorted(
             [*super().of(recording), *(Logged(one.time_ns, "", "", one.text) for one in lines)],
             key=lambda item: item.time_ns,
@@ -233,7 +233,7 @@ def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]
     cause = cause or why_not_called(recording, seen, nodes)
     if cause is not None:
         return cause
-    lines = [line for line in _printed(recording) if parameters.says(line.text)]
+    lines = [line for line in printed(recording) if parameters.says(line.text)]
     if lines and not found:
         moment = Moment("printed", recording.since_launch_s(lines[0].time_ns))
         return Cause(
