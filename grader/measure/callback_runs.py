@@ -1,4 +1,4 @@
-"""Runs of callbacks: when each began and ended, as reported or logged."""
+"""Runs of callbacks: when each began and ended, as reported, logged or timed by the tracer."""
 
 from __future__ import annotations
 
@@ -18,11 +18,21 @@ _MOST_SPANS = 400
 
 @dataclass(frozen=True)
 class Run:
-    """One call of a callback; `end_ns` is None if no end was reported."""
+    """One call of a callback; only those that the tracer timed have what follows `end_ns`.
+
+    Attributes:
+        end_ns: When it ended; None if no end was reported.
+        serves: Name of the topic or the service; of a timer its period, such as ``0.5 s``.
+        group: Type and identity of its callback group.
+    """
 
     callback: str
     begin_ns: int
     end_ns: int | None
+    serves: str = ""
+    group: str = ""
+    pid: str = ""
+    thread: str = ""
 
     @property
     def seconds(self) -> float | None:
@@ -54,6 +64,18 @@ def paired(events: Iterable[Event]) -> tuple[list[Run], list[str]]:
     return sorted(runs, key=lambda run: run.begin_ns), orphans
 
 
+def timed(recording: Recording) -> list[Run]:
+    """The runs that the tracer timed; a process could have written anything."""
+    found = []
+    for item in recording.declared("ran"):
+        keys = ("callback", "serves", "group", "pid", "thread")
+        texts = {key: str(item.data.get(key)) for key in keys}
+        begin_ns, end_ns = item.data.get("began_ns"), item.data.get("ended_ns")
+        if isinstance(begin_ns, int) and isinstance(end_ns, int) and begin_ns <= end_ns:
+            found.append(Run(begin_ns=begin_ns, end_ns=end_ns, **texts))
+    return sorted(found, key=lambda run: run.begin_ns)
+
+
 @dataclass(frozen=True)
 class Overlap:
     """Two runs at the same time."""
@@ -64,7 +86,11 @@ class Overlap:
 
 
 def overlaps(runs: Iterable[Run], least_s: float = 0.0) -> Iterator[Overlap]:
-    """Pairs of runs that overlap by this or longer, in the order of their beginning."""
+    """Pairs of runs that overlap, in the order of their beginning.
+
+    Args:
+        least_s: How long they must overlap; beyond what clocks may be off.
+    """
     active: list[Run] = []
     for run in sorted(runs, key=lambda item: item.begin_ns):
         active = [item for item in active if (item.end_ns or 0) > run.begin_ns]
@@ -82,7 +108,9 @@ def spans(recording: Recording, runs: Iterable[Run], wrong: Iterable[Run] = ()) 
         Span(
             run.callback,
             recording.since_launch_s(run.begin_ns),
-            recording.since_launch_s(run.end_ns or max(recording.stop_ns, run.begin_ns)),
+            recording.since_launch_s(
+                run.end_ns if run.end_ns is not None else max(recording.stop_ns, run.begin_ns)
+            ),
             wrong=run in marked,
         )
         for run in tuple(runs)[:_MOST_SPANS]

@@ -7,7 +7,6 @@ written the line itself.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -56,6 +55,16 @@ def declares(recording: Recording, kind: str, process: str | None = None, **text
 def never_spun(recording: Recording, process: str | None = None) -> bool:
     """Whether the tracer was there and no executor ever waited for work."""
     return traced(recording, process) and not declares(recording, "spin", process)
+
+
+def executors(recording: Recording) -> tuple[tuple[str, int], ...]:
+    """Executors that were spun, each with its number of threads."""
+    found = []
+    for item in recording.declared("spin"):
+        name, number = item.data.get("executor"), item.data.get("threads")
+        if isinstance(name, str) and isinstance(number, int):
+            found.append((name, number))
+    return tuple(dict.fromkeys(found))
 
 
 def in_no_executor(recording: Recording, node: str) -> bool:
@@ -177,12 +186,6 @@ def changed_environment(recording: Recording) -> list[str]:
     """Environment variables of discovery that a program changed before rclpy.init()."""
     changed = sorted({_text(item.data, "changed") or "" for item in recording.declared("init")})
     return [name for text in changed for name in text.split()]
-
-
-def made_twice(recording: Recording) -> str:
-    """Fully qualified name of a node that one operating-system process made twice, or nothing."""
-    made = Counter((item.process, _text(item.data, "node")) for item in recording.declared("node"))
-    return next((name for (_, name), number in made.items() if name and number > 1), "")
 
 
 def process_of(recording: Recording, node: str) -> Process | None:

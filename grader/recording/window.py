@@ -18,8 +18,8 @@ Item = TypeVar("Item")
 def cut(recording: Recording, begin_ns: int, end_ns: int) -> Recording:
     """What was observed in ``[begin_ns, end_ns)``.
 
-    The graph, the processes, what they declare and the delays of the machine stay whole. Times
-    still count from the launch of the run.
+    The graph, the processes, what they declare (but for the runs of callbacks) and the delays of
+    the machine stay whole. Times still count from the launch of the run.
     """
 
     def inside(items: Iterable[Item], time_ns: Callable[[Item], int]) -> tuple[Item, ...]:
@@ -38,6 +38,11 @@ def cut(recording: Recording, begin_ns: int, end_ns: int) -> Recording:
         messages=streams(recording.messages),
         sent=streams(recording.sent),
         log=inside(recording.log, _written_ns),
+        declarations=tuple(
+            item
+            for item in recording.declarations
+            if item.kind != "ran" or begin_ns <= item.time_ns < end_ns
+        ),
         truth=inside(recording.truth, attrgetter("time_ns")),
         incidents=inside(recording.incidents, attrgetter("time_ns")),
         calls=inside(recording.calls, attrgetter("requested_ns")),

@@ -265,7 +265,7 @@ DECLARATIONS = st.builds(
     TIMES,
     PROCESSES,
     st.sampled_from(
-        ["started", "init", "node", "publisher", "timer", "spin", "held", "exiting", "?"]
+        ["started", "init", "node", "publisher", "timer", "spin", "held", "ran", "exiting", "?"]
     ),
     st.dictionaries(
         st.sampled_from(["topic", "depth", "history", "period_s", "node", "matched"]),

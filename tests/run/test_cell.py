@@ -99,6 +99,63 @@ def test_an_events_executor_calls_back(run_node: RunNode, spin: str) -> None:
     assert recording.processes[0].stopped_by == "SIGINT"
 
 
+_CALLBACKS = """
+class Worker(Node):
+    def __init__(self):
+        super().__init__("worker")
+        groups = {groups}
+        self.publisher = self.create_publisher(Twist, "cmd_vel", 10)
+        self.create_timer(0.2, self.work, callback_group=groups[0])
+        self.create_timer(0.001, lambda: None)
+        self.create_subscription(Twist, "cmd_vel", self.heard, 10, callback_group=groups[1])
+
+    def work(self):
+        self.publisher.publish(twist())
+        time.sleep(0.1)
+
+    async def heard(self, message):
+        self.get_logger().info("heard: start")
+        time.sleep(0.05)
+        print("heard: end", flush=True)
+
+rclpy.init()
+node = Worker()
+executor = MultiThreadedExecutor()
+{spin}
+"""
+
+
+@pytest.mark.parametrize("parallel", [True, False])
+def test_when_callbacks_run_and_in_which_groups(run_node: RunNode, parallel: bool) -> None:
+    imports = (
+        "from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup\n"
+        "from rclpy.executors import MultiThreadedExecutor\n"
+    )
+    groups = "[ReentrantCallbackGroup(), MutuallyExclusiveCallbackGroup()]"
+    source = imports + nodes.HEADER + _CALLBACKS.format(
+        groups=groups if parallel else "[None, None]",
+        spin="rclpy.spin(node, executor)" if parallel else "rclpy.spin(node)",
+    )  # fmt: skip
+    recording = run_node(source, until={"messages": 6})
+    named = ("/cmd_vel", "work")
+    kind, other = "MultiThreadedExecutor", "SingleThreadedExecutor"
+    found = {
+        "overlap": judge("executor.overlap", recording, callbacks=named),
+        "never": judge("executor.overlap", recording, callbacks=("heard", "200 ms"), never=True),
+        "itself": judge(
+            "executor.overlap", recording, callbacks=["heard"], never=True, log=["start", "end"]
+        ),
+        "kind": judge(
+            "executor.kind", recording, executor=kind, callbacks=named, groups="different"
+        ),
+        "single": judge("executor.kind", recording, executor=other, callbacks=named),
+    }
+    passed = {name for name, finding in found.items() if finding.status is Status.PASSED}
+    assert passed == {"itself"} | ({"overlap", "kind"} if parallel else {"never", "single"}), found
+    # A timer of 1 ms that does nothing floods nothing.
+    assert len(recording.declared("ran")) < 100
+
+
 def test_which_nodes_an_executor_was_given(run_node: RunNode) -> None:
     """Some before it spins, and one while it does."""
     executor = (

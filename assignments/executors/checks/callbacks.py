@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median
@@ -262,7 +263,8 @@ def _worked(recording: Recording, reports: Reports, from_ns: int, to_ns: int) ->
 
 def _made_twice(recording: Recording) -> str:
     """What to try where a process made a node twice, with all of its callbacks; else nothing."""
-    name = declarations.made_twice(recording)
+    made = Counter((item.process, str(item.data.get("node"))) for item in recording.declared("node"))
+    name = next((name for (_, name), number in made.items() if name and number > 1), "")
     return name and (
         f"The process made the node {code(name)} twice, and each has its own timers and "
         "subscriptions. Make it once, and hand this one to the executor."

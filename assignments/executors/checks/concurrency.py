@@ -7,19 +7,10 @@ from typing import Any
 
 from grader.findings.finding import Finding
 from grader.findings.wording import code, codes, listing
+from grader.measure.declarations import executors
 from grader.recording.model import Recording
 
 _EXCLUSIVE = "MutuallyExclusiveCallbackGroup"
-
-
-def executors(recording: Recording) -> tuple[tuple[str, int], ...]:
-    """Executors that were spun, each with its number of threads."""
-    found = []
-    for item in recording.declared("spin"):
-        name, number = item.data.get("executor"), item.data.get("threads")
-        if isinstance(name, str) and isinstance(number, int):
-            found.append((name, number))
-    return tuple(dict.fromkeys(found))
 
 
 def threads(recording: Recording) -> int:

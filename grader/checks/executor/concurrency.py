@@ -1,10 +1,12 @@
-"""The check of whether callbacks run at the same time, or never do."""
+"""Checks of how callbacks run: at the same time or never, in which executor and which groups."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
+from typing import Literal
 
 from pydantic import Field
 
@@ -13,33 +15,42 @@ from grader.checks.log.log_content import logged, printed
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.process.blocked_executor import why_not_called
 from grader.diagnosis.process.process_exit import why_ended
+from grader.diagnosis.undeclared import why_undeclared
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code, codes, counted, listing
-from grader.measure.callback_runs import Event, Run, overlaps, paired, spans
-from grader.measure.declarations import was_held_up
+from grader.measure.callback_runs import Event, Run, overlaps, paired, spans, timed
+from grader.measure.declarations import declares, executors, traced, was_held_up
 from grader.recording.model import NS, Recording
+from grader.spec.unit import Dimension, parse_quantity
 
-_HINT = (
-    "rclpy.spin(node) and a SingleThreadedExecutor run one callback at a time. When a "
-    "MultiThreadedExecutor spins, only callbacks of one MutuallyExclusiveCallbackGroup wait for "
-    "each other; without callback_group=... all are in one, the node's default group."
+_SINGLE, _MULTI = "SingleThreadedExecutor", "MultiThreadedExecutor"
+_EXCLUSIVE = "MutuallyExclusiveCallbackGroup"
+_CALLBACKS = (
+    "Each is a topic that the node subscribes to or a service that it offers (`/chatter`), the "
+    "period of a timer (`500 ms`), or the name of a function or method."
 )
+# How far a timer's period may be from that by which it is named.
+_SAME_PERIOD = 0.05
 
 
 class Overlap(Parameters):
     """Parameters of executor.overlap."""
 
     callbacks: tuple[str, ...] = Field(
-        min_length=1, description="Words for each callback in lines of the log, such as `timer_1`."
+        min_length=1, description=f"{_CALLBACKS} With `log`, the words for it in lines of the log."
     )
     never: bool = Field(False, description="Whether no two runs of them may overlap.")
     at_least: int = Field(2, ge=1, description="How often each must overlap; with `never`, run.")
-    log: tuple[str, str] = Field(
-        description="Words in the lines that a callback logs or prints when it starts and ends."
+    log: tuple[str, str] | None = Field(
+        None,
+        description="Words in the lines that callbacks log or print when they start and end, such "
+        "as `[start, end]`; by default rclpy itself declares when it calls them.",
     )
 
     def runs(self, recording: Recording) -> list[Run]:
-        """The complete runs of the callbacks."""
+        """The complete runs of the callbacks, under the names that they have here."""
+        if self.log is None:
+            return _named(recording, self.callbacks)
         return [run for run in paired(self._logged(recording, *self.log))[0] if run.end_ns]
 
     def _logged(self, recording: Recording, start: str, end: str) -> Iterator[Event]:
@@ -55,18 +66,32 @@ def _says(text: str, words: str) -> bool:
     return re.search(rf"(?<!\w){re.escape(words)}(?!\w)", text, re.IGNORECASE) is not None
 
 
+def _named(recording: Recording, names: Sequence[str]) -> list[Run]:
+    runs = timed(recording)
+    return [replace(run, callback=name) for run in runs for name in names if _is(run, name)]
+
+
+def _is(run: Run, name: str) -> bool:
+    try:
+        period_s, named_s = (parse_quantity(one, Dimension.TIME) for one in (run.serves, name))
+    except ValueError:
+        return name in (run.serves, run.callback, run.callback.rpartition(".")[2])
+    return abs(period_s - named_s) <= _SAME_PERIOD * named_s
+
+
 @check("executor.overlap", Subject.RECORDING, Overlap)
 def overlap(recording: Recording, parameters: Overlap) -> Finding:
     """Callbacks run at the same time, or never do.
 
     Each of the named callbacks must overlap with another of them, a single one with itself. With
-    `never`, no two of their runs may overlap.
+    `never`, no two of their runs may overlap. Only the first 1,000 runs of a process are declared.
     """
     names, never, least = parameters.callbacks, parameters.never, parameters.at_least
     expected = f"{codes(names)} {'never ' * never}running at the same time"
     expected += f", in {counted(least, 'run')} of each" if never else f", {least} times or more"
     runs = parameters.runs(recording)
-    missing = _why_missing(recording, names, runs, least if never else 1)
+    declared = parameters.log is None
+    missing = _why_missing(recording, names, runs, least if never else 1, declared=declared)
     if missing is not None:
         return missing.finding(expected)
     found = [(both.one, both.other) for both in overlaps(runs)]
@@ -76,14 +101,14 @@ def overlap(recording: Recording, parameters: Overlap) -> Finding:
     parts = [f"{code(name)} overlaps {counted(numbers[name], 'time')}" for name in names]
     observed = f"{counted(len(runs), 'run')}: {listing(parts)}"
     wrong = [run for both in found for run in both] if never else []
-    moment = Moment("one runs", recording.since_launch_s((wrong or runs)[0].begin_ns))
-    evidence = Evidence((moment,), spans=spans(recording, runs, wrong))
+    begin_s = recording.since_launch_s((wrong or runs)[0].begin_ns)
+    evidence = Evidence((Moment("one runs", begin_s),), spans=spans(recording, runs, wrong))
     if not found if never else min(numbers.values()) >= least:
         return Finding.passed(expected, observed, evidence)
     prevented = sum(_was_held_up(recording, one, other) for one, other in pairwise(runs))
     if not never and min(numbers.values()) + prevented >= least:
         return Finding.to_repeat(expected, f"{observed}, but the machine held callbacks up")
-    return Finding.failed(expected, observed, _HINT, evidence)
+    return Finding.failed(expected, observed, _hint(recording, runs, together=not never), evidence)
 
 
 def _was_held_up(recording: Recording, one: Run, other: Run) -> bool:
@@ -94,17 +119,108 @@ def _was_held_up(recording: Recording, one: Run, other: Run) -> bool:
 
 
 def _why_missing(
-    recording: Recording, names: Sequence[str], runs: Sequence[Run], least: int
+    recording: Recording, names: Sequence[str], runs: Sequence[Run], least: int, *, declared: bool
 ) -> Cause | None:
     """Why a callback has not run as often as it must to be judged, or None if each has."""
-    number, name = min((sum(run.callback == name for run in runs), name) for name in names)
-    if number >= least:
-        return None
+    numbers = [(sum(run.callback == name for run in runs), name) for name in names]
+    number, name = min(numbers, default=(least, ""))
     seen = f"{code(name)} ran {counted(number, 'time')}, of {least} that are needed"
+    return _why_not_seen(recording, seen, declared=declared) if number < least else None
+
+
+def _why_not_seen(recording: Recording, seen: str, *, declared: bool = True) -> Cause:
+    if declared and declares(recording, "spin", executor="EventsExecutor"):
+        return Cause(f"{seen}: an EventsExecutor does not tell when callbacks run", ours=True)
+    if declared and not traced(recording):
+        return why_undeclared(recording, "its executor and callbacks")
+    others = sorted({f"{run.callback} ({run.serves})" for run in timed(recording)})
     cause = why_ended(recording, seen) or why_not_called(recording, seen, ())
     return cause or Cause(
-        seen,
-        "Is it created in the constructor, and does it log the words when it starts and ends?",
-        Evidence((Moment("launched", 0.0),), spans=spans(recording, runs)),
+        seen + (f"; {codes(others)} ran" if others else ""),
+        "Look whether it is created in the constructor, with the name or the seconds that are "
+        "asked for, and whether every callback returns, and logs what is asked for.",
+        Evidence((Moment("launched", 0.0),), spans=spans(recording, timed(recording))),
         disturbed=was_held_up(recording),
     )
+
+
+def _hint(recording: Recording, runs: Sequence[Run], *, together: bool) -> str:
+    if together and declares(recording, "made") and _MULTI not in dict(executors(recording)):
+        return (
+            f"The {_MULTI} that was made never spins: rclpy.spin(node) uses another one, with one "
+            "thread. Call executor.add_node(node) and executor.spin()."
+        )
+    if together and len({run.group for run in runs}) == 1 and runs[0].group.startswith(_EXCLUSIVE):
+        return (
+            f"They are in one {_EXCLUSIVE}, the node's default group if no callback_group=... is "
+            "given. Give them a ReentrantCallbackGroup, or each a group of its own."
+        )
+    return (
+        f"rclpy.spin(node) and a {_SINGLE} run one callback at a time. When a {_MULTI} spins, only "
+        f"callbacks of one {_EXCLUSIVE} wait for each other."
+    )
+
+
+class ExecutorKind(Parameters):
+    """Parameters of executor.kind."""
+
+    executor: Literal["SingleThreadedExecutor", "MultiThreadedExecutor"] = Field(
+        description="Kind of the executor that spins."
+    )
+    threads: int = Field(1, ge=1, description="Least number of its threads.")
+    callbacks: tuple[str, ...] = Field((), description=_CALLBACKS)
+    groups: Literal["same", "different", "reentrant"] = Field(
+        "same", description="Whether `callbacks` are in one mutually exclusive group."
+    )
+
+
+@check("executor.kind", Subject.RECORDING, ExecutorKind)
+def kind(recording: Recording, parameters: ExecutorKind) -> Finding:
+    """The executor is of a kind, and callbacks are in the same group or in different ones.
+
+    Judged by what the process declared: executors that spin, and groups of callbacks that ran. If
+    runs overlap that these keep apart, the check ends as an error and costs no points. A
+    MultiThreadedExecutor without a given number of threads has four or more.
+    """
+    names, wanted, least = parameters.callbacks, parameters.executor, parameters.threads
+    expected = f"a {wanted} that spins, with {counted(least, 'thread')} or more"
+    expected += f", and {codes(names)} in groups: {parameters.groups}" if names else ""
+    spun, runs = executors(recording), _named(recording, names)
+    missing = _why_missing(recording, names, runs, 1, declared=True)
+    if missing is not None or not spun:
+        return (missing or _why_not_seen(recording, "no executor spun")).finding(expected)
+    impossible = _impossible(recording)
+    if impossible:
+        return Finding.error(expected, f"the declarations contradict each other: {impossible}")
+    groups = sorted({run.group for run in runs})
+    pairs = sorted({(run.callback, groups.index(run.group)) for run in runs})
+    exclusive = [group.startswith(_EXCLUSIVE) for group in groups]
+    parts = [f"a {name} with {counted(threads, 'thread')} spins" for name, threads in spun]
+    parts += [f"{code(name)} is in {groups[of].split()[0]} {of + 1}" for name, of in pairs]
+    right = [name == wanted and threads >= least for name, threads in spun]
+    grouped = {
+        "same": len(groups) == 1 and all(exclusive),
+        "different": len(pairs) == len(groups),
+        "reentrant": not any(exclusive),
+    }
+    evidence = Evidence((Moment("launched", 0.0),), spans=spans(recording, runs))
+    # Before one of several threads spins, another may wait for a service.
+    good = any(right) if wanted == _MULTI else all(right)
+    if good and (not names or grouped[parameters.groups]):
+        return Finding.passed(expected, listing(parts), evidence)
+    together = wanted == _MULTI and (not good or parameters.groups != "same")
+    hint = _hint(recording, runs, together=together)
+    return Finding.failed(expected, listing(parts), hint, evidence)
+
+
+def _impossible(recording: Recording) -> str:
+    """Which runs overlap although the declared executor or their group keeps them apart."""
+    for both in overlaps(timed(recording)):
+        one, other = both.one, both.other
+        spins = [item.data for item in recording.declared("spin")]
+        spun = [spin.get("executor") for spin in spins if str(spin.get("pid")) == one.pid]
+        in_one = one.group == other.group and one.group.startswith(_EXCLUSIVE)
+        alone = spun == [_SINGLE] and one.thread != other.thread
+        if one.pid == other.pid and (in_one or alone):
+            return f"{code(one.callback)} and {code(other.callback)} overlap"
+    return ""

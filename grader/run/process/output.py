@@ -20,14 +20,14 @@ _LONGEST_LINE = 8192
 # print(a, b) writes in four pieces, between which a busy machine may hold it up; what courses
 # print again and again comes every half second at most often.
 _LONGEST_WAIT_NS = 400_000_000
-_MOST_DECLARATIONS = 2000
+_MOST_DECLARATIONS = 10_000
 _LARGEST_NUMBER = 2**63
 _OF_ENDPOINTS = ("publisher", "subscription")
 _KINDS = frozenset(
     {
         *_OF_ENDPOINTS,
         *("started", "imported", "init", "node", "timer", "added", "spin", "published", "held"),
-        *("destroyed", "leaving", "exiting"),
+        *("made", "ran", "destroyed", "leaving", "exiting"),
     }
 )
 """Kinds of declarations of a tracer; see ``tracer/sitecustomize.py``."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import gc
 import itertools
 import os
@@ -29,6 +30,9 @@ _FLUSH_LIMIT_S = 0.5
 _SEEN_LIMIT_S = 2.0
 _SLICE_S = 0.5
 _OWN_TOPICS = ("/parameter_events", "/rosout")
+_MOST_RUNS = 1000
+# Shorter runs overlap nothing that counts: only the 1st, 2nd, 4th, 8th, ... of them is reported.
+_SHORT_NS = 1_000_000
 
 
 def _full_name(node: Any) -> str:
@@ -52,6 +56,10 @@ def _qos(profile: Any) -> dict[str, Any]:
 def _group(group: Any, node: Any) -> dict[str, Any]:
     chosen = group if group is not None else node.default_callback_group
     return {"type": type(chosen).__name__, "id": id(chosen)}
+
+
+def _callback_name(callback: Any) -> str:
+    return str(getattr(callback, "__qualname__", type(callback).__name__))
 
 
 def _endpoint(kind: str, node: Any, endpoint: Any, **more: Any) -> None:
@@ -137,6 +145,10 @@ _count = itertools.count()
 _publishers: list[Any] = []
 _held: set[tuple[str, str]] = set()
 _added: set[str] = set()
+_began: dict[int, list[int]] = {}
+"""When the calls that still run began: id of the timer, subscription or service -> times."""
+_calls: dict[int, Any] = collections.defaultdict(lambda: itertools.count(1))
+_reported_runs = itertools.count()
 _nodes: list[bool] = []
 
 
@@ -194,7 +206,7 @@ def _patch_node(module: Any) -> None:
             "timer",
             node=_full_name(node),
             period_s=timer.timer_period_ns / 1e9,
-            callback=str(getattr(timer.callback, "__qualname__", type(timer.callback).__name__)),
+            callback=_callback_name(timer.callback),
             group=_group(timer.callback_group, node),
         )
 
@@ -257,8 +269,57 @@ def _give_threads(executor_class: Any) -> None:
         if num_threads is None:
             num_threads = max(LEAST_THREADS, len(os.sched_getaffinity(0)))
         make(self, num_threads, **kwargs)
+        report("made", executor=type(self).__name__)
 
     executor_class.__init__ = made
+
+
+def _patch_callback_groups(module: Any) -> None:
+    _time_callbacks(module.MutuallyExclusiveCallbackGroup)
+    _time_callbacks(module.ReentrantCallbackGroup)
+
+
+def _time_callbacks(group_class: Any) -> None:
+    """Time the calls of callbacks: executors ask the group before each, and tell it afterwards."""
+    import time
+
+    begin, end = group_class.beginning_execution, group_class.ending_execution
+
+    def beginning_execution(group: Any, entity: Any) -> Any:
+        may_begin = begin(group, entity)
+        if may_begin:
+            _began.setdefault(id(entity), []).append(time.time_ns())
+        return may_begin
+
+    def ending_execution(group: Any, entity: Any) -> None:
+        quietly(_ran, group, entity, time.time_ns())
+        end(group, entity)
+
+    group_class.beginning_execution = beginning_execution
+    group_class.ending_execution = ending_execution
+
+
+def _ran(group: Any, entity: Any, ended_ns: int) -> None:
+    """Report a call of a timer, a subscription or a service, but for those of rclpy itself."""
+    import threading
+
+    began_ns, number = _began[id(entity)].pop(0), next(_calls[id(entity)])
+    serves = getattr(entity, "topic_name", None) or getattr(entity, "service_name", None)
+    # What is none of them lacks one of these attributes.
+    serves = serves or f"{entity.timer_period_ns / 1e9:g} s"
+    if entity.callback.__module__.startswith("rclpy."):
+        return
+    is_long = ended_ns - began_ns >= _SHORT_NS
+    if (is_long or not number & (number - 1)) and next(_reported_runs) < _MOST_RUNS:
+        report(
+            "ran",
+            callback=_callback_name(entity.callback),
+            serves=serves,
+            group=f"{type(group).__name__} {id(group)}",
+            thread=threading.get_ident(),
+            began_ns=began_ns,
+            ended_ns=ended_ns,
+        )
 
 
 def _patch_events_executor(module: Any) -> None:
@@ -290,6 +351,7 @@ def _wait_in_slices(executor_class: Any) -> None:
 
 
 PATCHES = {
+    "rclpy.callback_groups": _patch_callback_groups,
     "rclpy.experimental.events_executor": _patch_events_executor,
     "rclpy.node": _patch_node,
     "rclpy.publisher": lambda module: _patch_endpoint(module.Publisher),

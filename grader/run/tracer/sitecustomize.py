@@ -130,6 +130,7 @@ _PATCHES = {
     "launch.launch_service": _patch_launch,
     **dict.fromkeys(
         (
+            "rclpy.callback_groups",
             "rclpy.context",
             "rclpy.executors",
             "rclpy.experimental.events_executor",
