@@ -53,8 +53,12 @@ def declares(recording: Recording, kind: str, process: str | None = None, **text
 
 
 def never_spun(recording: Recording, process: str | None = None) -> bool:
-    """Whether the tracer was there and no executor ever waited for work."""
-    return traced(recording, process) and not declares(recording, "spin", process)
+    """Whether the tracer was there and no executor ever waited for work.
+
+    `ros2 launch` spins nothing itself: its nodes are in processes of their own.
+    """
+    has_nodes = declares(recording, "node", process) or not declares(recording, "node")
+    return has_nodes and traced(recording, process) and not declares(recording, "spin", process)
 
 
 def executors(recording: Recording) -> tuple[tuple[str, int], ...]:

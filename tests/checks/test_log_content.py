@@ -9,10 +9,13 @@ from grader.recording.model import Ending
 from tests.checks.builder import (
     at,
     call,
+    declarations,
+    declared,
     died,
     failing,
     judge,
     output,
+    process,
     recording,
     taken,
     traceback,
@@ -60,6 +63,17 @@ class TestNumbers:
     def test_a_logged_line_counts_once_where_printed_lines_count(self):
         run = logging(logs("distance 1.37"))
         assert judge("log.contains", run, number=1.37, printed=True, at_most=1).status is PASSED
+
+    def test_ros2_launch_itself_need_not_spin(self):
+        launch = "bringup/robot.launch.py"
+        run = logging(
+            logs("ready"),
+            processes=(process(), process(launch)),
+            declarations=(*declarations(), declared("started", 0.1, launch)),
+        )
+        found = failing("log.contains", run, text="distance", printed=True)
+        assert "never called" not in found
+        assert "output='screen'" in found
 
 
 class TestContains:

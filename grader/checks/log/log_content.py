@@ -242,6 +242,8 @@ def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]
             Evidence(moments=(moment,), log=tuple(line.text for line in lines[:_SHOWN])),
         )
     hint = f"Is the line reached that calls {call} with such a text?"
+    if isinstance(parameters, Contains) and parameters.printed:
+        hint += " What a node of a launch file prints is shown with output='screen' only."
     if not records:
         nothing = until_the_end(recording, "nothing logged when the observation ended")
         return Cause("the node logs nothing", hint, Evidence(moments=(nothing,)))
