@@ -43,7 +43,7 @@ def _why_never(recording: Recording, window: Window) -> Cause:
             return _why_not(recording, phase)
     ended_s = recording.since_launch_s(recording.stop_ns)
     seen = f"there was none before the run ended {ended_s:.2f} s after launch"
-    # Only the assignment's own times, and no doing of the student's, are nobody's mistake there.
+    # A window of times alone does not depend on the student: the mistake is the assignment's.
     shown = Evidence(moments=(until_the_end(recording),))
     hint = "Look at the order in which this happens, and whether it happens at all."
     return why_ended(recording, seen) or Cause(seen, hint, shown, ours=not window.phases)
