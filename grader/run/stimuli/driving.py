@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from grader.findings.value import NoSuchField
+from grader.spec.expression import yaw
 from sim.motion import Pose, Twist
 
 _THERE_M, _THERE_RAD = 0.03, 0.02
@@ -29,8 +30,7 @@ def target(goal: Mapping[str, Any], path: str) -> Target:
     position, rotation = here.get("position", here), here.get("orientation", {})
     yaw_rad = here.get("theta")
     if any(rotation.values()):
-        x, y, z, w = (rotation[name] for name in "xyzw")
-        yaw_rad = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        yaw_rad = yaw(*(rotation[name] for name in "xyzw"))
     return position["x"], position["y"], yaw_rad
 
 
