@@ -12,7 +12,7 @@ from pathlib import Path
 
 from grader import resources
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.mutant import MUTANTS_FILE, REFERENCE_FOLDER
+from grader.assignment.mutant import LANGUAGES
 from grader.assignment.selection import visible_part
 from grader.errors import UsageError
 from grader.report.files import refuse_inputs, refuse_part, write_whole
@@ -117,11 +117,12 @@ def _rosgrade(loaded: LoadedAssignment) -> dict[str, Member]:
 
 def _assignment(loaded: LoadedAssignment) -> dict[str, Path]:
     """The files of an assignment that grading needs: without its solution and its mutants."""
+    solutions = {name for one in LANGUAGES for name in (one.mutants, one.reference)}
     found = {path.relative_to(loaded.folder): path for path in _files(loaded.folder)}
     return {
         inside.as_posix(): path
         for inside, path in found.items()
-        if inside.parts[0] not in (REFERENCE_FOLDER, MUTANTS_FILE)
+        if inside.parts[0] not in solutions
     }
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from grader.assignment.load import ASSIGNMENT_FILE
 from grader.assignment.model import Package
-from grader.assignment.mutant import MUTANTS_FILE, REFERENCE_FOLDER
+from grader.assignment.mutant import PYTHON
 from grader.errors import UsageError
 from grader.report.files import write_folders
 from grader.report.html.handout import HANDOUT_FILE
@@ -43,9 +43,9 @@ def assignment_files(name: str) -> dict[str, str]:
     solution = {name: rendered("new/node.py", id=name, program=program)}
     files = {
         file: rendered(f"new/{file}", id=name)
-        for file in (ASSIGNMENT_FILE, HANDOUT_FILE, MUTANTS_FILE)
+        for file in (ASSIGNMENT_FILE, HANDOUT_FILE, PYTHON.mutants)
     }
     description = "Says hello twice a second."
     for path, content in package_files(package, description, solution, ()).items():
-        files[f"{REFERENCE_FOLDER}/{name}/{path}"] = content
+        files[f"{PYTHON.reference}/{name}/{path}"] = content
     return files

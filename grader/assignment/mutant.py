@@ -1,5 +1,7 @@
 """``mutants.yaml``: what the checks of an assignment must notice, and what they must not.
 
+``mutants_cpp.yaml`` is the same for the reference in C++.
+
 A mutant is the reference with one mistake of a student in it, and names the checks that must
 fail for it. A variant is another right solution, in an unusual style, and must keep every
 point.
@@ -23,9 +25,25 @@ from grader.spec.name import Id
 from grader.spec.nearest_name import nearest_or_all
 from grader.spec.source import Model, Source, in_order, read_source
 
-MUTANTS_FILE = "mutants.yaml"
-REFERENCE_FOLDER = "reference"
-"""Beside assignment.yaml, where the assignment is not one of rosgrade's own."""
+
+@dataclass(frozen=True)
+class Language:
+    """Where the solution in one language and its mutants lie.
+
+    Attributes:
+        mutants: Name of the file beside assignment.yaml.
+        reference: Name of the folder beside assignment.yaml.
+        own: The folder in ``reference/`` with the solutions of rosgrade's own assignments.
+    """
+
+    mutants: str
+    reference: str
+    own: str
+
+
+PYTHON = Language("mutants.yaml", "reference", ".")
+CPP = Language("mutants_cpp.yaml", "reference_cpp", "cpp")
+LANGUAGES = (PYTHON, CPP)
 
 _LEFT_OUT = {"__pycache__", "build", "install", "log"}
 
@@ -85,7 +103,10 @@ class Variant(Change):
 
 
 class MutantFile(Model):
-    """The mutants and variants of an assignment: `assignments/<id>/mutants.yaml`."""
+    """The mutants and variants of an assignment: `assignments/<id>/mutants.yaml`.
+
+    Those of the reference in C++ are in `mutants_cpp.yaml`.
+    """
 
     rosgrade: Literal[1] = Field(description="Version of this format.")
     mutants: tuple[Mutant, ...] = Field(min_length=1, description="Mistakes.")
@@ -225,10 +246,10 @@ class Mutants:
     variants: tuple[Variant, ...]
 
 
-def reference_of(assignment: str, folder: Path | None = None) -> Path:
+def reference_of(assignment: str, folder: Path | None = None, language: Language = PYTHON) -> Path:
     """The folder of an assignment's reference solution: beside it, or rosgrade's own."""
-    own = resources.reference() / assignment
-    places = [folder / REFERENCE_FOLDER, own] if folder is not None else [own]
+    own = resources.reference() / language.own / assignment
+    places = [folder / language.reference, own] if folder is not None else [own]
     for place in places:
         if place.is_dir():
             return place
@@ -236,10 +257,15 @@ def reference_of(assignment: str, folder: Path | None = None) -> Path:
     raise UsageError(f"the assignment {assignment!r} has no reference solution: {listed}")
 
 
-def load_mutants(assignment: Assignment, folder: Path, reference: Path | None = None) -> Mutants:
+def load_mutants(
+    assignment: Assignment,
+    folder: Path,
+    reference: Path | None = None,
+    language: Language = PYTHON,
+) -> Mutants:
     """Read and check the mutants of an assignment, for :func:`reference_of` by default."""
-    reference = reference_of(assignment.id, folder) if reference is None else reference
-    source = read_source(folder / MUTANTS_FILE)
+    reference = reference_of(assignment.id, folder, language) if reference is None else reference
+    source = read_source(folder / language.mutants)
     content = source.read(MutantFile)
     files = _read(reference)
     problems = [*source.duplicates("id", "mutants", "variants")]

@@ -16,8 +16,10 @@ from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.mutant import (
+    PYTHON,
     Change,
     Difference,
+    Language,
     Mutant,
     MutantVerdict,
     apply,
@@ -72,9 +74,9 @@ class TrialResult:
     findings: tuple[str, ...] = ()
 
 
-def trials(loaded: LoadedAssignment) -> tuple[Trial, ...]:
+def trials(loaded: LoadedAssignment, language: Language = PYTHON) -> tuple[Trial, ...]:
     """The trials of an assignment: its reference, its variants, its mutants, its starter."""
-    mutants = load_mutants(loaded.assignment, loaded.folder)
+    mutants = load_mutants(loaded.assignment, loaded.folder, language=language)
     changes = [*mutants.variants, *mutants.mutants]
     return (
         Trial(Role.REFERENCE, "reference", "the reference solution", None),
@@ -88,7 +90,11 @@ def trials(loaded: LoadedAssignment) -> tuple[Trial, ...]:
             for change in changes
             if not change.skip_reason
         ),
-        Trial(Role.STARTER, "starter", "the starter package, untouched", None),
+        *(
+            [Trial(Role.STARTER, "starter", "the starter package, untouched", None)]
+            if language is PYTHON
+            else []
+        ),
     )
 
 
@@ -169,12 +175,13 @@ def selftest(
     grading: Grading,
     *,
     jobs: int,
+    language: Language = PYTHON,
     keep: Path | None = None,
     chosen: Callable[[Trial], bool] = lambda _: True,
     on_graded: Callable[[Graded], None] = lambda _: None,
 ) -> Iterator[TrialResult]:
     """Run every trial of an assignment."""
-    base = load_mutants(loaded.assignment, loaded.folder).reference
+    base = load_mutants(loaded.assignment, loaded.folder, language=language).reference
     with Scratch("selftest") as folder:
 
         def work(trial: Trial) -> TrialResult:
@@ -187,8 +194,9 @@ def selftest(
                         shutil.copytree(made, keep / trial.id / part, symlinks=True)
             return result
 
+        every = trials(loaded, language)
         with ThreadPoolExecutor(max_workers=jobs) as pool:
-            futures = [pool.submit(work, trial) for trial in trials(loaded) if chosen(trial)]
+            futures = [pool.submit(work, trial) for trial in every if chosen(trial)]
             try:
                 for future in as_completed(futures):
                     yield future.result()

@@ -32,7 +32,7 @@ def validate(
     """
     from grader.assignment.lint_warnings import lint_warnings
     from grader.assignment.load import load_assignment
-    from grader.assignment.mutant import MUTANTS_FILE, load_mutants
+    from grader.assignment.mutant import LANGUAGES, load_mutants
     from grader.batch.type_support import missing_underlays
     from grader.sandbox.python_tree import not_installed
 
@@ -40,18 +40,24 @@ def validate(
     for name in files:
         try:
             loaded = load_assignment(name)
-            has_mutants = (loaded.folder / MUTANTS_FILE).exists()
-            mutants = load_mutants(loaded.assignment, loaded.folder) if has_mutants else None
+            mutants = [
+                mutant
+                for language in LANGUAGES
+                if (loaded.folder / language.mutants).exists()
+                for mutant in load_mutants(
+                    loaded.assignment, loaded.folder, language=language
+                ).mutants
+            ]
         except RosgradeError as error:
             print_error(str(error))
             broken += 1
             continue
-        warnings = [*lint_warnings(loaded, mutants.mutants if mutants else None)]
+        warnings = [*lint_warnings(loaded, mutants or None)]
         warnings += not_installed(loaded.assignment.libraries)
         warnings += missing_underlays(loaded)
         for warning in warnings:
             print_warning(f"{loaded.file}: {warning}")
-        tested = f", {counted(len(mutants.mutants), 'mutant')}" if mutants else ""
+        tested = f", {counted(len(mutants), 'mutant')}" if mutants else ""
         typer.echo(
             f"{loaded.file}: {counted(len(loaded.assignment.scenarios), 'scenario')}, "
             f"{counted(len(loaded.checks), 'check')}{tested}: valid"

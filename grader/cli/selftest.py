@@ -29,6 +29,9 @@ def selftest(
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Submissions at once; by default two for each CPU.")
     ] = None,
+    cpp: Annotated[
+        bool, typer.Option("--cpp", help="Take the reference in C++, and mutants_cpp.yaml.")
+    ] = False,
     record: Annotated[
         bool,
         typer.Option("--record", help="Grade only the reference; keep its recordings for reports."),
@@ -51,15 +54,25 @@ def selftest(
     """
     from grader import ros
     from grader.assignment.load import list_assignments, load_assignment
-    from grader.assignment.mutant import reference_of
+    from grader.assignment.mutant import CPP, PYTHON, reference_of
     from grader.batch.grading import Grading
     from grader.batch.reference_run import keep_reference
     from grader.batch.selftest import Role, Trial, mutation_score, trials
     from grader.batch.selftest import selftest as run_selftest
+    from grader.errors import UsageError
     from grader.report.files import refuse_part
     from grader.run.host.load import cpu_count
     from grader.run.runner import Runner
+    from grader.submission.underlay.definition import find_underlay
+    from grader.submission.underlay.store import UnderlayStore
 
+    if cpp and record:
+        raise UsageError(
+            "--record keeps the recordings of the reference in Python: leave out --cpp"
+        )
+    language = CPP if cpp else PYTHON
+    if cpp:
+        UnderlayStore(cache_folder(), ros.find()).fetched([find_underlay("rclcpp")])
     kept: list[str] = []
 
     def keep_runs(loaded: LoadedAssignment, graded: Graded) -> None:
@@ -75,16 +88,17 @@ def selftest(
         loaded = load_assignment(name)
         if keep is not None:
             refuse_part(keep, loaded.folder, f"the assignment in {loaded.folder}")
-            reference = reference_of(loaded.assignment.id, loaded.folder)
+            reference = reference_of(loaded.assignment.id, loaded.folder, language)
             refuse_part(keep, reference, f"the reference solution in {reference}")
         results: list[TrialResult] = []
-        wanted = sum(chosen_trial(trial) for trial in trials(loaded))
+        wanted = sum(chosen_trial(trial) for trial in trials(loaded, language))
         with Runner(ros.find(), sandbox=chosen) as runner, Progress(quiet).shown() as progress:
             grading = Grading(loaded, runner, cache_folder())
             for result in run_selftest(
                 loaded,
                 grading,
                 jobs=jobs or 2 * cpu_count(),
+                language=language,
                 keep=keep and keep / loaded.assignment.id,
                 chosen=chosen_trial,
                 on_graded=partial(keep_runs, loaded) if record else lambda _: None,

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.assignment.model import Assignment
-from grader.assignment.mutant import apply, load_mutants, reference_of
+from grader.assignment.mutant import CPP, apply, load_mutants, reference_of
 from grader.errors import AssignmentError, UsageError
 from grader.spec.source import parse_source
 from tests.assignment.lessons import HEAD
@@ -135,6 +135,18 @@ def test_a_mistake_in_the_form_is_reported(
 def test_a_missing_file_is_wrong_use(tmp_path: Path, reference: Path) -> None:
     with pytest.raises(UsageError, match=r"mutants\.yaml: No such file or directory"):
         load_mutants(LESSON, tmp_path, reference)
+
+
+def test_the_solution_in_cpp_has_mutants_of_its_own(tmp_path: Path, reference: Path) -> None:
+    write(tmp_path, GOOD)
+    cpp = tmp_path / "reference_cpp"
+    (cpp / "bot/src").mkdir(parents=True)
+    (cpp / "bot/src/node.cpp").write_text('auto topic = "/cmd_vel";\n')
+    (tmp_path / "mutants_cpp.yaml").write_text(GOOD.replace("bot/node.py", "src/node.cpp"))
+    mutants = load_mutants(LESSON, tmp_path, language=CPP)
+    assert mutants.reference == cpp
+    apply(mutants.mutants[0], mutants.reference, tmp_path / "one")
+    assert (tmp_path / "one/bot/src/node.cpp").read_text() == 'auto topic = "/cmdvel";\n'
 
 
 def test_a_missing_reference_is_reported() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from grader import resources
 from grader.assignment.load import load_assignment
-from grader.assignment.mutant import MUTANTS_FILE
+from grader.assignment.mutant import PYTHON
 from grader.assignment.schema import assignment_schema, mutants_schema
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check
@@ -30,7 +30,7 @@ def test_the_assignments_and_their_mutants_fit(name: str) -> None:
     folder = resources.assignments() / name
     for file, schema in (
         ("assignment.yaml", assignment_schema()),
-        (MUTANTS_FILE, mutants_schema()),
+        (PYTHON.mutants, mutants_schema()),
     ):
         assert valid(read_source(folder / file).data, schema, schema)
 
