@@ -47,8 +47,10 @@ def cell_environment(ros: RosInstallation, *, sandboxed: bool = False) -> dict[s
     return environment
 
 
-def student_environment(ros: RosInstallation, install: Path, scratch: Path) -> dict[str, str]:
-    """Variables of a student's process: ROS, the packages handed in, and the tracer."""
+def student_environment(
+    ros: RosInstallation, install: Path, scratch: Path, compiled_tracer: Path | None = None
+) -> dict[str, str]:
+    """Variables of a student's process: ROS, the packages handed in, and the tracers."""
     environment = ros.environment(os.environ, (install,))
     temporary = scratch / "tmp"
     temporary.mkdir(exist_ok=True)
@@ -63,6 +65,9 @@ def student_environment(ros: RosInstallation, install: Path, scratch: Path) -> d
         HOME=str(scratch),
         TMPDIR=str(temporary),
     )
+    if compiled_tracer is not None:
+        preloaded = _joined(str(compiled_tracer), environment.get("LD_PRELOAD", ""))
+        environment["LD_PRELOAD"] = preloaded
     return environment
 
 

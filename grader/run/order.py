@@ -90,6 +90,7 @@ class CellOrder:
         scratch: Folder of the student: working directory, home and temporary files.
         submission: The submission's facts, as JSON, to go into the recording unread.
         simulator: The simulated robot, or None.
+        compiled_tracer: The library that compiled programs are started with, or None.
         process_sandbox: The sandbox of each process of the student, or None.
     """
 
@@ -108,6 +109,7 @@ class CellOrder:
     values: dict[str, float] = field(default_factory=dict)
     facts: dict[str, str] = field(default_factory=dict)
     type_support: tuple[str, ...] = ()
+    compiled_tracer: str | None = None
     process_sandbox: ProcessSandbox | None = None
     tells_output: bool = False
 

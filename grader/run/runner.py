@@ -17,11 +17,13 @@ from grader.errors import GraderFault
 from grader.recording.interface import definition_finder
 from grader.recording.mcap_writer import write_recording
 from grader.recording.model import to_json
+from grader.resources import cache_folder
 from grader.ros import RosInstallation
 from grader.run.admission import Admission
 from grader.run.cell.cell_process import SCRATCH, CellProcess
 from grader.run.cell.middleware_hang import MiddlewareHung, hung_recording
 from grader.run.cell.prefork_server import SIMULATOR_MODULE, PreforkServer
+from grader.run.compiled_tracer import compiled_tracer, has_compiled_programs
 from grader.run.environment import RMW, student_environment
 from grader.run.host.load import cpu_count
 from grader.run.order import CellOrder, ProcessCommand, RunLimits, SimulatorOrder, Topic, Until
@@ -380,6 +382,8 @@ class Runner:
             process_command(ros, launch, assignment, install, values, remaps)
             for launch in scenario.launch
         )
+        compiled = has_compiled_programs(install)
+        tracer = compiled_tracer(ros, cache_folder()) if compiled else None
         imported = {item.module for package in submission.packages for item in package.ros_imports}
         # rosgrade's own definition comes before one of the student's.
         definitions = tuple(map(str, (*type_support, *ros.underlays, *ros.prefixes, install)))
@@ -387,7 +391,8 @@ class Runner:
             scenario=scenario.id,
             seed=seed,
             commands=commands,
-            environment=student_environment(ros, install, scratch),
+            environment=student_environment(ros, install, scratch, tracer),
+            compiled_tracer=str(tracer) if tracer else None,
             prefixes=tuple(map(str, (*type_support, install, *ros.underlays, *ros.prefixes))),
             topics=_topics(scenario),
             stimuli=_stimuli(scenario, commands, worlds, definitions, seed, values),

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from grader.ros import RosInstallation
+from grader.run.compiled_tracer import IN_SANDBOX
 from grader.run.environment import TRACER, TRACER_IN_SANDBOX, sandboxed_environment
 from grader.run.order import CellOrder
 from grader.run.process.process_sandbox import HOME, WORKSPACE, ProcessSandbox
@@ -26,7 +27,7 @@ from grader.sandbox.seccomp import guard_filter, guarded_calls, student_filter
 _UID = 1000
 _PASSWD = f"student:x:{_UID}:{_UID}::{HOME}:/bin/sh\n"
 _FILTER, _UNGUARDED, _GUARD = "student.bpf", "unguarded.bpf", "guard.bpf"
-_WORLD, _PASSWD_FILE = "world.yaml", "passwd"
+_WORLD, _PASSWD_FILE, _COMPILED_TRACER = "world.yaml", "passwd", "tracer.so"
 _SYSTEM = "system"
 
 
@@ -58,6 +59,11 @@ def sandboxed(
     bubblewrap.copy_system_files(folder / _SYSTEM)
     binds = [Bind(Path(in_cell[outside]), Path(inside)) for outside, inside in seen.items()]
     binds.append(Bind.same(TRACER_IN_SANDBOX))
+    places = {**seen, str(TRACER): str(TRACER_IN_SANDBOX)}
+    if order.compiled_tracer is not None:
+        shutil.copyfile(order.compiled_tracer, folder / _COMPILED_TRACER)
+        binds.append(Bind(CELL / _COMPILED_TRACER, IN_SANDBOX))
+        places[order.compiled_tracer] = str(IN_SANDBOX)
     simulator = order.simulator
     if simulator is not None:
         shutil.copyfile(simulator.world, folder / _WORLD)
@@ -65,9 +71,7 @@ def sandboxed(
     return replace(
         order,
         commands=tuple(replace(one, argv=_moved(one.argv, seen)) for one in order.commands),
-        environment=sandboxed_environment(
-            order.environment, {**seen, str(TRACER): str(TRACER_IN_SANDBOX)}
-        ),
+        environment=sandboxed_environment(order.environment, places),
         prefixes=_moved(order.prefixes, in_cell),
         type_support=_moved(order.type_support, in_cell),
         scratch=str(CELL),
