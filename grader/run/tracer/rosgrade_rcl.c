@@ -947,11 +947,18 @@ static void say(const char * format, ...)
 }
 
 /* Whether a line of addr2line is about code of the student's, not of a header that it includes. */
-static bool is_of_student(const char * text)
+static bool is_of_student(char * text)
 {
-  const char * place = strstr(text, " at ");
-  if (!place || strncmp(text, "?? ", 3) == 0 || strncmp(place + 4, "??", 2) == 0) {
+  char * place = strstr(text, " at "), * note = strstr(text, " (discriminator");
+  if (note) {
+    *note = '\0';
+  }
+  if (!place || text[0] == '?') {
     return false;
+  }
+  if (place[4] == '?') {
+    /* Without debugging information there are names only. */
+    return text[0] != '_' && !strstr(text, "std::") && !strstr(text, "rclcpp::");
   }
   return place[4] != '/' || !strstr(place, "/include/");
 }
