@@ -735,7 +735,12 @@ PUBLIC void ros_trace_do_rclcpp_callback_register(const void * callback, const c
 {
   pthread_mutex_lock(&lock);
   entity_t * one = of_callback(callback);
-  if (one) {
+  /* Of std::bind(&Class::method, this) only the class is known. */
+  const char * class = symbol && strncmp(symbol, "std::_Bind<", 11) == 0 ? strchr(symbol, '(') : NULL;
+  const char * end = class ? strstr(class, "::*(") : NULL;
+  if (one && end) {
+    snprintf(one->symbol, sizeof(one->symbol), "method of %.*s", (int)(end - class) - 1, class + 1);
+  } else if (one) {
     snprintf(one->symbol, sizeof(one->symbol), "%s", symbol ? symbol : "");
   }
   pthread_mutex_unlock(&lock);
