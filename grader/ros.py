@@ -66,6 +66,14 @@ class RosInstallation:
         """Folders that Python imports from."""
         return [path for one in (*self.underlays, *self.prefixes) for path in site_packages(one)]
 
+    @property
+    def preloaded(self) -> str:
+        """What compiled programs are started with, such as a path, or nothing.
+
+        The wheels' librcl needs libraries with symbols that only an interpreter defines.
+        """
+        return str(_libpython()) if self.source == "wheels" else ""
+
     def environment(
         self, environ: Mapping[str, str], overlays: tuple[Path, ...] = ()
     ) -> dict[str, str]:
@@ -97,8 +105,7 @@ class RosInstallation:
             # The wheels' start-up hook would set LD_LIBRARY_PATH and execute Python again.
             result["_ROS_WHEELS_BOOTSTRAP_COMPLETE"] = "1"
             if "rclcpp" in self.packages:
-                # Libraries that every node loads have symbols which only an interpreter defines.
-                result["LD_PRELOAD"] = str(_libpython())
+                result["LD_PRELOAD"] = self.preloaded
         for name, paths in ahead.items():
             parts = [*map(str, paths), *filter(None, result.get(name, "").split(os.pathsep))]
             if parts:

@@ -66,8 +66,7 @@ def student_environment(
         TMPDIR=str(temporary),
     )
     if compiled_tracer is not None:
-        preloaded = _joined(str(compiled_tracer), environment.get("LD_PRELOAD", ""))
-        environment["LD_PRELOAD"] = preloaded
+        environment["LD_PRELOAD"] = _joined(str(compiled_tracer), ros.preloaded)
     return environment
 
 

@@ -1,0 +1,81 @@
+"""Nodes in C++ are graded as those in Python: built, held, traced, judged, and mutated."""
+
+from __future__ import annotations
+
+import shutil
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import pytest
+
+from grader import resources, ros
+from grader.assignment.load import load_assignment
+from grader.assignment.mutant import CPP
+from grader.batch.grading import Grading
+from grader.batch.selftest import TrialResult, selftest
+from grader.run.host.load import cpu_count
+from grader.run.runner import Runner
+from tests.compiled.packages import MUTANTS, node, write_package
+
+pytestmark = [pytest.mark.compiles, pytest.mark.ros, pytest.mark.slow]
+
+
+class Solution(NamedTuple):
+    """A lesson's solution in C++: package, executables, and what they need."""
+
+    package: str
+    programs: dict[str, str]
+    depends: tuple[str, ...]
+
+
+_SPINS = {"single_threaded": "spin", "multi_threaded": "spin_in_threads"}
+SOLUTIONS = {
+    "simple_publisher": Solution(
+        "bot_publisher", {"bot_pub": node("simple_publisher")}, ("geometry_msgs",)
+    ),
+    "timed_publisher": Solution(
+        "bot_publisher", {"bot_pub": node("timed_publisher")}, ("geometry_msgs",)
+    ),
+    "subscribers": Solution(
+        "bot_subscriber", {"bot_sub": node("subscribers")}, ("nav_msgs", "sensor_msgs")
+    ),
+    "bot_controller": Solution(
+        "bot_controller", {"bot_ctrl": node("bot_controller")}, ("geometry_msgs", "sensor_msgs")
+    ),
+    "executors": Solution(
+        "executors_demo",
+        {name: node("executors").replace("THREADS", how) for name, how in _SPINS.items()},
+        ("std_msgs", "rosidl_runtime_c"),
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[TrialResult]]:
+    """The results of all lessons, which are graded at the same time."""
+    folder = tmp_path_factory.mktemp("lessons")
+    with Runner(ros.find()) as runner, ThreadPoolExecutor(len(SOLUTIONS)) as pool:
+
+        def graded(name: str) -> list[TrialResult]:
+            lesson = folder / name
+            shutil.copytree(load_assignment(name).folder, lesson)
+            write_package(lesson / CPP.reference, *SOLUTIONS[name])
+            shutil.copy(MUTANTS / f"{name}.yaml", lesson / CPP.mutants)
+            loaded = load_assignment(lesson)
+            grading = Grading(loaded, runner, resources.cache_folder())
+            return list(selftest(loaded, grading, jobs=cpu_count(), language=CPP))
+
+        return dict(zip(SOLUTIONS, pool.map(graded, SOLUTIONS), strict=True))
+
+
+@pytest.mark.timeout(400)
+@pytest.mark.parametrize("name", SOLUTIONS)
+def test_a_right_node_gets_full_points_and_a_wrong_one_loses_what_it_must(
+    name: str, results: dict[str, list[TrialResult]]
+) -> None:
+    wrong = {
+        result.trial.id: (str(result.verdict), *result.findings)
+        for result in results[name]
+        if not result.verdict.right
+    }
+    assert not wrong
