@@ -314,6 +314,8 @@ def _default(schema: Mapping[str, Any], value: Any) -> str:
         text = format_duration(default) if is_time else min(forms, key=len)
     elif isinstance(default, bool):
         text = text.lower()
+    elif isinstance(default, list) and all(isinstance(one, str) for one in default):
+        text = f"[{', '.join(default)}]"
     return f"`{text}`"
 
 

@@ -17,6 +17,7 @@ from grader.assignment.stimuli.stimulus import Stimulus
 from grader.assignment.variable import Variable
 from grader.checks.window import Phase, Window
 from grader.spec.name import (
+    BuildTypes,
     Durability,
     Id,
     InterfaceName,
@@ -100,15 +101,25 @@ class Package(Model):
     """A package that students hand in."""
 
     name: PackageName = Field(description="Name in package.xml.")
-    build_type: Literal["ament_python", "ament_cmake"] = Field(
-        "ament_python", description="Build type exported by package.xml."
+    build_types: BuildTypes = Field(
+        ("ament_python",),
+        alias="build_type",
+        description="Build type exported by package.xml. With `[ament_python, ament_cmake]`, "
+        "students choose between Python and C++.",
     )
     depends: tuple[str, ...] = Field(
-        (), description="ROS packages that the solution needs; the starter package names them."
+        (),
+        description="ROS packages that the solution needs; the starter package names them. `rclpy` "
+        "stands for `rclcpp` too if students may write C++.",
     )
     executables: tuple[str, ...] = Field(
         (), description="Executables that `ros2 run` must find in the package."
     )
+
+    @property
+    def build_type(self) -> str:
+        """The build type of the reference solution and of the starter package."""
+        return self.build_types[0]
 
 
 class Launch(Model):

@@ -58,7 +58,7 @@ def mistakes(
 def _is_echo(found: dict[str, Any]) -> bool:
     """Whether a list is called too short only because its entries have mistakes."""
     value = found["input"]
-    is_short = found["type"] == "too_short" and isinstance(value, list)
+    is_short = found["type"] == "too_short" and isinstance(value, list | tuple)
     return is_short and len(value) >= found["ctx"]["min_length"]
 
 

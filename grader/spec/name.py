@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
-from pydantic import AfterValidator, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 ID = r"[a-z][a-z0-9_]*"
 TOPIC = r"(/[A-Za-z_][A-Za-z0-9_]*)+"
@@ -105,3 +105,18 @@ LibraryName = Annotated[
 
 Reliability = Literal["reliable", "best_effort"]
 Durability = Literal["volatile", "transient_local"]
+BuildType = Literal["ament_python", "ament_cmake"]
+BuildTypes = Annotated[
+    tuple[BuildType, ...],
+    Field(min_length=1),
+    BeforeValidator(lambda given: tuple(given) if isinstance(given, list) else (given,)),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"enum": list(get_args(BuildType))},
+                {"type": "array", "items": {"enum": list(get_args(BuildType))}, "minItems": 1},
+            ],
+            "x-words": "`ament_python`, `ament_cmake`, or a list of both",
+        }
+    ),
+]

@@ -63,7 +63,7 @@ def test_a_value_is_described_in_the_words_of_yaml(catalogue: dict[str, Check]) 
     assert "| `period` | time, such as `300 ms` | required |" in text
     text = docs.assignment_markdown()
     assert "| `discovery` | time, such as `300 ms` | `10 s` |" in text
-    assert "| `build_type` | `ament_python` or `ament_cmake` | `ament_python` |" in text
+    assert "| `ament_python`, `ament_cmake`, or a list of both | `[ament_python]` |" in text
     assert "| `launch` | list of [launch](#launch) | required |" in text
 
 

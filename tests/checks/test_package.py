@@ -82,6 +82,13 @@ class TestFound:
         assert "its build type is cmake" in found
         assert "<build_type>ament_python</build_type>" in found
 
+    def test_one_of_several_build_types(self):
+        asked = ["ament_python", "ament_cmake"]
+        compiled = submission(package(build_type="ament_cmake"))
+        assert judge("package.found", compiled, package=NAME, build_type=asked).status == "passed"
+        found = self.found(submission(package(build_type="cmake")), build_type=asked)
+        assert "<build_type>ament_python</build_type></export> or <export>" in found
+
     def test_a_name_that_ros_does_not_allow_is_the_authors_mistake(self):
         with pytest.raises(ValueError, match="is not a package name"):
             judge("package.found", submission(), package="Bot Publisher")

@@ -39,7 +39,14 @@ def test_a_good_assignment_is_read() -> None:
     assert assignment.checks[0].points == 1.0
     # What the YAML does not say.
     assert assignment.scenarios[0].shutdown == 2.0
-    assert assignment.packages[0].build_type == "ament_python"
+    assert assignment.packages[0].build_types == ("ament_python",)
+
+
+def test_a_build_type_is_one_or_a_list() -> None:
+    both = GOOD.replace("    exe", "    build_type: [ament_cmake, ament_python]\n    exe", 1)
+    (package,) = parse_source(both, FILE).read(Assignment).packages
+    assert package.build_types == ("ament_cmake", "ament_python")
+    assert package.build_type == "ament_cmake"
 
 
 @pytest.mark.parametrize(

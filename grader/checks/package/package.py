@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from pydantic import Field
 
@@ -22,7 +22,7 @@ from grader.diagnosis.not_built import (
 )
 from grader.findings.finding import Evidence, Finding, Table
 from grader.findings.wording import code, codes
-from grader.spec.name import PackageName
+from grader.spec.name import BuildTypes, PackageName
 from grader.spec.nearest_name import nearest
 from grader.submission.read.dependencies import meant
 from grader.submission.read.reachable import only_for
@@ -40,13 +40,13 @@ class OfPackage(Parameters):
 class PackageFound(OfPackage):
     """Parameters of package.found."""
 
-    build_type: Literal["ament_python", "ament_cmake"] | None = Field(
-        None, description="Expected build type; by default any."
+    build_type: BuildTypes = Field(
+        (), description="Expected build type, or several; by default any."
     )
 
     def _asked(self) -> str:
-        build_type = f" with the build type {self.build_type}" if self.build_type else ""
-        return f"the package {code(self.package)}{build_type}"
+        types = f" with the build type {' or '.join(self.build_type)}" if self.build_type else ""
+        return f"the package {code(self.package)}{types}"
 
 
 @check("package.found", Subject.SUBMISSION, PackageFound)
@@ -61,13 +61,14 @@ def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding:
     if breach := breach_of_rep_144(package.name):
         seen = f"found in {code(package.path)}{breach}"
         return Finding.failed(parameters.asked_for, seen, "Give the package another name.")
-    if parameters.build_type in (None, package.build_type):
+    if not parameters.build_type or package.build_type in parameters.build_type:
         return Finding.passed(parameters.asked_for, f"found in {code(package.path)}")
     manifest = SourceError(package.file("package.xml"), None, f"build type {package.build_type}")
+    tags = (f"<export><build_type>{one}</build_type></export>" for one in parameters.build_type)
     return Finding.failed(
         parameters.asked_for,
         f"its build type is {package.build_type}",
-        f"Write <export><build_type>{parameters.build_type}</build_type></export> in package.xml.",
+        f"Write {' or '.join(tags)} in package.xml.",
         Evidence(places=(manifest,)),
     )
 
