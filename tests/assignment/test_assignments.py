@@ -10,7 +10,15 @@ import pytest
 
 from grader import resources
 from grader.assignment.load import LoadedAssignment, list_assignments, load_assignment
-from grader.assignment.mutant import Mutants, apply, load_mutants, reference_of
+from grader.assignment.mutant import (
+    CPP,
+    LANGUAGES,
+    Language,
+    Mutants,
+    apply,
+    load_mutants,
+    reference_of,
+)
 from grader.checks.check import Subject
 
 PUBLISHERS = ("simple_publisher", "timed_publisher")
@@ -37,7 +45,13 @@ def test_there_are_enough_mutants_and_variants(mutants: Mutants) -> None:
     assert len(mutants.variants) >= 5
 
 
-def test_every_mutant_is_another_submission(mutants: Mutants, tmp_path: Path) -> None:
+@pytest.mark.parametrize("language", LANGUAGES, ids=["python", "cpp"])
+def test_every_mutant_is_another_submission(
+    loaded: LoadedAssignment, language: Language, tmp_path: Path
+) -> None:
+    if not (loaded.folder / language.mutants).is_file():
+        pytest.skip(f"no {language.mutants} yet")
+    mutants = load_mutants(loaded.assignment, loaded.folder, language=language)
     seen: dict[tuple[tuple[str, bytes], ...], str] = {}
     for change in (*mutants.mutants, *mutants.variants):
         folder = tmp_path / change.id
@@ -107,6 +121,24 @@ def test_the_reference_is_a_package_as_the_assignment_asks(loaded: LoadedAssignm
         assert [one.text for one in manifest.findall("depend")] == list(package.depends)
         if package.build_type == "ament_python":
             assert (folder / "resource" / package.name).is_file()
+
+
+def test_the_reference_in_cpp_is_the_same_package(loaded: LoadedAssignment) -> None:
+    for package in loaded.assignment.packages:
+        folder = reference_of(loaded.assignment.id, language=CPP) / package.name
+        manifest = ElementTree.parse(folder / "package.xml").getroot()
+        assert manifest.findtext("name") == package.name
+        assert manifest.findtext("export/build_type") == "ament_cmake"
+        for executable in package.executables:
+            assert executable in (folder / "CMakeLists.txt").read_text(encoding="utf-8")
+
+
+def test_there_are_enough_mutants_in_cpp(loaded: LoadedAssignment) -> None:
+    if not (loaded.folder / CPP.mutants).is_file():
+        pytest.skip(f"no {CPP.mutants} yet")
+    mutants = load_mutants(loaded.assignment, loaded.folder, language=CPP)
+    assert len(mutants.mutants) >= 6
+    assert len(mutants.variants) >= 2
 
 
 @pytest.mark.parametrize("name", PUBLISHERS)
