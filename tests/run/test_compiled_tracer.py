@@ -10,6 +10,12 @@ import pytest
 from grader import ros
 from grader.run.compiled_tracer import compiled_tracer, has_compiled_programs
 
+_PRINTS = """
+#include <cstdio>
+#include <cstdlib>
+#include <iostream>
+int main() { std::printf("one\\n"); std::cout << "two\\n"; std::_Exit(0); }
+"""
 _CRASH = """
 #include <stdexcept>
 void decide(bool fails) { if (fails) throw std::runtime_error("no idea"); }
@@ -40,14 +46,14 @@ def test_scripts_are_no_compiled_programs(tmp_path: Path) -> None:
     assert has_compiled_programs(tmp_path)
 
 
-def test_the_function_that_crashes_is_named_with_file_and_line(tmp_path: Path) -> None:
+def _run_traced(source: str, tmp_path: Path) -> subprocess.CompletedProcess[str]:
     library = compiled_tracer(ros.find(), tmp_path)
-    (tmp_path / "crash.cpp").write_text(_CRASH, encoding="utf-8")
+    (tmp_path / "crash.cpp").write_text(source, encoding="utf-8")
     command = ["c++", "-g", "-O0", "crash.cpp", "-o", "crash"]
     subprocess.run(command, cwd=tmp_path, check=True)
     read, write = os.pipe()
     with os.fdopen(read), os.fdopen(write, "wb"):
-        run = subprocess.run(
+        return subprocess.run(
             [tmp_path / "crash"],
             env={
                 "LD_PRELOAD": str(library),
@@ -59,6 +65,15 @@ def test_the_function_that_crashes_is_named_with_file_and_line(tmp_path: Path) -
             text=True,
             check=False,
         )
+
+
+def test_what_is_printed_is_there_at_once_as_in_a_terminal(tmp_path: Path) -> None:
+    """To a pipe it would come when a buffer of 4 KiB is full, or when the program ends."""
+    assert _run_traced(_PRINTS, tmp_path).stdout == "one\ntwo\n"
+
+
+def test_the_function_that_crashes_is_named_with_file_and_line(tmp_path: Path) -> None:
+    run = _run_traced(_CRASH, tmp_path)
     assert run.returncode == -6
     lines = run.stderr.splitlines()
     assert "rosgrade: SIGABRT (abort) in crash" in lines

@@ -1115,6 +1115,8 @@ __attribute__((constructor)) static void start(void)
   add_text(&line, "language", "C++");
   send_line(&line);
   if (!is_python) {
+    /* As in a terminal: what is printed must be dated when it is printed. */
+    setvbuf(stdout, NULL, _IOLBF, 0);
     catch_crashes();
   }
 }
