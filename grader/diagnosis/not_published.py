@@ -33,6 +33,25 @@ _OWN_S = 2.0
 _ENDED_PERIODS = 3.0
 
 
+@explanation(NoMessages, FewMessages)
+def timer_destroyed(symptom: OnTopic) -> Cause | None:
+    """The timer was destroyed: in C++ it ends with the variable that holds it."""
+    recording = symptom.recording
+    gone_ns = declarations.last_timer_destroyed_ns(recording)
+    if gone_ns is None:
+        return None
+    period = format_duration(declarations.timers(recording)[-1].period_s)
+    gone_s = recording.since_launch_s(gone_ns)
+    return Cause(
+        f"{symptom.seen}: the process destroyed its timer of {period} again, {gone_s:.2f} s after "
+        "launch",
+        "A timer lasts as long as a variable that holds it. Keep it in a member of the class, "
+        "timer_ = this->create_wall_timer(...): a local variable, as in `auto timer = ...`, ends "
+        "with the constructor. Look for timer_.reset() and timer_ = nullptr, too.",
+        Evidence(moments=(Moment("timer destroyed", gone_s), *symptom.moments)),
+    )
+
+
 @explanation(NoMessages)
 def slow_timer(symptom: NoMessages) -> Cause | None:
     """The timer's period is longer than the observation: milliseconds were given as seconds."""

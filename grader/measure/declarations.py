@@ -43,6 +43,15 @@ def traced(recording: Recording, process: str | None = None) -> bool:
     return bool(started) and all(item.name in started for item in recording.processes)
 
 
+def is_compiled(recording: Recording, process: str) -> bool:
+    """Whether a process is no Python program: as its tracer says, or how its package is built."""
+    began = [item for item in recording.declared("started") if item.process == process]
+    if began:
+        return any("language" in item.data for item in began)
+    package = recording.submission.package(process.partition("/")[0])
+    return package is not None and package.build_type == "ament_cmake"
+
+
 def declares(recording: Recording, kind: str, process: str | None = None, **texts: str) -> bool:
     """Whether a process (or any) declared something, such as a ``publisher`` on a ``topic``."""
     return any(
@@ -83,7 +92,7 @@ def in_no_executor(recording: Recording, node: str) -> bool:
 
 
 def exiting_ns(recording: Recording, process: str) -> int | None:
-    """When Python began to end in its usual way in the process, or None where it did not."""
+    """When a process began to end in its usual way, or None where it did not."""
     began = [item for item in recording.declared("started") if item.process == process]
     # A process may have been started again, and children may have ended under its name.
     ends = [
@@ -103,6 +112,16 @@ def timers(recording: Recording) -> tuple[DeclaredTimer, ...]:
             callback = _text(item.data, "callback") or ""
             found.append(DeclaredTimer(period_s, item.time_ns, callback))
     return tuple(found)
+
+
+def last_timer_destroyed_ns(recording: Recording) -> int | None:
+    """When a process destroyed its last timer, or None where one was kept or none declared.
+
+    Only compiled programs tell: rclpy keeps a timer as long as its node.
+    """
+    ends = [_destroyed_ns(recording, item) for item in recording.declared("timer")]
+    known = [time_ns for time_ns in ends if time_ns is not None]
+    return max(known) if known and len(known) == len(ends) else None
 
 
 def timer_of_zero(recording: Recording) -> bool:
@@ -130,16 +149,22 @@ def _on(recording: Recording, kind: Kind, topic: str) -> list[Declaration]:
     return [item for item in recording.declared(kind.value) if _text(item.data, "topic") == topic]
 
 
-def _was_destroyed(recording: Recording, endpoint: Declaration) -> bool:
-    """Whether the process declared an endpoint destroyed before the observation ended."""
-    number = endpoint.data.get("number")
-    return number is not None and any(
-        item.process == endpoint.process
-        and item.data.get("pid") == endpoint.data.get("pid")
+def _was_destroyed(recording: Recording, made: Declaration) -> bool:
+    return _destroyed_ns(recording, made) is not None
+
+
+def _destroyed_ns(recording: Recording, made: Declaration) -> int | None:
+    """When a process declared an endpoint or a timer destroyed while it was observed, or None."""
+    number = made.data.get("number")
+    ends = (
+        item.time_ns
+        for item in recording.declared("destroyed")
+        if item.process == made.process
+        and item.data.get("pid") == made.data.get("pid")
         and item.data.get("number") == number
         and item.time_ns < recording.stop_ns
-        for item in recording.declared("destroyed")
     )
+    return None if number is None else next(ends, None)
 
 
 def profiles(recording: Recording, kind: Kind, topic: str) -> tuple[tuple[str, Qos], ...]:

@@ -71,6 +71,11 @@ BUSY = taken(0.1, 4.4, waited_s=4.2)
 FAILED_BUILD = BuildRecord(
     False, 1.0, failed_packages=("bot_publisher",), log="Starting >>> bot_publisher\n"
 )
+DESTROYED_TIMER = (
+    *declarations(timer_s=None),
+    declared("timer", number=2, period_s=0.3),
+    declared("destroyed", 0.5, number=2),
+)
 HANGS = tuple(call(0.5 * n, None) for n in range(2, 6))
 
 
@@ -261,6 +266,7 @@ CASES: list[Group] = [
             "NoMessages.process_ended": silent(processes=(died(1),)),
             "NoMessages.publisher_destroyed": silent(endpoints=(gone(endpoint()), reader())),
             "NoMessages.nothing_to_answer NotDelivered.no_endpoint": answering(),
+            "NoMessages.timer_destroyed": silent(declarations=DESTROYED_TIMER),
             "NoMessages.slow_timer": silent(declarations=declarations(timer_s=300.0)),
             "NoMessages.no_cpu_time": silent(calls=(), disturbance=BUSY),
             "NoMessages.never_spun": silent(declarations=declarations(spin=False)),
@@ -280,6 +286,9 @@ CASES: list[Group] = [
             ),
             "FewMessages.publisher_destroyed": recording(
                 messages=messages([0.7]), endpoints=(gone(endpoint()), reader())
+            ),
+            "FewMessages.timer_destroyed": recording(
+                messages=messages([1.0]), declarations=DESTROYED_TIMER
             ),
             "FewMessages.never_spun": recording(
                 messages=messages([1.0]), declarations=declarations(spin=False)

@@ -8,8 +8,8 @@ import pytest
 
 from grader.diagnosis.explanation import Explanation, explanations
 from grader.diagnosis.no_messages import FewMessages, NoMessages
-from grader.diagnosis.process.exceptions import TABLE, Raised, Row
-from grader.diagnosis.process.raised import Failure, Frame
+from grader.diagnosis.process.exceptions import CPP, TABLE, Raised, Row
+from grader.diagnosis.process.failure import Failure, Frame
 from grader.docs import explanations_markdown
 from tests.checks.builder import recording
 
@@ -83,10 +83,13 @@ def test_a_row_of_the_table_matches_all_that_it_says(
     assert row(raised) == hint
 
 
-@pytest.mark.parametrize("entry", TABLE.exceptions, ids=lambda entry: entry.example[:60])
-def test_every_row_of_the_table_answers_for_its_example(entry: Row) -> None:
+@pytest.mark.parametrize(
+    "entry", (*TABLE.exceptions, *CPP.exceptions), ids=lambda entry: entry.example[:60]
+)
+def test_every_row_of_the_tables_answers_for_its_example(entry: Row) -> None:
     type_, _, message = entry.example.partition(": ")
     frame = Frame(f"/opt/ros/jazzy/{entry.raised_in or 'bot/node.py'}", 1, "f", entry.line)
-    raised = Raised(Failure(type_, message, (frame,)), recording())
+    compiled = entry in CPP.exceptions
+    raised = Raised(Failure(type_, message, (frame,), compiled=compiled), recording())
     answer = next(one for one in explanations()[Raised] if one.apply(raised) is not None)
     assert answer.sentence == entry.mistake

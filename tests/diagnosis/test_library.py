@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from grader.diagnosis.process import missing_library
+from grader.diagnosis.process.failure import Failure
 from grader.diagnosis.process.missing_library import library_hint
-from grader.diagnosis.process.raised import Failure
 from grader.recording.model import Ending, Recording
 from grader.submission.record import PackageRecord, SubmissionRecord
 

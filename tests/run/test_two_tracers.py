@@ -84,7 +84,9 @@ def seen(recording: Recording) -> Iterator[str]:
         data = item.data
         if item.kind in ("publisher", "subscription"):
             topics[data["number"]] = f"{item.kind} on {data['topic']}"
-        if item.kind in SEEN_BY_RCL:
+        # A timer of rclpy lasts as long as its node: only the compiled tracer tells of its end.
+        is_timer = item.kind == "destroyed" and data.get("number") not in topics
+        if item.kind in SEEN_BY_RCL and not is_timer:
             what = {key: data.get(key) for key in SEEN_BY_RCL[item.kind]}
             yield f"{item.kind}: {what or topics.get(data.get('number'), '')}"
 

@@ -1,4 +1,4 @@
-"""What to try after an exception: the table ``exceptions.yaml``, and what no table can tell."""
+"""What to try after an exception: the tables beside this module, and what no table can tell."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from pathlib import Path
 from string import Template
 
 from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
+from grader.diagnosis.process.failure import Failure, Frame
 from grader.diagnosis.process.missing_library import library_hint
-from grader.diagnosis.process.raised import Failure, Frame, student_place
+from grader.diagnosis.process.raised import student_place
 from grader.findings.wording import code
 from grader.recording.model import Recording
 from grader.spec.source import Model, read_source
@@ -48,12 +49,22 @@ class Row(Model):
         """The same of an exception alone."""
         last = failure.frames[-1] if failure.frames else Frame("", 0)
         found = re.search(self.message, failure.message)
-        if found is None or self.type not in ("", failure.type) or self.raised_in not in last.file:
+        # Classes of C++ have the same names as those of Python, in a namespace.
+        is_type = not self.type or re.fullmatch(self.type, failure.type.rpartition("::")[2])
+        if found is None or not is_type or self.raised_in not in last.file:
             return None
         names = {key: text for key, text in found.groupdict().items() if text}
         if not re.search(Template(self.source).safe_substitute(names), last.source):
             return None
         return Template(self.hint).safe_substitute(names)
+
+
+class CppRow(Row):
+    """The same of what ends compiled programs only."""
+
+    def __call__(self, symptom: Raised) -> str | None:
+        """The hint, if the failure is that of the mistake."""
+        return self.hint_for(symptom.failure) if symptom.failure.compiled else None
 
 
 class Table(Model):
@@ -67,7 +78,19 @@ class Table(Model):
     imports: dict[str, str]
 
 
+class CppTable(Model):
+    """The whole of ``exceptions_cpp.yaml``."""
+
+    exceptions: tuple[CppRow, ...]
+
+
 TABLE = read_source(Path(__file__).with_suffix(".yaml")).read(Table)
+CPP = read_source(Path(__file__).with_name("exceptions_cpp.yaml")).read(CppTable)
+_GDB = (
+    "Find the line with a debugger: `ros2 run --prefix 'gdb -ex run --args' PACKAGE EXECUTABLE`, "
+    "then `bt` for the functions that were being called. It names lines only if the program is "
+    "built with -g."
+)
 
 
 @explanation(Raised)
@@ -92,15 +115,17 @@ def not_imported(symptom: Raised) -> str | None:
     return None
 
 
-for _row in TABLE.exceptions:
+for _row in (*CPP.exceptions, *TABLE.exceptions):
     add(Explanation(Raised, _row.mistake, _row, __name__, _row.mistake, example=_row.example))
 
 
 @explanation(Raised, general=True)
 def any_exception(symptom: Raised) -> str | None:
     """Any other exception: the line that raised it is named."""
-    if not symptom.failure.frames:
-        return None
     if student_place(symptom.failure, symptom.recording.submission):
         return "Correct the line that is named here."
+    if symptom.failure.compiled:
+        return _GDB
+    if not symptom.failure.frames:
+        return None
     return "Read the traceback from its last line upwards."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from grader.diagnosis.process.raised import Failure
+from grader.diagnosis.process.failure import Failure
 from grader.findings.wording import code, codes
 from grader.recording.model import Recording
 from grader.spec.nearest_name import nearest

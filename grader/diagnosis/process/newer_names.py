@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from grader.diagnosis.process.raised import Failure
+from grader.diagnosis.process.failure import Failure
 from grader.recording.model import Recording
 from grader.spec.source import Model, read_source
 

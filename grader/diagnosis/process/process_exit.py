@@ -10,9 +10,10 @@ from pathlib import Path
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
 from grader.diagnosis.process.exceptions import Raised
+from grader.diagnosis.process.failure import Failure
 from grader.diagnosis.process.missing_library import lacking_package
 from grader.diagnosis.process.newer_names import newer_name
-from grader.diagnosis.process.raised import Failure, fatal_failure, in_brackets, student_place
+from grader.diagnosis.process.raised import fatal_failure, in_brackets, student_place
 from grader.findings.finding import Evidence, Moment
 from grader.findings.wording import code, codes
 from grader.measure import declarations
@@ -23,6 +24,8 @@ from grader.submission.record import SourceError
 from grader.submission.underlay.definition import sets_with
 
 _LOG_LINES = 15
+# What a failure ends a compiled program by.
+_CRASHES = ("SIGSEGV", "SIGABRT", "SIGFPE", "SIGILL", "SIGBUS")
 # As `ros2 launch` says it.
 _NO_LAUNCH_FILE = re.compile(
     r"file '(?P<file>[^']+)' was not found in the share directory of package '(?P<package>[^']+)'"
@@ -138,8 +141,14 @@ class ProcessExit(Symptom[Cause]):
 
     @property
     def failure(self) -> Failure | None:
-        """The exception that ended it."""
-        return None if self.killed else fatal_failure(self.recording, self.process.name)
+        """The exception that ended it, or the crash of a compiled program."""
+        failure = fatal_failure(self.recording, self.process.name)
+        if not declarations.is_compiled(self.recording, self.process.name):
+            return None if self.killed else failure
+        if failure is None and self.killed and self.killed.name in _CRASHES:
+            words = TABLE.signals[self.killed.name]
+            return Failure(self.killed.name, words, (), compiled=True)
+        return failure
 
     @property
     def place(self) -> SourceError | None:
@@ -269,8 +278,11 @@ def raised(symptom: ProcessExit) -> Cause | None:
     failure = symptom.failure
     if failure is None:
         return None
+    where = in_brackets(symptom.place)
+    if failure.compiled and failure.frames and not where:
+        where = f" in {code(failure.frames[-1].where)}"
     return Cause(
-        f"{symptom.seen} with {failure}{in_brackets(symptom.place)}",
+        f"{symptom.seen} with {failure}{where}",
         cause_of(Raised(failure, symptom.recording)),
         replace(symptom.evidence, places=(symptom.place,) if symptom.place else ()),
     )

@@ -1,11 +1,13 @@
-"""Python tracebacks in a process's output: what was raised, and where in the student's files."""
+"""What a process raised, as its output tells, and where that is in the student's files."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from grader.diagnosis.process.crash import parse_crashes
+from grader.diagnosis.process.failure import Failure, Frame
+from grader.measure import declarations
 from grader.recording.model import Recording
 from grader.submission.record import SourceError, SubmissionRecord
 
@@ -18,43 +20,7 @@ _IGNORED = "Exception ignored in"
 _FRAME = re.compile(r'\s+File "(?P<file>[^"]+)", line (?P<line>\d{1,7})(?:, in (?P<where>.+))?')
 _RAISED = re.compile(r"(?P<type>[A-Za-z_][A-Za-z0-9_.]{0,200})(?:: (?P<message>.*))?")
 _INSTALL_FOLDERS = ("site-packages", "dist-packages")
-
-
-@dataclass(frozen=True)
-class Frame:
-    """One step of a traceback.
-
-    Attributes:
-        line: Line from 1.
-        where: Function, or ``<module>``; empty for a syntax error.
-        source: The line of code, or empty.
-    """
-
-    file: str
-    line: int
-    where: str = ""
-    source: str = ""
-
-
-@dataclass(frozen=True)
-class Failure:
-    """An exception as the interpreter printed it.
-
-    Attributes:
-        type: Short name of the class, such as ``ValueError``.
-        linked: It came of the exception before it.
-        ignored: Python printed and ignored it (``Exception ignored in ...``).
-    """
-
-    type: str
-    message: str
-    frames: tuple[Frame, ...]
-    linked: bool = False
-    ignored: bool = False
-
-    def __str__(self) -> str:
-        """Write it as Python does: ``ValueError: math domain error``."""
-        return f"{self.type}: {self.message}" if self.message else self.type
+_OF_CPP = (".cpp", ".cc", ".cxx", ".c", ".hpp", ".hh", ".hxx", ".h")
 
 
 def parse_failures(lines: Sequence[str]) -> tuple[Failure, ...]:
@@ -102,9 +68,11 @@ def _parse_one(
 
 
 def failures(recording: Recording, process: str) -> tuple[Failure, ...]:
-    """Every traceback that a process wrote to stderr."""
-    return parse_failures(
-        [line.text for line in recording.log if line.process == process and line.stream == "stderr"]
+    """Every failure that a process wrote to stderr: tracebacks, or what ends compiled programs."""
+    of_process = (line for line in recording.log if line.process == process)
+    lines = [line.text for line in of_process if line.stream == "stderr"]
+    return parse_failures(lines) or (
+        parse_crashes(lines) if declarations.is_compiled(recording, process) else ()
     )
 
 
@@ -167,8 +135,13 @@ def _student_frame(failure: Failure, submission: SubmissionRecord) -> Frame | No
 def submission_path(installed: str, submission: SubmissionRecord) -> str | None:
     """Path in the submission of a file as a process named it, or None if it is not the student's.
 
-    The longest of the known installed paths that the given path ends with wins.
+    The longest of the known installed paths that the given path ends with wins. A compiled program
+    knows the path of its source instead.
     """
+    if installed.endswith(_OF_CPP):
+        named = (path for path in submission.files if f"/{installed}".endswith(f"/{path}"))
+        within = (path for path in submission.files if path.endswith(f"/{installed}"))
+        return max(named, key=len, default=None) or next(within, None)
     known = [pair for package in submission.packages for pair in package.files]
     known += [
         (f"share/{package.name}/{new}", old)

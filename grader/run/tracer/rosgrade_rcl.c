@@ -410,8 +410,8 @@ static void forget(const void * handle)
   pthread_mutex_lock(&lock);
   entity_t * one = find(handle);
   if (one) {
-    bool is_endpoint = strcmp(one->kind, "publisher") == 0 || strcmp(one->kind, "subscription") == 0;
-    number = is_endpoint ? one->number : -1;
+    /* Services are not declared. */
+    number = strcmp(one->kind, "service") != 0 ? one->number : -1;
     one->handle = NULL;
   }
   pthread_mutex_unlock(&lock);
@@ -551,10 +551,11 @@ static void report_timer(const rcl_timer_t * timer, int64_t period)
   }
   snprintf(serves, sizeof(serves), "%g s", period / 1e9);
   pthread_mutex_lock(&lock);
-  keep(timer, "timer", serves);
+  entity_t * one = keep(timer, "timer", serves);
+  int number = one ? one->number : -1;
   pthread_mutex_unlock(&lock);
   line_t line = begin("timer");
-  add(&line, ", \"period_s\": %.9g", period / 1e9);
+  add(&line, ", \"number\": %d, \"period_s\": %.9g", number, period / 1e9);
   send_line(&line);
 }
 
