@@ -15,7 +15,7 @@ from grader import ros
 from grader.errors import GraderFault
 from grader.run.host.load import cpu_count
 from grader.spec.unit import format_duration
-from grader.submission.build.toolchain import has_headers, headers_package
+from grader.submission.build.toolchain import has_headers, headers_package, missing_tools
 
 
 @dataclass(frozen=True)
@@ -109,6 +109,10 @@ def _underlays(installation: ros.RosInstallation) -> Iterator[Part]:
     remedy = "what an assignment may need besides; `rosgrade underlay add NAME`"
     absent = f"; not here: {', '.join(sorted(missing))} ({remedy})" if missing else ""
     yield Part("underlays", True, f"{', '.join(there) or 'none'}{absent}")
+    tools = missing_tools(installation.environment({})["PATH"])
+    lacks = [f"sudo apt install {' '.join(tools)}"] if tools else []
+    lacks += ["rosgrade underlay add rclcpp"] if "rclcpp" in missing else []
+    yield Part("nodes in C++", not lacks, "can be graded", "; then ".join(lacks))
     found = find_command(installation)
     yield Part("ros2", found is not None, str(found), REMEDY)
 

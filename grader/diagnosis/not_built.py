@@ -15,7 +15,7 @@ from grader.submission.build.build_log import modules_not_found, not_found
 from grader.submission.build.toolchain import TOOLS
 from grader.submission.intake.paths import is_within
 from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
-from grader.submission.underlay.definition import sets_with
+from grader.submission.underlay.definition import ways_to_get
 
 _LOG_LINES = 15
 # Of the first error's message, which may join several lines of the log.
@@ -238,8 +238,8 @@ def why_lacking(submission: SubmissionRecord, name: str) -> Cause | None:
 
 
 def _not_here(lacking: list[str]) -> Cause:
-    sets = ", ".join(sets_with(lacking))
-    other = f", and so does `underlays: [{sets}]` in assignment.yaml" if sets else ""
+    ways = ways_to_get(lacking)
+    other = f", and so does {ways}" if ways else ""
     return Cause(
         f"it needs {codes(lacking)} to build: ROS 2 Jazzy has it, but it is not installed on the "
         "machine that grades",

@@ -163,7 +163,7 @@ def _prepare(
         return Prepared(record, None)
     used = {name for package in packages for name in package.named}
     used -= {package.name for package in packages}
-    ros = store.completed(ros, used)
+    ros = store.completed(store.needed(ros, used), used)
     sources = Sources(
         files={file.path for file in located.files},
         folders={package.name: package.folder for package in packages},

@@ -21,7 +21,7 @@ from grader.recording.model import Ending, Process, Recording
 from grader.spec.source import Model, read_source
 from grader.submission.read.rosdistro import PYTHON_MODULES
 from grader.submission.record import SourceError
-from grader.submission.underlay.definition import sets_with
+from grader.submission.underlay.definition import ways_to_get
 
 _LOG_LINES = 15
 # What a failure ends a compiled program by.
@@ -258,9 +258,9 @@ def machine_lacks_it(symptom: ProcessExit) -> Cause | None:
     if newer:
         name, needs = newer
     elif lacking:
-        sets = ", ".join(sets_with(PYTHON_MODULES.get(lacking, (lacking,))))
+        ways = ways_to_get(PYTHON_MODULES.get(lacking, (lacking,)))
         apt = f"`sudo apt install ros-jazzy-{lacking.replace('_', '-')}`"
-        name, needs = lacking, f"`underlays: [{sets}]` in assignment.yaml" if sets else apt
+        name, needs = lacking, ways or apt
     else:
         return None
     return Cause(

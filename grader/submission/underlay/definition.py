@@ -43,11 +43,14 @@ class Repos(Model):
     Attributes:
         requires: Named sets that it is built on.
         python: Python libraries that its packages import.
+        by_need: Whether a submission that names one of its packages gets it where it is built, also
+            if the assignment does not name it.
     """
 
     repositories: dict[str, Repository] = Field(min_length=1)
     requires: tuple[str, ...] = ()
     python: tuple[str, ...] = ()
+    by_need: bool = False
 
 
 @dataclass(frozen=True)
@@ -76,15 +79,32 @@ class Underlay:
         """Python libraries that its packages import."""
         return self.repos.python if self.repos else ()
 
+    @property
+    def by_need(self) -> bool:
+        """Whether submissions get it that need it, also if the assignment does not name it."""
+        return self.repos is not None and self.repos.by_need
+
 
 def named_sets() -> tuple[str, ...]:
     """Names of the sets that come with rosgrade."""
     return tuple(sorted(file.stem for file in SETS.glob(f"*{SUFFIX}")))
 
 
-def sets_with(packages: Collection[str]) -> list[str]:
+def sets_with(packages: Collection[str]) -> list[Underlay]:
     """The named sets that have one of some packages."""
-    return [name for name in named_sets() if not find_underlay(name).listed.isdisjoint(packages)]
+    found = map(find_underlay, named_sets())
+    return [one for one in found if not one.listed.isdisjoint(packages)]
+
+
+def ways_to_get(packages: Collection[str]) -> str:
+    """How an instructor gives some packages to submissions, or nothing if no named set has them."""
+    ways = [
+        f"`rosgrade underlay add {one.name}` on that machine"
+        if one.by_need
+        else f"`underlays: [{one.name}]` in assignment.yaml"
+        for one in sets_with(packages)
+    ]
+    return " and ".join(ways)
 
 
 def find_underlay(given: str, beside: Path = Path()) -> Underlay:

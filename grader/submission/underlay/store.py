@@ -12,6 +12,7 @@ import hashlib
 import json
 import shutil
 from collections.abc import Callable, Collection, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,7 +33,7 @@ from grader.submission.build.toolchain import check_toolchain, missing_tools
 from grader.submission.intake.listing import find_packages
 from grader.submission.intake.locate import opened
 from grader.submission.read.manifest import MANIFEST, read_manifest
-from grader.submission.underlay.definition import Underlay, find_underlay
+from grader.submission.underlay.definition import Underlay, find_underlay, sets_with
 from grader.submission.underlay.fetch import fetch
 
 if TYPE_CHECKING:
@@ -179,6 +180,15 @@ class UnderlayStore:
             return self._entry(key) / INSTALL
         return self._build(folder.name, folder, ros, self._passing, key, names)
 
+    def needed(self, ros: RosInstallation, named: Collection[str]) -> RosInstallation:
+        """Add to an installation the sets that are taken by need, where they are built."""
+        for underlay in sets_with(frozenset(named) - ros.packages):
+            if underlay.by_need:
+                # Where it is not, the build says what it lacks, and the rest is graded.
+                with suppress(MissingUnderlay):
+                    ros = on_top(ros, self._prefixes(underlay))
+        return ros
+
     def completed(self, ros: RosInstallation, named: Iterable[str]) -> RosInstallation:
         """Add to an installation what it lacks of the packages that are carried along."""
         if missing_tools(ros.environment({})["PATH"]):
@@ -241,7 +251,8 @@ class UnderlayStore:
         assert underlay.repos is not None
         required = [self._key(one) for one in _required(underlay) if self._wanted(one)]
         wanted = sorted(self._wanted(underlay))
-        return self._digest(underlay.repos.model_dump_json(), wanted, required)
+        sources = underlay.repos.model_dump_json(exclude={"by_need"})
+        return self._digest(sources, wanted, required)
 
     def _folder_key(
         self, folder: Path, ros: RosInstallation, names: Collection[str] | None = None

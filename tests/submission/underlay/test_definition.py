@@ -7,7 +7,12 @@ from pathlib import Path
 import pytest
 
 from grader.errors import AssignmentError, UsageError
-from grader.submission.underlay.definition import find_underlay, named_sets, sets_with
+from grader.submission.underlay.definition import (
+    find_underlay,
+    named_sets,
+    sets_with,
+    ways_to_get,
+)
 
 REPOSITORY = "repositories:\n  a/b:\n    type: git\n    url: https://example.org/b.git\n"
 
@@ -54,5 +59,11 @@ def test_an_unknown_name_is_told_the_nearest(tmp_path: Path) -> None:
 
 
 def test_the_set_that_has_a_package_is_found() -> None:
-    assert sets_with({"tf2_ros_py", "turtlesim"}) == ["tf2"]
+    assert [one.name for one in sets_with({"tf2_ros_py", "turtlesim"})] == ["tf2"]
     assert sets_with({"turtlesim"}) == []
+
+
+def test_what_students_choose_needs_a_command_and_the_rest_an_entry_of_the_assignment() -> None:
+    assert ways_to_get({"rclcpp"}) == "`rosgrade underlay add rclcpp` on that machine"
+    assert ways_to_get({"tf2_ros_py"}) == "`underlays: [tf2]` in assignment.yaml"
+    assert ways_to_get({"turtlesim"}) == ""

@@ -92,6 +92,24 @@ def test_a_file_is_built_once_laid_under_submissions_and_removed(
 
 @pytest.mark.ros
 @pytest.mark.slow
+def test_a_set_by_need_is_laid_where_it_is_built_under_what_names_one_of_its_packages(
+    real_ros: RosInstallation,
+    repository: Repository,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    repository.commit("arm", tag="1.0.0")
+    repos(tmp_path, repository.entry("1.0.0", packages="[arm]"), "by_need: true\n")
+    monkeypatch.setattr("grader.submission.underlay.definition.SETS", tmp_path)
+    store = UnderlayStore(tmp_path / "cache", real_ros)
+    assert store.needed(real_ros, {"arm"}) == real_ros
+    store.add(find_underlay("course"), 20.0)
+    assert store.needed(real_ros, {"leg"}) == real_ros
+    assert store.needed(real_ros, {"arm"}).packages - real_ros.packages == {"arm"}
+
+
+@pytest.mark.ros
+@pytest.mark.slow
 def test_a_package_that_does_not_build_is_named_with_its_reason_and_tried_again(
     real_ros: RosInstallation, repository: Repository, tmp_path: Path
 ) -> None:
