@@ -14,11 +14,10 @@ from grader.findings.finding import Evidence, Moment
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.wording import code, codes, counted
 from grader.measure import compatibility
-from grader.measure.declarations import was_held_up
+from grader.measure.declarations import is_compiled_publisher, was_held_up
 from grader.recording.model import NS, Endpoint, Kind, Owner, Recording
 from grader.spec.unit import format_duration
 
-SECONDS_HINT = "create_timer takes its period in seconds: 0.3 is 300 ms."
 ENDED_HINT = (
     "Publish in every call of the callback. Look for a counter or a condition that ends it, for "
     "timer.cancel() and timer.reset(), and for a callback that does not return."
@@ -119,6 +118,19 @@ class NotDelivered(OnTopic):
     def seen(self) -> str:
         """The symptom in words."""
         return "its callback is never called"
+
+
+def seconds_hint(
+    recording: Recording, topic: str, example: str = "0.3 is 300 ms", period_s: float = 0.3
+) -> str:
+    """What a timer takes as its period, in the language of what publishes on a topic."""
+    if is_compiled_publisher(recording, topic):
+        return (
+            "create_wall_timer takes a period with its unit, such as "
+            f"{format_duration(period_s).replace(' ', '')}: `300s` is 300 seconds. Of a number "
+            "make one with std::chrono::milliseconds(number)."
+        )
+    return f"create_timer takes its period in seconds: {example}."
 
 
 def why_silent(recording: Recording, topic: str) -> Cause:

@@ -9,10 +9,10 @@ from grader.diagnosis.explanation import explanation
 from grader.diagnosis.no_answer import why_raised
 from grader.diagnosis.no_messages import (
     ENDED_HINT,
-    SECONDS_HINT,
     FewMessages,
     NoMessages,
     OnTopic,
+    seconds_hint,
     why_not_delivered,
 )
 from grader.diagnosis.process.blocked_executor import left_s, why_blocked, why_never_spun
@@ -63,7 +63,7 @@ def slow_timer(symptom: NoMessages) -> Cause | None:
     return Cause(
         f"{symptom.seen} in {format_duration(watched_s)}: the process declared a "
         f"timer of {format_duration(timer.period_s)}",
-        SECONDS_HINT,
+        seconds_hint(recording, symptom.topic),
         Evidence(
             moments=(
                 Moment("timer declared", recording.since_launch_s(timer.declared_ns)),
@@ -188,7 +188,7 @@ def publishing_stopped(symptom: FewMessages) -> Cause:
     return Cause(
         f"{symptom.seen}; the process declared a timer of "
         f"{listing(map(format_duration, period_s))}",
-        SECONDS_HINT if is_slow else ENDED_HINT,
+        seconds_hint(recording, symptom.topic) if is_slow else ENDED_HINT,
         evidence,
     )
 

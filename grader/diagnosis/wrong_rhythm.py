@@ -9,6 +9,7 @@ from statistics import mean
 
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, explanation
+from grader.diagnosis.no_messages import seconds_hint
 from grader.diagnosis.process.blocked_executor import left_s, long_wait
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Moment
@@ -55,10 +56,8 @@ class WrongRhythm(Symptom[Cause]):
     def seconds_hint(self) -> str:
         """The period as an argument of create_timer."""
         wanted_s = self.limits.period_s
-        return (
-            f"create_timer takes its period in seconds: {format_duration(wanted_s)} is "
-            f"{wanted_s:g}."
-        )
+        example = f"{format_duration(wanted_s)} is {wanted_s:g}"
+        return seconds_hint(self.recording, self.topic, example, wanted_s)
 
     def declares(self, period_s: float) -> list[float]:
         """The declared periods that are nearly this one."""
@@ -148,15 +147,17 @@ def other_timer(symptom: WrongRhythm) -> Cause | None:
 @explanation(WrongRhythm)
 def timer_of_zero(symptom: WrongRhythm) -> Cause | None:
     """A timer of 0 s fires again and again without a pause."""
-    if symptom.verdict.median_s > symptom.limits.period_s or not declarations.timer_of_zero(
-        symptom.recording
-    ):
+    recording = symptom.recording
+    too_often = symptom.verdict.median_s <= symptom.limits.period_s
+    if not too_often or not declarations.timer_of_zero(recording):
         return None
+    how = "300 // 1000 or int(0.3)"
+    if declarations.is_compiled_publisher(recording, symptom.topic):
+        how = "std::chrono::seconds(300 / 1000)"
     return Cause(
         "messages come too often: the process declared a timer of 0 s, which fires again and "
         "again without a pause",
-        "A period below 1 s becomes 0 as an integer, as in 300 // 1000 or int(0.3). "
-        f"{symptom.seconds_hint}",
+        f"A period below 1 s becomes 0 as an integer, as in {how}. {symptom.seconds_hint}",
     )
 
 

@@ -52,6 +52,21 @@ def is_compiled(recording: Recording, process: str) -> bool:
     return package is not None and package.build_type == "ament_cmake"
 
 
+def is_compiled_publisher(recording: Recording, topic: str) -> bool:
+    """Whether a compiled program publishes on a topic."""
+    names = {item.process for item in _on(recording, Kind.PUBLISHER, topic)}
+    names = names or {process.name for process in recording.processes}
+    return any(is_compiled(recording, name) for name in names)
+
+
+def hides_calls(recording: Recording) -> bool:
+    """Whether an EventsExecutor of rclpy spins: it calls from C++, where no tracer in Python is."""
+    return any(
+        item.data.get("executor") == "EventsExecutor" and not is_compiled(recording, item.process)
+        for item in recording.declared("spin")
+    )
+
+
 def declares(recording: Recording, kind: str, process: str | None = None, **texts: str) -> bool:
     """Whether a process (or any) declared something, such as a ``publisher`` on a ``topic``."""
     return any(
@@ -207,8 +222,7 @@ def not_in_callback(recording: Recording, topic: str) -> bool:
         for item in recording.declared("published")
         if item.time_ns <= recording.stop_ns and _text(item.data, "topic") == topic
     ]
-    # What an EventsExecutor calls, it calls from C++.
-    return published[-1:] == [False] and not declares(recording, "spin", executor="EventsExecutor")
+    return published[-1:] == [False] and not hides_calls(recording)
 
 
 def changed_environment(recording: Recording) -> list[str]:

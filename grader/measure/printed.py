@@ -30,8 +30,9 @@ _GROUPED = re.compile(
 )
 # Typographers' sign, which some locales and tables write.
 _MINUS = "\N{MINUS SIGN}"
-# `{position.x:.2f}` as it stands in the source.
+# `{position.x:.2f}` as it stands in the source; of C++ `%.2f`, and `{}` of std::format.
 _UNFILLED = re.compile(r"\{[A-Za-z_][^{}\s\"',]*\}")
+_UNFILLED_CPP = re.compile(r"%[-+0-9.]*l{0,2}[dfgsuz]|\{[^{}\s\"',]*\}")
 # `x = 1.37`, `y: -0.62`, `"x": 1.37`: a name and its number with nothing but such signs between.
 _NAMED = re.compile(
     r"""(?<![A-Za-z0-9_])(?P<name>[A-Za-z_]\w*)["']?[ \t]*[:=][ \t]*(?P<number>"""
@@ -72,9 +73,9 @@ def numbers(line: str) -> tuple[float, ...]:
     return tuple(found)
 
 
-def unfilled(line: str) -> str | None:
-    """What stands in braces where a value should: the text of an f-string without its f."""
-    found = _UNFILLED.search(logged_text(line))
+def unfilled(line: str, *, compiled: bool = False) -> str | None:
+    """What stands where a value should, such as the braces of an f-string without its f."""
+    found = (_UNFILLED_CPP if compiled else _UNFILLED).search(logged_text(line))
     return found[0] if found else None
 
 

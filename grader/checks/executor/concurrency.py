@@ -19,7 +19,13 @@ from grader.diagnosis.undeclared import why_undeclared
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code, codes, counted, listing
 from grader.measure.callback_runs import Event, Run, overlaps, paired, spans, timed
-from grader.measure.declarations import declares, executors, traced, was_held_up
+from grader.measure.declarations import (
+    declares,
+    executors,
+    hides_calls,
+    traced,
+    was_held_up,
+)
 from grader.recording.model import NS, Recording
 from grader.spec.unit import Dimension, parse_quantity
 
@@ -129,7 +135,7 @@ def _why_missing(
 
 
 def _why_not_seen(recording: Recording, seen: str, *, declared: bool = True) -> Cause:
-    if declared and declares(recording, "spin", executor="EventsExecutor"):
+    if declared and hides_calls(recording):
         return Cause(f"{seen}: an EventsExecutor does not tell when callbacks run", ours=True)
     if declared and not traced(recording):
         return why_undeclared(recording, "its executor and callbacks")

@@ -12,7 +12,7 @@ from grader.checks.check import NamedFields, Parameters, Subject, check, toleran
 from grader.checks.need import Published, Recorded
 from grader.diagnosis.explanation import explain
 from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
-from grader.diagnosis.wrong_value import WrongValue, accumulates, was_integer
+from grader.diagnosis.wrong_value import WrongValue, accumulates, misread_hint
 from grader.findings.fields import (
     FieldTolerance,
     difference_table,
@@ -36,6 +36,7 @@ from grader.findings.value import (
     tolerance_of,
 )
 from grader.findings.wording import code, codes, counted
+from grader.measure.declarations import is_compiled_publisher
 from grader.measure.numbering import is_numbered, published
 from grader.recording.model import Kind, Recording
 from grader.spec.expression import Expression
@@ -215,12 +216,14 @@ def _wrong(
     more = len(found) - _MOST_FIELDS
     observed += f" and {counted(more, 'more wrong field')}" if more > 0 else ""
     field, message = found[0].field, messages[first - 1]
+    compiled = is_compiled_publisher(recording, parameters.topic)
     if accumulates(found[0].expected, [leaves(item.value).get(field) for item in messages]):
         observed += f": {field} grows from message to message, as if added up"
     else:
         tolerance = tolerance_of(parameters.tolerance, field)
         always = wrong == len(messages)
-        clause = explain(WrongValue(found, leaves(message.value), tolerance, always=always))
+        symptom = WrongValue(found, leaves(message.value), tolerance, always, compiled)
+        clause = explain(symptom)
         observed += f": {clause}" if clause else ""
     if len(messages) > 1:
         observed += f" ({wrong} of {counted(len(messages), 'message')} wrong)"
@@ -228,7 +231,7 @@ def _wrong(
     return Finding.failed(
         parameters.words,
         observed,
-        _hint(found, len(messages), len(messages) - wrong),
+        _hint(found, len(messages), len(messages) - wrong, compiled=compiled),
         Evidence(
             moments=(Moment(f"message {first} is wrong", when_s),),
             tables=(difference_table(f"Message {first}", found),),
@@ -236,9 +239,11 @@ def _wrong(
     )
 
 
-def _hint(found: tuple[Difference, ...], number: int, right: int) -> str:
-    if any(was_integer(item.observed) for item in found):
-        return "A number in a message must be a float: write 1.0 instead of 1, or float(value)."
+def _hint(found: tuple[Difference, ...], number: int, right: int, *, compiled: bool) -> str:
+    hints = (misread_hint(item.observed, compiled=compiled) for item in found)
+    hint = next(filter(None, hints), None)
+    if hint:
+        return hint
     if right:
         return (
             f"{counted(right, 'message')} of {number} {'is' if right == 1 else 'are'} right. Look "

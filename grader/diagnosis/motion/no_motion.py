@@ -11,13 +11,14 @@ from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
-from grader.diagnosis.wrong_value import MISREAD, was_integer
+from grader.diagnosis.wrong_value import MISREAD, misread_hint
 from grader.findings.finding import Evidence
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.reference import Goal, UnknownValue
 from grader.findings.value import leaves
 from grader.findings.wording import code, codes, counted
 from grader.measure.compatibility import compatibility_table, refusals
+from grader.measure.declarations import is_compiled_publisher
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.command import (
     VelocityCommand,
@@ -211,11 +212,12 @@ def integer_in_command(symptom: NotMoved) -> Cause | None:
     """A float field holds an integer, which ROS misreads."""
     twist = symptom.first.twist
     for field, number in (("linear.x", twist.linear_m_s), ("angular.z", twist.angular_rad_s)):
-        if was_integer(number):
+        hint = misread_hint(number, compiled=False)
+        if hint and not is_compiled_publisher(symptom.recording, command_topic(symptom.recording)):
             return Cause(
                 f"{_STILL}: {MISREAD} was put into {code(field)}, a float field, "
                 "which ROS misreads",
-                "A number in a message must be a float: write 1.0 instead of 1, or float(value).",
+                hint,
                 symptom.evidence,
             )
     return None
