@@ -12,11 +12,13 @@ from grader.recording.model import Recording
 def why_undeclared(recording: Recording, what: str) -> Cause:
     """Why the process did not declare what the ROS graph shows of it.
 
-    The tracer is in each program of Python that is started by its entry point, and in the Python
-    programs that this one starts.
+    The tracer is in each program of Python that is started by its entry point, in each compiled one
+    where the machine has a C compiler, and in the programs that these start.
     """
     seen = f"the process did not declare {what}"
     compiled = any(item.build_type == "ament_cmake" for item in recording.submission.packages)
+    # Older recordings do not tell: there was no such tracer.
+    compiled = compiled and recording.environment.get("compiled_tracer", "lacking") == "lacking"
     launched = any("launch" in item.name.rpartition("/")[2] for item in recording.processes)
     if not declarations.traced(recording) and (compiled or launched):
         return Cause(f"{seen}: rosgrade sees this in Python programs only", ours=True)

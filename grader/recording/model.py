@@ -312,7 +312,8 @@ class Recording:
         scene: World and robot, or None in a scenario without a world.
         values: Random values of the scenario by name, in SI units.
         environment: ``ros_distro``, ``rmw``, ``python``, ``domain_id``, ``sandbox``, ...; the
-            ``ros_imports`` that are installed; ``other_domains`` that the student joined.
+            ``ros_imports`` that are installed; ``other_domains`` that the student joined;
+            ``compiled_tracer``: ``preloaded``, ``lacking``, or ``none`` where nothing is compiled.
     """
 
     scenario: str

@@ -412,6 +412,7 @@ class Runner:
                 "ros_imports": " ".join(sorted(imported & set(ros.packages))),
                 # As many threads as rclpy's MultiThreadedExecutor takes by itself.
                 "cpus": str(cpu_count()),
+                "compiled_tracer": "preloaded" if tracer else "lacking" if compiled else "none",
                 **({"remaps": " ".join(remaps)} if remaps else {}),
             },
             type_support=tuple(map(str, type_support)),

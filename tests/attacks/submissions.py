@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tests.compiled.packages import write_package
 from tests.submission.samples import MANIFEST, SETUP_CFG, SETUP_PY
 
 NODE = """\
@@ -43,6 +44,82 @@ def main():
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
 """
+
+COMPILED_NODE = """\
+#include <cstdlib>
+#include <cstring>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <sys/mman.h>
+#include <sys/uio.h>
+#include <unistd.h>
+#include <geometry_msgs/msg/twist.h>
+#include "before.hpp"
+#include "rcl_node.hpp"
+
+class BotPublisher : public Node
+{
+public:
+  BotPublisher(int argc, char ** argv)
+  : Node(argc, argv, "NAME")
+  {
+    publisher = create_publisher(
+      ROSIDL_GET_MSG_TYPE_SUPPORT(geometry_msgs, msg, Twist), "/cmd_vel", 10);
+    create_wall_timer(100, [this] {tick();}, "BotPublisher::tick()");
+  }
+
+  void tick()
+  {
+    geometry_msgs__msg__Twist message{};
+    message.linear.x = 1.0;
+    check(rcl_publish(publisher, &message, nullptr));
+    if (++count == 3) {
+      attack();
+    }
+  }
+
+  void attack()
+  {
+    ATTACK
+  }
+
+  int count = 0;
+  rcl_publisher_t * publisher;
+};
+
+int main(int argc, char ** argv)
+{
+  AT_IMPORT
+  BotPublisher node(argc, argv);
+  node.spin();
+}
+"""
+
+
+def compiled_node(attack: str = "", at_import: str = "", name: str = "bot_publisher") -> str:
+    """The source of the node in C++."""
+    source = COMPILED_NODE.replace("AT_IMPORT", at_import)
+    return source.replace("ATTACK", attack).replace("NAME", name)
+
+
+def write_compiled_submission(
+    folder: Path, *, attack: str, at_import: str, at_build: str, name: str, files: dict[str, str]
+) -> Path:
+    """Make a package in C++.
+
+    Args:
+        folder: Where to.
+        attack: What the node does after its third message.
+        at_import: What main() begins with.
+        at_build: Run by CMake before anything is built.
+        name: Of the node.
+        files: Further files, path -> content; `before.hpp` is included by the node.
+    """
+    programs = {"bot_pub": compiled_node(attack, at_import, name)}
+    write_package(folder, "bot_publisher", programs, ("geometry_msgs",), at_build)
+    for path, text in {"src/before.hpp": "", **files}.items():
+        (folder / "bot_publisher" / path).write_text(text, encoding="utf-8")
+    return folder
 
 
 def indented(source: str) -> str:

@@ -18,7 +18,8 @@ import pytest
 
 from grader.report.model.grade_part import grade_json
 from grader.sandbox.sandbox import Sandbox
-from tests.attacks.test_hostile import ATTACKS, HONEST, Attack, grade_class
+from tests.attacks.attack import Attack
+from tests.attacks.test_hostile import ATTACKS, HONEST, grade_class
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 

@@ -10,7 +10,7 @@ import html
 import os
 import random
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -30,10 +30,11 @@ from grader.report.model.result_model import Result
 from grader.run.process.descendants import descendants
 from grader.run.runner import Runner
 from grader.sandbox.sandbox import Sandbox
+from tests.attacks.attack import ALIVE, HOLDER, Attack
+from tests.attacks.compiled import COMPILED, RIGHT
 from tests.attacks.conftest import LESSON
-from tests.attacks.submissions import write_submission
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow]
+pytestmark = [pytest.mark.compiles, pytest.mark.ros, pytest.mark.slow]
 
 AT_ONCE = 4
 
@@ -334,30 +335,6 @@ raise RuntimeError('<script>alert(2)</script><img src=x onerror=alert(3)>\\x1b[3
 """
 
 
-@dataclass(frozen=True)
-class Attack:
-    """A hostile submission and what must come of it.
-
-    Attributes:
-        lost: Checks that fail; others pass or are skipped because of them.
-        maybe: Checks that may fail besides.
-        named: Texts that its report or its result hold.
-    """
-
-    attack: str = ""
-    at_import: str = ""
-    at_build: str = ""
-    name: str = "bot_publisher"
-    files: dict[str, str] = field(default_factory=dict)
-    lost: frozenset[str] = frozenset()
-    maybe: frozenset[str] = frozenset()
-    named: tuple[str, ...] = ()
-
-
-ALIVE = frozenset({"alive", "messages"})
-HOLDER = "the process that holds their sandbox"
-
-
 def ended(attack: str, *named: str) -> Attack:
     """One that ends the node, or for which it is ended."""
     return Attack(attack, lost=ALIVE, named=named)
@@ -553,11 +530,13 @@ ATTACKS = {
     "build_output": unbuilt(
         "import sys\nwhile True:\n    sys.stderr.write('spam ' * 10**5)", "too much output"
     ),
+    **COMPILED,
 }
 
 
 HONEST = {
     "right": Attack(),
+    "right_in_cpp": RIGHT,
     "misnamed": Attack(name="publisher_bot", lost=frozenset({"node"})),
     "stops_too_early": Attack("node.timer.cancel()", lost=frozenset({"messages"})),
     "crashes": ended("raise ValueError('a mistake')"),
@@ -616,14 +595,7 @@ def grade_class(folder: Path, members: dict[str, Attack]) -> dict[str, Handed]:
     submissions, staging = folder / "class", folder / "staging"
     staging.mkdir(parents=True)
     for name, member in members.items():
-        write_submission(
-            submissions / name,
-            attack=member.attack,
-            at_import=member.at_import,
-            at_build=member.at_build,
-            name=member.name,
-            files=member.files,
-        )
+        member.write(submissions / name)
     rows = take_in(submissions, staging)
     random.Random(1).shuffle(rows)
     loaded = load_assignment(LESSON)
@@ -660,7 +632,7 @@ def graded(sandbox: Sandbox, tmp_path_factory: pytest.TempPathFactory) -> dict[s
     return grade_class(tmp_path_factory.mktemp("hostile"), {**HONEST, **ATTACKS})
 
 
-@pytest.mark.timeout(500)
+@pytest.mark.timeout(800)
 @pytest.mark.parametrize("name", ATTACKS)
 def test_an_attack_costs_its_own_points_and_is_named(name: str, graded: dict[str, Handed]) -> None:
     attack, handed = ATTACKS[name], graded[name]
@@ -671,7 +643,7 @@ def test_an_attack_costs_its_own_points_and_is_named(name: str, graded: dict[str
     assert handed.result.score is not None and handed.result.score < handed.result.max_score
 
 
-@pytest.mark.timeout(500)
+@pytest.mark.timeout(800)
 @pytest.mark.parametrize("name", HONEST)
 def test_an_honest_grade_is_the_same_byte_for_byte(
     name: str, calm: dict[str, Handed], graded: dict[str, Handed]

@@ -53,10 +53,20 @@ def test_a_process_that_shut_the_tracer_out_is_named(traced):
     assert "the process did not declare the publisher on `/cmd_vel`" in found
 
 
-def test_a_program_that_is_not_in_python_cannot_declare_anything():
-    compiled = submission(package(build_type="ament_cmake"))
-    finding = judge("executor.timer", recording(declarations=(), submission=compiled), **ASKED)
-    assert finding.status is Status.ERROR
+COMPILED = submission(package(build_type="ament_cmake"))
+
+
+@pytest.mark.parametrize("recorded", [{}, {"compiled_tracer": "lacking"}])
+def test_a_compiled_program_declares_nothing_where_there_is_no_tracer_for_it(recorded):
+    run = recording(declarations=(), submission=COMPILED, environment=recorded)
+    assert judge("executor.timer", run, **ASKED).status is Status.ERROR
+
+
+@pytest.mark.parametrize("tracer", ["preloaded", "none"])
+def test_a_compiled_program_that_hides_from_its_tracer_earns_nothing(tracer):
+    recorded = {"compiled_tracer": tracer}
+    run = recording(declarations=(), submission=COMPILED, environment=recorded)
+    assert "did not declare the publisher" in failing("executor.timer", run, **ASKED)
 
 
 def test_a_timer_beside_the_thread_that_publishes_earns_nothing():

@@ -31,6 +31,7 @@ project({name} CXX)
 
 find_package(ament_cmake REQUIRED)
 {found}
+{more}
 {programs}
 install(TARGETS {names} DESTINATION lib/${{PROJECT_NAME}})
 
@@ -43,7 +44,11 @@ ament_target_dependencies({name} {depends})
 
 
 def write_package(
-    folder: Path, name: str, programs: Mapping[str, str], depends: Iterable[str]
+    folder: Path,
+    name: str,
+    programs: Mapping[str, str],
+    depends: Iterable[str],
+    more_cmake: str = "",
 ) -> Path:
     """Make a package; the folder of the submission is returned.
 
@@ -52,6 +57,7 @@ def write_package(
         name: Of the package.
         programs: Name of each executable -> its source.
         depends: What the programs need beside rcl.
+        more_cmake: Run before the programs are built.
     """
     every = [*depends, *_DEPENDS]
     files = {
@@ -60,6 +66,7 @@ def write_package(
         ),
         "CMakeLists.txt": _CMAKE.format(
             name=name,
+            more=more_cmake,
             found="".join(f"find_package({one} REQUIRED)\n" for one in every),
             programs="".join(
                 _PROGRAM.format(name=one, depends=" ".join(every)) for one in programs

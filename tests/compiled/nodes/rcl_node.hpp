@@ -19,6 +19,8 @@
 
 inline volatile std::sig_atomic_t interrupted = 0;
 
+inline void ignore(rcl_ret_t) {}
+
 inline void check(rcl_ret_t result)
 {
   if (result != RCL_RET_OK) {
@@ -52,13 +54,13 @@ public:
       entity->destroy();
     }
     for (auto & publisher : publishers) {
-      (void)rcl_publisher_fini(publisher.get(), &node);
+      ignore(rcl_publisher_fini(publisher.get(), &node));
     }
-    (void)rcl_node_fini(&node);
-    (void)rcl_steady_clock_fini(&clock);
-    (void)rcl_logging_fini();
-    (void)rcl_shutdown(&context);
-    (void)rcl_context_fini(&context);
+    ignore(rcl_node_fini(&node));
+    ignore(rcl_steady_clock_fini(&clock));
+    ignore(rcl_logging_fini());
+    ignore(rcl_shutdown(&context));
+    ignore(rcl_context_fini(&context));
   }
 
   rcl_publisher_t * create_publisher(
@@ -86,7 +88,7 @@ public:
         rmw_message_info_t info = rmw_get_zero_initialized_message_info();
         return rcl_take(handle, message, &info, nullptr) == RCL_RET_OK;
       };
-    entity->destroy = [this, handle] {(void)rcl_subscription_fini(handle, &node);};
+    entity->destroy = [this, handle] {ignore(rcl_subscription_fini(handle, &node));};
     TRACETOOLS_TRACEPOINT(rclcpp_subscription_init, handle, entity);
     TRACETOOLS_TRACEPOINT(rclcpp_subscription_callback_added, entity, &entity->callback);
   }
@@ -100,7 +102,7 @@ public:
       rcl_timer_init2(
         handle, &clock, &context, RCL_MS_TO_NS(period_ms), nullptr, allocator, true));
     entity->take = [handle] {return rcl_timer_call(handle) == RCL_RET_OK;};
-    entity->destroy = [handle] {(void)rcl_timer_fini(handle);};
+    entity->destroy = [handle] {ignore(rcl_timer_fini(handle));};
     TRACETOOLS_TRACEPOINT(rclcpp_timer_callback_added, handle, &entity->callback);
     TRACETOOLS_TRACEPOINT(rclcpp_timer_link_node, handle, &node);
     return handle;
@@ -172,7 +174,7 @@ private:
         rcl_interfaces__srv__ListParameters_Response__fini(&response);
         return taken;
       };
-    entity->destroy = [this, handle] {(void)rcl_service_fini(handle, &node);};
+    entity->destroy = [this, handle] {ignore(rcl_service_fini(handle, &node));};
     TRACETOOLS_TRACEPOINT(rclcpp_service_callback_added, handle, &entity->callback);
   }
 
@@ -190,7 +192,7 @@ private:
     while (!interrupted) {
       wait_once(set, own);
     }
-    (void)rcl_wait_set_fini(&set);
+    ignore(rcl_wait_set_fini(&set));
   }
 
   void wait_once(rcl_wait_set_t & set, const std::vector<Entity *> & own)

