@@ -292,3 +292,16 @@ def nothing_to_answer(symptom: NoMessages) -> Cause | None:
         f"{symptom.seen}, because the messages that the node should answer, on "
         f"{code(symptom.asked[0])}, never reached it"
     )
+
+
+@explanation(NoMessages)
+def subscription_destroyed(symptom: NoMessages) -> Cause | None:
+    """The program destroyed its subscription, so no callback is called that could publish."""
+    recording = symptom.recording
+    topics = {item.topic for item in recording.student_endpoints(Kind.SUBSCRIPTION)}
+    causes = [
+        why_unsubscribed(recording, name, symptom.seen)
+        for name in sorted(topics)
+        if recording.carried(name)
+    ]
+    return causes[0] if causes and all(causes) else None

@@ -266,6 +266,9 @@ CASES: list[Group] = [
             "NoMessages.process_ended": silent(processes=(died(1),)),
             "NoMessages.publisher_destroyed": silent(endpoints=(gone(endpoint()), reader())),
             "NoMessages.nothing_to_answer NotDelivered.no_endpoint": answering(),
+            "NoMessages.subscription_destroyed": silent(
+                endpoints=(gone(LISTENER), endpoint(), reader()), sent=sent([0.5, 1.5])
+            ),
             "NoMessages.timer_destroyed": silent(declarations=DESTROYED_TIMER),
             "NoMessages.slow_timer": silent(declarations=declarations(timer_s=300.0)),
             "NoMessages.no_cpu_time": silent(calls=(), disturbance=BUSY),
