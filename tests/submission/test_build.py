@@ -15,6 +15,7 @@ from grader.diagnosis.not_built import why_not_built
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
 from grader.run.process.descendants import descendants
+from grader.sandbox.limits import BUILD
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
 from grader.submission.build.build import build_key
@@ -311,6 +312,34 @@ def test_a_package_of_jazzy_that_is_not_installed_keeps_only_what_rests_on_it(
     for name in build.failed_packages:
         cause = why_not_built(found.record, name)
         assert cause is not None and cause.ours
+
+
+COMPILERS = """\
+cmake_minimum_required(VERSION 3.8)
+project(bot_msgs LANGUAGES NONE)
+foreach(number RANGE 1 6)
+  add_custom_target(part_${number} ALL COMMAND mkdir ${CMAKE_BINARY_DIR}/open.${number}
+    COMMAND sleep 0.2 COMMAND ls ${CMAKE_BINARY_DIR} | grep -c open.
+    COMMAND rmdir ${CMAKE_BINARY_DIR}/open.${number})
+endforeach()
+find_package(ament_cmake REQUIRED)
+ament_package()
+"""
+
+
+@pytest.mark.compiles
+@pytest.mark.parametrize("most", [1, 2])
+def test_as_many_files_are_compiled_at_once_as_there_is_memory_for(
+    tree: Tree, real_ros: RosInstallation, most: int
+) -> None:
+    manifest = INTERFACES["src/bot_msgs/package.xml"]
+    tree.write({"src/bot_msgs/package.xml": manifest, "src/bot_msgs/CMakeLists.txt": COMPILERS})
+    limits = BuildLimits(room=replace(BUILD, memory_bytes=most * 2**30))
+    found = prepare(tree.root, real_ros, cache=tree.root.parent / "cache", limits=limits)
+    build = build_of(found)
+    assert build.succeeded, build.log
+    numbers = [int(line) for line in build.log.splitlines() if line.isdecimal()]
+    assert len(numbers) == 6 and max(numbers) == min(most, len(os.sched_getaffinity(0)))
 
 
 def test_without_colcon_the_text_says_how_to_get_it(tree: Tree, named_ros: RosInstallation) -> None:

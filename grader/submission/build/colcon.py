@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox
 
 COMPILE_S = 60.0
+_COMPILER_BYTES = 1024 * MIB
+"""A compiler takes 750 MiB for a file that includes rclcpp."""
 STOPPED = "Exception in job execution"
 """The message of colcon when its executor stops in spite of --continue-on-error."""
 UNTOUCHABLE = """\
@@ -153,6 +155,10 @@ class Colcon:
             environment[name] = str(folder)
         # Messages of CMake and the compiler are searched for the place of an error.
         environment["LC_ALL"] = "C.UTF-8"
+        # With as many at once as there are CPUs, which is the default, a build would take more
+        # memory on a machine with more of them.
+        compilers = self.setting.limits.room.memory_bytes // _COMPILER_BYTES
+        environment["MAKEFLAGS"] = f"-j{max(1, min(compilers, len(os.sched_getaffinity(0))))}"
         return environment
 
     def _command(self) -> list[str]:
