@@ -213,6 +213,10 @@ def check_markdown(check: Check) -> str:
         parts.append("A check of what was handed in: it has no `scenarios`.")
     if check.parameters.model_fields:
         parts.append(_fields_table(check.parameters))
+    if check.parameters.only:
+        parts.append(
+            f"Reads {check.parameters.only} only: a package in another language is an error."
+        )
     if check.parameters.needs:
         parts.append(f"Needs {'; '.join(map(str, check.parameters.needs))}.")
     return "\n\n".join(parts)

@@ -47,6 +47,8 @@ class Parameters(Model):
     needs: ClassVar[tuple[Need, ...]] = ()
     doubt: ClassVar[Doubt | None] = None
     """After such disturbances a failure must happen twice to count."""
+    only: ClassVar[str] = ""
+    """The one language that it can read, or nothing if it is the same for all."""
     asks: ClassVar[str] = ""
     """What is asked for, in the words of the handout, such as ``the node `{self.name}```."""
 

@@ -41,6 +41,7 @@ class Explanation:
     Attributes:
         sentence: What it explains: the text of the documentation.
         example: How Python says it, or nothing.
+        only: The one language of the programs that it explains, or nothing if any.
     """
 
     symptom: type[Symptom[Any]]
@@ -50,6 +51,7 @@ class Explanation:
     sentence: str
     is_general: bool = False
     example: str = ""
+    only: str = ""
 
 
 def add(entry: Explanation) -> None:
@@ -58,20 +60,21 @@ def add(entry: Explanation) -> None:
 
 
 def explanation(
-    *symptoms: type[Symptom[Any]], general: bool = False
+    *symptoms: type[Symptom[Any]], general: bool = False, only: str = ""
 ) -> Callable[[Callable[[S], A]], Callable[[S], A]]:
     """Put a function into the catalogue.
 
     Args:
         symptoms: Which it explains.
         general: Asked after all others: it says only what is there in any case.
+        only: The one language of the programs that it explains.
     """
 
     def register(apply: Callable[[S], A]) -> Callable[[S], A]:
         sentence = " ".join((inspect.getdoc(apply) or "").split())
         for symptom in symptoms:
             name, module = apply.__name__, apply.__module__
-            add(Explanation(symptom, name, apply, module, sentence, general))
+            add(Explanation(symptom, name, apply, module, sentence, general, only=only))
         return apply
 
     return register

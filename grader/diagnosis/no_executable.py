@@ -10,7 +10,7 @@ from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Evidence
 from grader.findings.wording import code, codes
 from grader.spec.nearest_name import nearest
-from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
+from grader.submission.record import PYTHON, PackageRecord, SourceError, SubmissionRecord
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def _at(package: PackageRecord, file: str, what: str) -> Evidence:
     return Evidence(places=(SourceError(package.file(file), None, what),))
 
 
-@explanation(NoExecutable)
+@explanation(NoExecutable, only=PYTHON)
 def no_such_function(symptom: NoExecutable) -> Cause | None:
     """The entry point names a module or function that does not exist or is not installed."""
     target = dict(symptom.package.missing_targets).get(symptom.name)
@@ -71,16 +71,17 @@ def in_another_package(symptom: NoExecutable) -> Cause | None:
         return None
     for other in symptom.submission.packages:
         if other.name != own.name and name in other.executables:
+            file = "setup.py" if other.build_type == "ament_python" else "CMakeLists.txt"
             return Cause(
                 f"it is in the package {code(other.name)}: `ros2 run {other.name} {name}`",
                 f"Move its entry in console_scripts and its module to the package "
                 f"{code(own.name)}.",
-                _at(other, "setup.py", "console_scripts"),
+                _at(other, file, name),
             )
     return None
 
 
-@explanation(NoExecutable)
+@explanation(NoExecutable, only=PYTHON)
 def installed_in_bin(symptom: NoExecutable) -> Cause | None:
     """setup.cfg is missing or wrong: the executable was installed in bin/."""
     if symptom.name not in symptom.package.misplaced_executables:
@@ -112,7 +113,7 @@ def not_installed_by_cmake(symptom: NoExecutable) -> Cause | None:
     )
 
 
-@explanation(NoExecutable)
+@explanation(NoExecutable, only=PYTHON)
 def no_console_scripts(symptom: NoExecutable) -> Cause | None:
     """setup.py defines no executables."""
     if symptom.package.entry_points:
@@ -125,7 +126,7 @@ def no_console_scripts(symptom: NoExecutable) -> Cause | None:
     )
 
 
-@explanation(NoExecutable, general=True)
+@explanation(NoExecutable, general=True, only=PYTHON)
 def other_console_scripts(symptom: NoExecutable) -> Cause:
     """setup.py gives the executable another name, or setup() does not get it."""
     name, scripts = symptom.name, [script for script, _ in symptom.package.entry_points]

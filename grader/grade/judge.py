@@ -20,12 +20,13 @@ from grader.checks.doubt import is_doubtful
 from grader.diagnosis.not_built import why_lacking, why_not_built
 from grader.findings.finding import Finding, Status
 from grader.findings.wording import percent
+from grader.grade.language import finding_in_cpp, in_cpp, is_cpp
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
 from grader.grade.naming import named
 from grader.grade.runtime_imports import with_runtime_imports
 from grader.grade.windowed import judged_in
 from grader.recording.model import Ending, Recording
-from grader.submission.record import SubmissionRecord
+from grader.submission.record import CPP, SubmissionRecord
 
 if TYPE_CHECKING:
     # Reading YAML is not needed to judge; a worker of a batch starts without it.
@@ -70,6 +71,9 @@ def grade(
             why = unnamed if unnamed and _is_about_names(bound[name], loaded) else None
             findings = tuple(_findings(bound[name], loaded, known, recordings, faults, why))
         spec = bound[name].spec
+        speaks_cpp = is_cpp(known, _about(bound[name], loaded))
+        if speaks_cpp:
+            findings = tuple(replace(one, finding=finding_in_cpp(one.finding)) for one in findings)
         status, credit = _counted(spec.counts, [item.finding for item in findings])
         put_right = all(_is_put_right(item, recordings) for item in findings)
         results[name] = CheckResult(
@@ -82,7 +86,7 @@ def grade(
             scenarios=tuple(scenario.id for scenario in loaded.scenarios_of(bound[name])),
             findings=findings,
             waits_for=roots,
-            hint=spec.hint,
+            hint=in_cpp(spec.hint) if speaks_cpp else spec.hint,
             credit=credit,
             put_right=put_right and status is Status.FAILED,
         )
@@ -127,6 +131,13 @@ def _skipped(roots: Sequence[CheckResult]) -> ScenarioFinding:
     return ScenarioFinding(None, Finding(Status.SKIPPED, f"{titles} to pass first", observed, hint))
 
 
+def _about(bound: BoundCheck, loaded: LoadedAssignment) -> list[str]:
+    """The packages that a check is about: one that it names, or what its scenarios launch."""
+    named = getattr(bound.parameters, "package", None)
+    scenarios = loaded.scenarios_of(bound)
+    return [named] if named else [name for one in scenarios for name in _launched(loaded, one.id)]
+
+
 def _findings(
     bound: BoundCheck,
     loaded: LoadedAssignment,
@@ -140,6 +151,12 @@ def _findings(
         yield from (ScenarioFinding(scenario, unnamed) for scenario in whole or (None,))
         return
     if bound.check.subject is Subject.SUBMISSION:
+        only = bound.parameters.only
+        if only and only != CPP and is_cpp(submission, _about(bound, loaded)):
+            unread = f"this check reads {only}, and the package is written in C++"
+            asked = bound.parameters.asked_for
+            yield ScenarioFinding(None, Finding.error(asked, unread, hint=_NOT_YOURS))
+            return
         yield _judge(bound, submission, None)
         return
     scenarios = [scenario.id for scenario in loaded.scenarios_of(bound)]

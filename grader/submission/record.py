@@ -13,6 +13,10 @@ from pydantic import TypeAdapter, ValidationError
 
 from grader.errors import UsageError
 
+PYTHON, CPP = "Python", "C++"
+"""What programs of students are written in."""
+_OF_CPP = (".cpp", ".cc", ".cxx", ".c")
+
 
 @dataclass(frozen=True)
 class SourceError:
@@ -301,6 +305,15 @@ class SubmissionRecord:
             for item in package.imports
             if (item.file, item.line) not in {(ros.file, ros.line) for ros in package.ros_imports}
         )
+
+    def language(self, package: PackageRecord) -> str:
+        """The language of its programs: Python, C++, or nothing if it has none, as interfaces."""
+        own = (path for path in self.files if path.startswith(package.file("")))
+        imported = {item.module for item in package.imports}
+        is_compiled = any(path.endswith(_OF_CPP) for path in own)
+        if package.build_type == "ament_python" or "rclpy" in imported:
+            return PYTHON
+        return CPP if is_compiled else PYTHON if package.sources else ""
 
     def package(self, name: str) -> PackageRecord | None:
         """The package of that name, or None."""

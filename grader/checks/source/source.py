@@ -24,6 +24,7 @@ from grader.spec.quantity import Ratio
 from grader.submission.read.inheritance import NODE, Family, FoundClass
 from grader.submission.read.lint import EXCLUDED
 from grader.submission.record import (
+    PYTHON,
     PackageRecord,
     SourceError,
     SourceFile,
@@ -34,6 +35,12 @@ from grader.submission.record import (
 _MOST_PLACES = 20
 _DOTTED = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+")
 _RULE = re.compile(r"[A-Z]+[0-9]*")
+
+
+class OfPython(OfPackage):
+    """Part of the parameters of every check of the source."""
+
+    only = PYTHON
 
 
 def _judged_package(submission: SubmissionRecord, name: str) -> PackageRecord:
@@ -58,7 +65,7 @@ def _dotted_name(text: str) -> str:
     return text
 
 
-class Class(OfPackage):
+class Class(OfPython):
     """Parameters of source.class."""
 
     name: str | None = Field(None, description="Name of the class; by default any.")
@@ -128,7 +135,7 @@ def _place(item: FoundClass, message: str) -> SourceError:
     return SourceError(item.file.path, item.found.line, message)
 
 
-class _Share(OfPackage):
+class _Share(OfPython):
     """Part of the parameters of source.docstrings and source.type_hints."""
 
     share: Ratio = Field(1.0, description="Share of them that must have one.")
@@ -253,7 +260,7 @@ def _shared(
     return Finding.failed(parameters.asked_for, f"{observed}; {first}", hint, shown)
 
 
-class NoPrint(OfPackage):
+class NoPrint(OfPython):
     """Parameters of source.no_print."""
 
     asks = "no print(): the node's logger tells what happens"
@@ -290,7 +297,7 @@ def _rule(text: str) -> str:
     return text
 
 
-class Ruff(OfPackage):
+class Ruff(OfPython):
     """Parameters of source.ruff."""
 
     needs = (Submitted(), RuffRules())

@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 from string import Template
+from typing import ClassVar
 
 from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
 from grader.diagnosis.process.failure import Failure, Frame
@@ -14,6 +15,7 @@ from grader.diagnosis.process.raised import student_place
 from grader.findings.wording import code
 from grader.recording.model import Recording
 from grader.spec.source import Model, read_source
+from grader.submission.record import CPP, PYTHON
 
 _UNDEFINED = re.compile(r"name '(\w+)' is not defined")
 
@@ -32,6 +34,7 @@ class Raised(Symptom[str]):
 class Row(Model):
     """A row of the table: a mistake, how to recognise its exception, and what to try."""
 
+    only: ClassVar[str] = ""
     mistake: str
     example: str
     line: str = ""
@@ -62,6 +65,8 @@ class Row(Model):
 class CppRow(Row):
     """The same of what ends compiled programs only."""
 
+    only = CPP
+
     def __call__(self, symptom: Raised) -> str | None:
         """The hint, if the failure is that of the mistake."""
         return self.hint_for(symptom.failure) if symptom.failure.compiled else None
@@ -85,7 +90,7 @@ class CppTable(Model):
 
 
 TABLE = read_source(Path(__file__).with_suffix(".yaml")).read(Table)
-CPP = read_source(Path(__file__).with_name("exceptions_cpp.yaml")).read(CppTable)
+CPP_TABLE = read_source(Path(__file__).with_name("exceptions_cpp.yaml")).read(CppTable)
 _GDB = (
     "Find the line with a debugger: `ros2 run --prefix 'gdb -ex run --args' PACKAGE EXECUTABLE`, "
     "then `bt` for the functions that were being called. It names lines only if the program is "
@@ -93,7 +98,7 @@ _GDB = (
 )
 
 
-@explanation(Raised)
+@explanation(Raised, only=PYTHON)
 def unknown_library(symptom: Raised) -> str | None:
     """A Python library is imported that the assignment does not allow."""
     if symptom.failure.type != "ModuleNotFoundError":
@@ -101,7 +106,7 @@ def unknown_library(symptom: Raised) -> str | None:
     return library_hint(symptom.failure.message, symptom.recording)
 
 
-@explanation(Raised)
+@explanation(Raised, only=PYTHON)
 def not_imported(symptom: Raised) -> str | None:
     """A well-known name of ROS 2 or Python, such as Twist or math, is not imported."""
     found = _UNDEFINED.match(symptom.failure.message)
@@ -115,8 +120,12 @@ def not_imported(symptom: Raised) -> str | None:
     return None
 
 
-for _row in (*CPP.exceptions, *TABLE.exceptions):
-    add(Explanation(Raised, _row.mistake, _row, __name__, _row.mistake, example=_row.example))
+for _row in (*CPP_TABLE.exceptions, *TABLE.exceptions):
+    add(
+        Explanation(
+            Raised, _row.mistake, _row, __name__, _row.mistake, example=_row.example, only=_row.only
+        )
+    )
 
 
 @explanation(Raised, general=True)
