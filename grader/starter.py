@@ -49,7 +49,7 @@ class Interface:
         return f"{self.kind}/{self.name}.{self.kind}"
 
 
-def write_starter(loaded: LoadedAssignment, folder: Path) -> tuple[Path, ...]:
+def write_starter(loaded: LoadedAssignment, folder: Path, *, cpp: bool = False) -> tuple[Path, ...]:
     """Write the starter packages of an assignment, unless one is there already."""
     packages = loaded.assignment.packages
     places = tuple(folder / package.name for package in packages)
@@ -59,16 +59,20 @@ def write_starter(loaded: LoadedAssignment, folder: Path) -> tuple[Path, ...]:
                 f"{place} is there already, and is left as it is: go on with it, or name another "
                 "folder"
             )
-    write_folders(folder, starter_files(loaded))
+    write_folders(folder, starter_files(loaded, cpp=cpp))
     return places
 
 
-def starter_files(loaded: LoadedAssignment) -> dict[str, str]:
-    """The starter packages of an assignment: contents by path, which begins with a package."""
+def starter_files(loaded: LoadedAssignment, *, cpp: bool = False) -> dict[str, str]:
+    """The starter packages of an assignment: contents by path, which begins with a package.
+
+    Raises:
+        UsageError: C++ is wanted, but the assignment takes Python only.
+    """
     assignment = loaded.assignment
     files: dict[str, str] = {}
     for package in assignment.packages:
-        files.update(_package(assignment, package))
+        files.update(_package(assignment, in_cpp(package) if cpp else package))
     first = assignment.packages[0].name
     places = sorted(path for path, text in files.items() if "TODO" in text)
     files[f"{first}/README.md"] = rendered(
@@ -113,6 +117,17 @@ def is_cpp(package: Package) -> bool:
     """
     scripts = all(name.endswith(".py") for name in package.executables)
     return package.build_type == "ament_cmake" and "rclpy" not in package.depends and not scripts
+
+
+def in_cpp(package: Package) -> Package:
+    """The same package for students who write C++."""
+    if "ament_cmake" not in package.build_types:
+        raise UsageError(
+            f"the assignment takes {package.name} in Python only (build_type: ament_python): leave "
+            "out --cpp"
+        )
+    depends = tuple("rclcpp" if name == "rclpy" else name for name in package.depends)
+    return package.model_copy(update={"build_types": ("ament_cmake",), "depends": depends})
 
 
 def programs(package: Package) -> tuple[Program, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import configparser
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -109,6 +110,30 @@ def test_a_package_for_cmake_has_programs_in_cpp(tmp_path: Path) -> None:
     assert "install(TARGETS tool\n  DESTINATION lib/${PROJECT_NAME}\n)" in cmake
     manifest = parse_package_string(files["talker_msgs/package.xml"])
     assert [one.name for one in manifest.build_depends] == ["rclcpp", "std_msgs"]
+
+
+@pytest.mark.parametrize("name", list_assignments())
+def test_each_assignment_has_a_starter_in_cpp(name: str) -> None:
+    loaded = load_assignment(name)
+    files = starter_files(loaded, cpp=True)
+    assert not any(path.endswith((".py", "setup.cfg")) for path in files)
+    for package in loaded.assignment.packages:
+        manifest = parse_package_string(files[f"{package.name}/package.xml"])
+        assert manifest.get_build_type() == "ament_cmake"
+        wanted = {"rclcpp" if one == "rclpy" else one for one in package.depends}
+        assert {one.name for one in manifest.build_depends} == wanted
+        cmake = files[f"{package.name}/CMakeLists.txt"]
+        assert all(f"find_package({one} REQUIRED)" in cmake for one in wanted)
+        for executable in package.executables:
+            (source,) = re.findall(rf"add_executable\({executable} (\S+)\)", cmake)
+            assert "rclcpp::spin(" in files[f"{package.name}/{source}"]
+            assert f"install(TARGETS {executable}\n  DESTINATION lib/${{PROJECT_NAME}}" in cmake
+
+
+def test_cpp_is_refused_where_an_assignment_takes_python_only(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"takes talker in Python only .* leave out --cpp"):
+        write_starter(lesson(tmp_path), tmp_path / "src", cpp=True)
+    assert not (tmp_path / "src").exists()
 
 
 def test_a_package_for_cmake_that_needs_rclpy_installs_its_programs(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ def start(
         ),
     ] = Path(),
     chosen: Chosen = None,
+    cpp: Annotated[bool, typer.Option("--cpp", help="A package in C++ (ament_cmake).")] = False,
 ) -> None:
     """Create a package to start from: it builds and runs.
 
@@ -35,7 +36,7 @@ def start(
         if name not in loaded.given and not variable.is_of_runs:
             example = loaded.values[name]
             say(f"{name} is {example} in these files; choose another with --set {name}=VALUE")
-    for written in write_starter(loaded, folder):
+    for written in write_starter(loaded, folder, cpp=cpp):
         say(f"Written: {written}")
     say("\nNext, read the task, then grade your work after every save:\n")
     say(f"  rosgrade show {assignment}")
