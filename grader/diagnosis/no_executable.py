@@ -10,6 +10,7 @@ from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Evidence
 from grader.findings.wording import code, codes
 from grader.spec.nearest_name import nearest
+from grader.submission.read.cmake import CMakeCommand, read_commands
 from grader.submission.record import PYTHON, PackageRecord, SourceError, SubmissionRecord
 
 
@@ -26,6 +27,25 @@ class NoExecutable(Symptom[Cause]):
         """Where executables of a Python package are defined."""
         return _at(self.package, "setup.py", "console_scripts")
 
+    def commands(self, name: str) -> list[CMakeCommand]:
+        """The commands of that name in CMakeLists.txt."""
+        return [one for one in read_commands(self.package.cmake or "") if one.name == name]
+
+    @property
+    def targets(self) -> list[str]:
+        """The programs that CMakeLists.txt builds."""
+        return [one.arguments[0] for one in self.commands("add_executable") if one.arguments]
+
+    @property
+    def line(self) -> str:
+        """How CMakeLists.txt installs it."""
+        return code(f"install(TARGETS {self.name} DESTINATION lib/${{PROJECT_NAME}})")
+
+    @property
+    def install(self) -> str:
+        """What to do where that line is missing."""
+        return f"CMakeLists.txt needs {self.line}."
+
 
 def why_no_executable(submission: SubmissionRecord, package: str, name: str) -> Cause | None:
     """Why a package has no executable of a name, or None if it has one."""
@@ -33,7 +53,8 @@ def why_no_executable(submission: SubmissionRecord, package: str, name: str) -> 
     if cause is not None:
         return cause
     record = existing_package(submission, package)
-    if name in record.executables and name not in dict(record.missing_targets):
+    is_there = name in record.executables and name not in dict(record.missing_targets)
+    if is_there and (record.registered or record.build_type == "ament_python"):
         return None
     return cause_of(NoExecutable(submission, record, name))
 
@@ -84,20 +105,55 @@ def in_another_package(symptom: NoExecutable) -> Cause | None:
 @explanation(NoExecutable, only=PYTHON)
 def installed_in_bin(symptom: NoExecutable) -> Cause | None:
     """setup.cfg is missing or wrong: the executable was installed in bin/."""
-    if symptom.name not in symptom.package.misplaced_executables:
+    package = symptom.package
+    if symptom.name not in package.misplaced_executables or package.build_type != "ament_python":
         return None
-    folder = f"$base/lib/{symptom.package.name}"
+    folder = f"$base/lib/{package.name}"
     return Cause(
         f"{code(symptom.name)} was installed in bin/, where `ros2 run` does not look",
         f"setup.cfg beside setup.py must hold these four lines: [develop] / script_dir={folder} / "
         f"[install] / install_scripts={folder}",
-        _at(symptom.package, "setup.cfg", "script_dir"),
+        _at(package, "setup.cfg", "script_dir"),
     )
 
 
 @explanation(NoExecutable)
+def not_registered(symptom: NoExecutable) -> Cause | None:
+    """CMakeLists.txt does not call ament_package(), so that ROS does not find the package."""
+    package = symptom.package
+    if package.build_type == "ament_python" or package.registered:
+        return None
+    return _in_cmake(
+        symptom,
+        f"the package was built, but ROS does not find it: `ros2 run {package.name}` says that "
+        "there is no such package",
+        "Write `ament_package()` as the last line of CMakeLists.txt.",
+        "ament_package",
+    )
+
+
+@explanation(NoExecutable)
+def built_and_not_installed(symptom: NoExecutable) -> Cause | None:
+    """CMakeLists.txt builds the executable, but does not install it where `ros2 run` looks."""
+    package, name = symptom.package, symptom.name
+    known = name in symptom.targets or name in package.misplaced_executables
+    if package.build_type == "ament_python" or not known:
+        return None
+    if name in package.misplaced_executables:
+        seen = f"{code(name)} was installed in bin/, where `ros2 run` does not look"
+        return _in_cmake(symptom, seen, symptom.install)
+    where = next((one for one in symptom.commands("install") if name in one.arguments), None)
+    if where is None:
+        seen = f"CMakeLists.txt builds {code(name)} and does not install it"
+        return _in_cmake(symptom, seen, symptom.install)
+    place = (where.after("DESTINATION", frozenset()) or ("bin",))[0]
+    seen = f"CMakeLists.txt installs {code(name)} in {code(place)}, where `ros2 run` does not look"
+    return _in_cmake(symptom, seen, symptom.install)
+
+
+@explanation(NoExecutable)
 def not_installed_by_cmake(symptom: NoExecutable) -> Cause | None:
-    """CMakeLists.txt does not install the executable, or under another name."""
+    """CMakeLists.txt gives the executable another name, or defines none."""
     package, name = symptom.package, symptom.name
     if package.build_type == "ament_python":
         return None
@@ -105,12 +161,13 @@ def not_installed_by_cmake(symptom: NoExecutable) -> Cause | None:
     there = f"the build installed {code(match)}" if match else "it was not installed"
     if not match and package.executables:
         there = f"the build installed {codes(package.executables)}"
-    return Cause(
-        there,
-        f"CMakeLists.txt needs `install(TARGETS {name} DESTINATION lib/${{PROJECT_NAME}})`, or "
-        "install(PROGRAMS ...) for a Python script.",
-        _at(package, "CMakeLists.txt", "install"),
-    )
+    build = f"`add_executable({name} src/<file>.cpp)` and " if symptom.targets else ""
+    scripts = "" if build else ", or install(PROGRAMS ...) for a Python script"
+    return _in_cmake(symptom, there, f"CMakeLists.txt needs {build}{symptom.line}{scripts}.")
+
+
+def _in_cmake(symptom: NoExecutable, seen: str, hint: str, command: str = "install") -> Cause:
+    return Cause(seen, hint, _at(symptom.package, "CMakeLists.txt", command))
 
 
 @explanation(NoExecutable, only=PYTHON)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
+from grader.diagnosis.build_error import BuildError
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.findings.finding import Evidence
@@ -23,8 +25,12 @@ _COMPARED = 60
 _ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 # Lines of colcon itself around the tool's output.
 _CHATTER = re.compile(r"Starting +>>>|(Finished|Failed|Aborted) +<<<|Summary:|\s+\d+ packages? ")
-# What setuptools says of data_files, as `ros2 pkg create` writes them.
-_NO_MARKER = re.compile(r"can't copy 'resource/[\w-]+': doesn't exist")
+# What CMake tells of its work, and how far make is.
+_STEPS = re.compile(r"-- |\[ *\d+%\] (?!Building)")
+# What a compiler says of headers and templates of others on the way to an error, and the line of
+# code that it shows after it.
+_FOLDED = re.compile(r"(In file included| +)from |/\S+: (In |.*required from)")
+_SHOWN = re.compile(r" *\d* \| ")
 _CMAKE = ("ament_cmake", "cmake")
 # What the build adds at the end when it ended colcon itself.
 _OURS = re.compile(r"\n\[rosgrade: (.+)\]\n\Z")
@@ -205,7 +211,7 @@ def build_failed(symptom: NotBuilt) -> Cause | None:
     started = f"Starting >>> {name}" in _clean(build).splitlines()
     if build.culprit and started and not is_within(build.culprit.file, folder):
         build = replace(build, culprit=None)
-    return _failed(build, name)
+    return _failed(symptom.submission, build, name)
 
 
 @explanation(NotBuilt, general=True)
@@ -215,7 +221,7 @@ def depends_on_another(symptom: NotBuilt) -> Cause:
     failed = [one for one in build.failed_packages if one != name and _failed_itself(build, one)]
     blamed = [one for one in _needs(submission, name) if one in failed] or failed
     if not blamed:
-        return _failed(build, name)
+        return _failed(submission, build, name)
     broken = [one for one in blamed if not _lacking(submission, build, one)]
     if broken:
         why = f": {build.culprit}" if build.culprit and broken == blamed else ""
@@ -269,16 +275,12 @@ def _needs(submission: SubmissionRecord, name: str) -> list[str]:
     return found[1:]
 
 
-def _failed(build: BuildRecord, name: str) -> Cause:
+def _failed(submission: SubmissionRecord, build: BuildRecord, name: str) -> Cause:
     ended = _OURS.search(build.log)
-    why = str(build.culprit) if build.culprit else ended[1] if ended else ""
+    error = build.culprit or SourceError("", None, ended[1] if ended else "")
     return Cause(
-        f"`colcon build` failed: {why}" if why else "`colcon build` failed",
-        f"Create the empty file resource/{name}: ROS finds the package by it. Use the same name in "
-        "package.xml, setup.py, setup.cfg and for the folder of the Python module."
-        if _NO_MARKER.search(why)
-        else f"Run `colcon build --packages-select {name}` in the workspace and correct the first "
-        "error that it prints.",
+        f"`colcon build` failed: {error if error.file else error.message}".removesuffix(": "),
+        cause_of(BuildError(error, submission, existing_package(submission, name))),
         _evidence(build, name),
     )
 
@@ -314,12 +316,19 @@ def _clean(build: BuildRecord) -> str:
 
 def _relevant(build: BuildRecord, name: str) -> tuple[str, ...]:
     """The log of the package's build, up to its first error or to its end."""
-    kept = [line for line in _written(build, name) if line.strip() and not _CHATTER.match(line)]
+    noise = (_CHATTER, _STEPS, _FOLDED)
+    kept = [
+        line
+        for line in _written(build, name)
+        if line.strip() and not any(pattern.match(line) for pattern in noise)
+    ]
     if build.culprit is not None:
         message = build.culprit.message[:_COMPARED]
         blamed = next((i for i, line in enumerate(kept) if message and message in line), None)
         # What follows is the complaint of the tools that called the student's file.
-        kept = kept[: blamed + 1] if blamed is not None else kept
+        if blamed is not None:
+            shown = takewhile(_SHOWN.match, kept[blamed + 1 :])
+            kept = [*kept[: blamed + 1], *shown]
     return tuple(kept[-_LOG_LINES:])
 
 

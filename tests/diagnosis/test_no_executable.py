@@ -1,4 +1,7 @@
-"""Why `ros2 run` finds no executable: setup.py, setup.cfg, CMakeLists.txt or another package."""
+"""Why `ros2 run` finds no executable: setup.py, setup.cfg, CMakeLists.txt or another package.
+
+Among others built_and_not_installed and not_registered.
+"""
 
 import pytest
 
@@ -10,6 +13,8 @@ FOLDER = "$base/lib/bot_publisher"
 TARGET = SourceError("src/bot_publisher/setup.py", 22, "no function `main` in node.py")
 NO_INIT = "bot_publisher/node.py is not installed: there is no bot_publisher/__init__.py"
 CMAKE = {"build_type": "ament_cmake", "entry_points": ()}
+BUILT = "add_executable(bot_pub src/a.cpp)\n"
+LINE = "install(TARGETS bot_pub DESTINATION lib/${PROJECT_NAME})"
 
 
 @pytest.mark.parametrize(
@@ -37,7 +42,19 @@ CMAKE = {"build_type": "ament_cmake", "entry_points": ()}
         ({**CMAKE, "executables": ("bot_publ",)}, "installed `bot_publ`"),
         ({**CMAKE, "executables": ("x", "y")}, "installed `x` and `y`"),
         (CMAKE, "it was not installed"),
-        (CMAKE, "install(TARGETS bot_pub DESTINATION lib/${PROJECT_NAME})"),
+        (CMAKE, f"`{LINE}`, or install(PROGRAMS"),
+        ({**CMAKE, "cmake": BUILT}, "CMakeLists.txt builds `bot_pub` and does not install it"),
+        ({**CMAKE, "cmake": BUILT + LINE.replace("lib", "share")}, "bot_pub` in `share/${PROJECT"),
+        (
+            {**CMAKE, "cmake": BUILT, "misplaced_executables": ("bot_pub",)},
+            f"bin/, where `ros2 run` does not look | CMakeLists.txt needs `{LINE}`.",
+        ),
+        (
+            {**CMAKE, "cmake": BUILT.replace("pub", "p"), "executables": ("bot_p",)},
+            "installed `bot_p` | CMakeLists.txt needs `add_executable(bot_pub src/<file>.cpp)` and "
+            f"`{LINE}`.",
+        ),
+        ({**CMAKE, "executables": ("bot_pub",), "registered": False}, "Write `ament_package()` as"),
     ],
 )
 def test_what_is_wrong_is_reported_with_what_to_write(changes, words):

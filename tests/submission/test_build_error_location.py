@@ -186,6 +186,95 @@ LOGS = {
         """,
         'src/c/package.xml: Invalid email "a@b.c" for person "Ada"',
     ),
+    "a template of others, gcc": (
+        """\
+        Starting >>> c
+        In file included from src/c/src/x.cpp:2:
+        /usr/include/c++/12/functional: In instantiation of ‘struct std::_Bind_check_arity<void (B::*)(int), B*>’:
+        /usr/include/c++/12/functional:836:12:   required from ‘struct std::_Bind_helper<false, void (B::*)(int), B*>’
+        src/c/src/x.cpp:16:83:   required from here
+        /usr/include/c++/12/functional:820:21: error: static assertion failed: Wrong number of arguments
+        """,  # noqa: E501
+        "src/c/src/x.cpp:16: static assertion failed: Wrong number of arguments",
+    ),
+    "a template of others, clang": (
+        """\
+        Starting >>> c
+        In file included from src/c/src/x.cpp:2:
+        /usr/include/c++/12/bits/stl_construct.h:119:25: error: no matching constructor for 'B'
+              ::new((void*)__p) _Tp(std::forward<_Args>(__args)...);
+        /usr/include/c++/12/bits/alloc_traits.h:518:4: note: in instantiation of function template specialization 'std::_Construct<B, int>' requested here
+        src/c/src/x.cpp:35:21: note: in instantiation of function template specialization 'std::make_shared<B, int>' requested here
+        src/c/src/x.cpp:40:1: error: unknown type name 'foo'
+        """,  # noqa: E501
+        "src/c/src/x.cpp:35: no matching constructor for 'B'",
+    ),
+    "a header of others": (
+        """\
+        Starting >>> c
+        In file included from /opt/ros/jazzy/include/a/b.hpp:3,
+                         from src/c/src/x.cpp:6:
+        /opt/ros/jazzy/include/a/c.hpp:9:2: error: #error Define A
+        """,
+        "src/c/src/x.cpp:6: #error Define A",
+    ),
+    "linker": (
+        """\
+        Starting >>> c
+        /usr/bin/ld: CMakeFiles/x.dir/src/x.cpp.o: in function `main':
+        src/c/src/x.cpp:6: undefined reference to `drive()'
+        collect2: error: ld returned 1 exit status
+        """,
+        "src/c/src/x.cpp:6: undefined reference to `drive()'",
+    ),
+    "linker, without lines": (
+        """\
+        Starting >>> c
+        /usr/bin/ld: CMakeFiles/x.dir/src/x.cpp.o: in function `main':
+        x.cpp:(.text+0x9): undefined reference to `drive()'
+        """,
+        "src/c/CMakeLists.txt: undefined reference to `drive()'",
+    ),
+    "no main": (
+        """\
+        Starting >>> c
+        /usr/bin/ld: /usr/lib/gcc/x86_64-linux-gnu/12/../../../x86_64-linux-gnu/Scrt1.o: in function `_start':
+        (.text+0x17): undefined reference to `main'
+        """,  # noqa: E501
+        "src/c/CMakeLists.txt: undefined reference to `main'",
+    ),
+    "twice": (
+        """\
+        Starting >>> c
+        /usr/bin/ld: CMakeFiles/x.dir/src/x.cpp.o: in function `drive()':
+        src/c/src/x.cpp:2: multiple definition of `drive()'; CMakeFiles/x.dir/src/b.cpp.o:b.cpp:2: first defined here
+        """,  # noqa: E501
+        "src/c/src/x.cpp:2: multiple definition of `drive()'; "
+        "CMakeFiles/x.dir/src/b.cpp.o:b.cpp:2: first defined here",
+    ),
+    "a message of CMake in parts": (
+        """\
+        Starting >>> c
+        CMake Error at CMakeLists.txt:11 (target_link_libraries):
+          Target "x" links to:
+
+            geometry_msgs::geometry_msgs
+
+          but the target was not found.  Possible reasons include:
+
+            * There is a typo in the target name.
+        """,
+        'src/c/CMakeLists.txt:11: Target "x" links to: geometry_msgs::geometry_msgs '
+        "but the target was not found.  Possible reasons include:",
+    ),
+    "install": (
+        """\
+        Starting >>> c
+        CMake Error at cmake_install.cmake:66 (file):
+          file INSTALL cannot find "src/c/launch": No such file or directory.
+        """,
+        'src/c/CMakeLists.txt: file INSTALL cannot find "src/c/launch": No such file or directory.',
+    ),
 }
 
 
@@ -236,6 +325,12 @@ def test_without_a_message_the_package_that_was_being_built_is_named() -> None:
     log = "Starting >>> bot\nFinished <<< bot\nStarting >>> c\n"
     assert str(last_started(log, SOURCES, "too late")) == "src/c/CMakeLists.txt: too late"
     assert last_started("", SOURCES, "too late") is None
+
+
+def test_where_a_compiler_is_ended_its_file_is_named() -> None:
+    log = "Starting >>> c\n[ 50%] Building CXX object CMakeFiles/x.dir/src/x.cpp.o\n"
+    assert str(last_started(log, SOURCES, "too much")) == "src/c/src/x.cpp: too much"
+    assert str(last_started(log, SOURCES, None)).startswith("src/c/CMakeLists.txt: ")
 
 
 @pytest.mark.parametrize(

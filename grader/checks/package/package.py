@@ -25,6 +25,7 @@ from grader.findings.wording import code, codes
 from grader.spec.name import BuildTypes, PackageName
 from grader.spec.nearest_name import nearest
 from grader.submission.read.dependencies import meant
+from grader.submission.read.includes import CODE
 from grader.submission.read.reachable import only_for
 from grader.submission.record import Import, PackageRecord, SourceError, SubmissionRecord
 
@@ -155,8 +156,8 @@ class Dependencies(OfPackage):
 
     executable: str | None = Field(
         None,
-        description="Judge only the imports of the modules that this executable needs; by default "
-        "those of the whole package.",
+        description="Judge only the imports of the modules, or the includes of the sources, that "
+        "this executable needs; by default those of the whole package.",
     )
 
     def _asked(self) -> str:
@@ -166,12 +167,13 @@ class Dependencies(OfPackage):
 
 @check("package.dependencies", Subject.SUBMISSION, Dependencies)
 def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Finding:
-    """package.xml declares the ROS packages that the code imports.
+    """package.xml declares the ROS packages that the code imports or includes.
 
-    Every ROS package that the Python code imports must be named in package.xml by `depend`,
-    `exec_depend`, `build_depend`, `build_export_depend` or `run_depend`, and every package that is
-    named there must exist. An optional import (guarded by `try`) needs no entry. Modules that the
-    code imports only during a run also count.
+    Every ROS package that the Python code imports, whose headers the C++ code includes or that
+    CMakeLists.txt looks for or links must be named in package.xml by `depend`, `exec_depend`,
+    `build_depend`, `build_export_depend` or `run_depend`, and every package that is named there
+    must exist. An optional import (guarded by `try`) or include (in `#if`) needs no entry. Modules
+    that the code imports only during a run also count.
     """
     stop_if(why_no_manifest(submission, parameters.package))
     package = existing_package(submission, parameters.package)
@@ -228,11 +230,16 @@ def _missing(package: PackageRecord) -> Iterator[_Fault]:
     for item in needed.values():
         why = _IDLE.get(kinds.get(item.module, "").partition("/")[0], "")
         tag = f"<depend>{item.module}</depend>"
+        verb, participle = "imports", "imported"
+        if item.file.endswith(CODE):
+            verb, participle = "includes", "included"
+        elif item.file.endswith("CMakeLists.txt"):
+            verb, participle = "uses", "used"
         yield (
-            f"{item.file}:{item.line} imports {code(item.module)}{why}",
+            f"{item.file}:{item.line} {verb} {code(item.module)}{why}",
             "",
-            SourceError(item.file, item.line, f"imports {item.module}"),
-            (f"imported in {item.file}:{item.line}", tag),
+            SourceError(item.file, item.line, f"{verb} {item.module}"),
+            (f"{participle} in {item.file}:{item.line}", tag),
         )
 
 

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 # Raise it when the same submission would now be built differently.
-_VERSION = 5
+_VERSION = 6
 _TOOLS = ("cc", "c++", "cmake", "ld", "make", "ninja")
 _SUMMARY = re.compile(r"Summary: \d+ packages? finished")
 _SIGNALLED = 128
@@ -143,7 +143,7 @@ class Builder(BuildSetting):
                 colcon = Colcon(
                     self,
                     located.root,
-                    tuple(sources.folders.values()),
+                    sources.folders,
                     scratch,
                     unfinished / INSTALL,
                     only_python=only_python,

@@ -17,6 +17,17 @@ _CMAKE = re.compile(r"CMake Error at (.+?):(\d+)(?: \((\w+)\))?:")
 _CMAKE_PLAIN = re.compile(r"CMake Error: (.+)")
 _CMAKE_CALLER = re.compile(r"\s+(\S+):(\d+) \(\w+\)")
 _COMPILER = re.compile(r"([^\s:]+):(\d+)(?::\d+)?: (?:fatal )?error: (.+)")
+_LINKER = re.compile(
+    r"(?:\S*ld: )?(?:(?P<file>[^\s:()]+):)?(?:(?P<line>\d+)|\([^()\s]+\)): "
+    r"(?P<message>(?:undefined reference to|multiple definition of) .+)"
+)
+# How a compiler says what led to an error in the code of others: where a template of theirs is
+# used (gcc before the error, clang after it), and where a header is included.
+_REQUIRED = re.compile(r"([^\s:]+):(\d+):\d+: +(?:recursively )?required (?:from|by)")
+_REQUESTED = re.compile(r"([^\s:]+):(\d+):\d+: note: in instantiation of")
+_INCLUDED = re.compile(r"(?:In file included| +)from ([^\s:]+):(\d+)")
+_COMPILING = re.compile(r"Building CX{0,2} object CMakeFiles/\S+?\.dir/(\S+)\.o$", re.MULTILINE)
+_MOST_AROUND = 200
 _MANIFEST = re.compile(r"(?:\S*InvalidPackage: )?Error\(s\) in package '([^']+)':")
 _SETUPTOOLS = re.compile(r"error: (.+)")
 _NO_SETUP_PY = re.compile(r".*can't open file '[^']*setup\.py'")
@@ -95,7 +106,11 @@ def last_started(log: str, sources: Sources, problem: str | None) -> SourceError
         return None
     folder = sources.folders[started[-1][1]]
     message = problem or _last_words(log[started[-1].end() :])
-    files = [join(folder, name) for name in ("setup.py", "CMakeLists.txt", "package.xml")]
+    names = ["setup.py", "CMakeLists.txt", "package.xml"]
+    if problem is not None:
+        # The compiler was ended at its last file.
+        names = _COMPILING.findall(log, started[-1].end())[-1:] + names
+    files = [join(folder, name) for name in names]
     file = next((file for file in files if file in sources.files), files[-1])
     return SourceError(shown(file), None, message)
 
@@ -132,7 +147,12 @@ class _Place:
         if match := _INTERFACE.match(line):
             return self._at(match[1], None, match[2])
         if match := _COMPILER.match(line):
-            return self._at(match[1], int(match[2]), match[3])
+            place = self._at(match[1], int(match[2]), match[3])
+            return place or self._used_at(match[3])
+        if match := _LINKER.match(line):
+            line_number = int(match["line"]) if match["line"] else None
+            place = self._at(match["file"] or "", line_number, match["message"])
+            return place or self._at("CMakeLists.txt", None, match["message"])
         if match := _MANIFEST.match(line):
             reason = "".join(self.lines[self.number + 1 : self.number + 2]).strip("- ")
             return self._at(match[1], None, reason or line)
@@ -150,6 +170,24 @@ class _Place:
         normal = (posixpath.normpath(candidate) for candidate in (path, self._path(path)))
         file = next((name for name in normal if name in self.sources.files), None)
         return SourceError(file, line, message) if file else None
+
+    def _used_at(self, message: str) -> SourceError | None:
+        """The student's line that led to an error in a header of others, if one did."""
+        before, after = [], []
+        for line in reversed(self.lines[max(self.number - _MOST_AROUND, 0) : self.number]):
+            if _COMPILER.match(line):
+                break
+            before.append(line)
+        for line in self.lines[self.number + 1 : self.number + _MOST_AROUND]:
+            if _COMPILER.match(line):
+                break
+            after.append(line)
+        for pattern, around in ((_REQUIRED, before), (_REQUESTED, after), (_INCLUDED, before)):
+            places = (self._at(m[1], int(m[2]), message) for m in map(pattern.match, around) if m)
+            found = next((place for place in places if place is not None), None)
+            if found is not None:
+                return found
+        return None
 
     def _block(self) -> list[str]:
         """The following lines that are indented, and the first that is not."""
@@ -194,12 +232,16 @@ class _Place:
     def _cmake(self, match: re.Match[str]) -> SourceError | None:
         paragraphs = _paragraphs(self._block())
         message = paragraphs[0] if paragraphs else f"{match[3]} failed"
+        if message.endswith(":"):
+            message = " ".join(paragraphs[:3])
         if any(_TRACEBACK in paragraph for paragraph in paragraphs):
             # The generators of interfaces: what they raise is the last that they say.
             message = paragraphs[-1]
             quoted = self._quoted(message, _INTERFACES)
             if quoted is not None:
                 return quoted
+        if match[1] == "cmake_install.cmake":
+            return self._at("CMakeLists.txt", None, message)
         places = [(match[1], match[2]), *self._callers()]
         found = (self._at(path, int(line), message) for path, line in places)
         return next((error for error in found if error is not None), None)

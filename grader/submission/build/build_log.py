@@ -16,6 +16,13 @@ _NOISE = re.compile(
 # setup.py is run in the package's folder and names colcon's folders relative to it.
 # Of a long run of them only the first one is tried.
 _RELATIVE_SCRATCH = re.compile(r"(?<!\.\./)(?:\.\./)+scratch/(?=build/)")
+# Default arguments of templates, and types that the compiler names twice.
+_FOLDED = (
+    (re.compile(r"\b(\w+)_<std::allocator<void> ?>"), r"\1"),
+    (re.compile(r"\bstd::(?:__cxx11::)?basic_string<char>"), "std::string"),
+    (re.compile(r"\b(using \w+ = )(?:class |struct )?"), ""),
+    (re.compile(r" \{aka (?:‘[^’\n]*’|'[^'\n]*')\}"), ""),
+)
 _ENDED = re.compile(r"(?<!^)(?=(?:Finished|Failed  |Aborted ) <<< \S+ \[)", re.MULTILINE)
 _NOT_FOUND = (
     re.compile(r"Could not find a package configuration file provided by\s+\"([\w-]+)\""),
@@ -31,7 +38,7 @@ _MISSING_MODULE = re.compile(r"^ModuleNotFoundError: No module named '(\w+)'$", 
 
 
 def clean(output: str, paths: Mapping[str, str]) -> str:
-    """Strip colours and control characters, and map scratch paths back.
+    """Strip colours and control characters, map scratch paths back, shorten types of C++.
 
     Args:
         paths: Folder as it was in the build -> what the student calls it; ``""`` for the
@@ -43,6 +50,8 @@ def clean(output: str, paths: Mapping[str, str]) -> str:
         name = paths[folder]
         text = text.replace(f"{folder}/", f"{name}/" if name else "")
         text = text.replace(folder, name or ".")
+    for written, short in _FOLDED:
+        text = written.sub(short, text)
     return _NOISE.sub("", text)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+import shlex
 import shutil
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -75,11 +76,15 @@ class BuildSetting:
 
 @dataclass(frozen=True)
 class Colcon:
-    """colcon for one submission, with a scratch folder for what a build leaves behind."""
+    """colcon for one submission, with a scratch folder for what a build leaves behind.
+
+    Attributes:
+        folders: Of each package, by its name.
+    """
 
     setting: BuildSetting
     root: Path
-    folders: tuple[str, ...]
+    folders: Mapping[str, str]
     scratch: Path
     install: Path
     only_python: bool
@@ -159,10 +164,23 @@ class Colcon:
         # memory on a machine with more of them.
         compilers = self.setting.limits.room.memory_bytes // _COMPILER_BYTES
         environment["MAKEFLAGS"] = f"-j{max(1, min(compilers, len(os.sched_getaffinity(0))))}"
+        # What others made, and what is generated, is not debugged.
+        if not self.is_standalone:
+            environment |= dict.fromkeys(("CFLAGS", "CXXFLAGS"), self._compiler_flags())
         return environment
 
+    def _compiler_flags(self) -> str:
+        """Quick to compile, with lines of functions for a crash; a package may say otherwise.
+
+        Debug information and ``__FILE__`` name the student's files as they were handed in. The
+        compiler takes the last option that fits: of two names, the longer one.
+        """
+        builds = [str(self.scratch / "build" / name) for name in sorted(self.folders, key=len)]
+        places = [f"-ffile-prefix-map={place}=" for place in (f"{self.root}/", *builds)]
+        return shlex.join(["-O0", "-g1", *places])
+
     def _command(self) -> list[str]:
-        folders = [str(self.root / folder) for folder in self.folders]
+        folders = [str(self.root / folder) for folder in self.folders.values()]
         command = _colcon(self.setting.ros, self.environment["PATH"])
         command += ["--log-base", os.devnull, "build"]
         command += ["--merge-install", "--continue-on-error", "--executor", "sequential"]

@@ -6,7 +6,8 @@ import ast
 import re
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import islice
 
 from grader.ros import RosInstallation
 from grader.submission.build.installed import (
@@ -21,10 +22,11 @@ from grader.submission.intake.paths import is_within, join, shown
 from grader.submission.read import source
 from grader.submission.read.dependencies import is_known
 from grader.submission.read.imports import find_imports, is_code, ros_imports
+from grader.submission.read.includes import CODE, MOST_SOURCE_BYTES, MOST_SOURCES, read_included
 from grader.submission.read.lint import lint, newer_syntax
 from grader.submission.read.manifest import MANIFEST, Manifest, read_manifest
 from grader.submission.read.outline import outline
-from grader.submission.read.rosdistro import PYTHON_MODULES
+from grader.submission.read.rosdistro import PACKAGES, PYTHON_MODULES
 from grader.submission.read.setup_py import EntryPoint, Setup, read_setup
 from grader.submission.read.targets import Modules, missing_target
 from grader.submission.record import Definition, Import, Lint, PackageRecord, SourceError
@@ -44,6 +46,7 @@ class Package:
         setup_py: The lines of its setup.py, or None where it has none.
         hashes: Path of each Python file in the submission -> hash of its content.
         trees: Path of each Python file -> its syntax tree, or why there is none.
+        code_cpp: Path of each file of C and C++, from the folder of the package -> its text.
     """
 
     name: str
@@ -57,6 +60,7 @@ class Package:
     trees: Mapping[str, ast.Module | SourceError]
     lint: Lint | None = None
     newer_syntax: tuple[SourceError, ...] = ()
+    code_cpp: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def build_type(self) -> str:
@@ -126,6 +130,12 @@ class Package:
         imports = self.imports
         newer = {error.file for error in self.newer_syntax}
         errors = (tree for _, tree in sorted(self.trees.items()) if isinstance(tree, SourceError))
+        included = read_included(
+            {shown(path): text for path, text in self.code_cpp.items()},
+            self.cmake,
+            shown(join(self.folder, CMAKE)),
+            lambda name: name != self.name and name in {*PACKAGES, *ros.packages, *submitted},
+        )
         dependencies = (
             replace(
                 one,
@@ -141,16 +151,18 @@ class Package:
             manifest_error=self.manifest.error,
             dependencies=(*dependencies, *self.manifest.misplaced),
             imports=tuple(imports),
-            ros_imports=tuple(
-                ros_imports(
+            ros_imports=(
+                *ros_imports(
                     imports,
                     own=self.modules().top_level | {self.name},
                     packages={
                         module: next((name for name in names if name in declared), names[0])
                         for module, names in providers.items()
                     },
-                )
+                ),
+                *included.packages,
             ),
+            own_headers=included.own,
             syntax_errors=tuple(error for error in errors if error.file not in newer),
             newer_syntax=self.newer_syntax,
             description=shown(self.manifest.description),
@@ -197,6 +209,13 @@ def read_package(
         if data is not None and (suffixed or source.is_python_script(data)):
             hashes[file.path] = hash_of(data)
             trees[file.path] = source.parse(data, shown(file.path), allowance)
+    code_cpp = {
+        file.path if folder == "." else file.path[len(folder) + 1 :]: _text(
+            _bytes(located, file.path) or b""
+        )
+        for file in islice((one for one in files if one.path.endswith(CODE)), MOST_SOURCES)
+        if file.size <= MOST_SOURCE_BYTES
+    }
     folder_name = located.id if folder == "." else folder.rpartition("/")[2]
     package = Package(
         name=manifest.name or setup.name or shown(folder_name),
@@ -211,6 +230,7 @@ def read_package(
         ),
         hashes=hashes,
         trees=trees,
+        code_cpp=code_cpp,
     )
     broken = [path for path, tree in trees.items() if isinstance(tree, SourceError)]
     return replace(
@@ -265,7 +285,7 @@ def _with_executables(
         if built is not None:
             entries = [_at_declaration(entry, package) for entry in built]
             modules = package.modules(installed.python)
-        names = {entry.name for entry in entries}
+        names = {entry.name for entry in entries} | {*_WORD.findall(record.cmake or "")}
         record = replace(
             record,
             files=tuple(sorted(files)),

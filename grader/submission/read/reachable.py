@@ -1,18 +1,28 @@
-"""The part of a package that one of its executables needs, by what its modules import."""
+"""The part of a package that one of its executables needs, by what its files import or include."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
 
+from grader.submission.read.cmake import read_commands
+from grader.submission.read.includes import needed_files
 from grader.submission.record import PackageRecord, SourceFile
 
 
 def only_for(package: PackageRecord, executable: str) -> PackageRecord:
-    """The package with the imports of the modules that an executable needs.
+    """The package with the imports of the modules or sources that an executable needs.
 
-    An executable that is no entry point, such as a script, has all of them.
+    An executable that neither setup.py nor CMakeLists.txt defines, such as a script, has all.
     """
+    commands, folder = read_commands(package.cmake or ""), package.file("")
+    compiled = needed_files(executable, commands, folder, package.own_headers)
+    if compiled is not None:
+        parts, lines = compiled
+        cmake = package.file("CMakeLists.txt")
+        kept = (one for one in package.ros_imports if one.file in parts)
+        named = (one for one in package.ros_imports if one.file == cmake and one.line in lines)
+        return replace(package, ros_imports=(*kept, *named))
     target = dict(package.entry_points).get(executable)
     files = {source.module: source for source in package.sources}
     if target is None or target.partition(":")[0] not in files:
