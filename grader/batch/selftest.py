@@ -16,6 +16,7 @@ from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.mutant import (
+    CPP,
     PYTHON,
     Change,
     Difference,
@@ -90,11 +91,7 @@ def trials(loaded: LoadedAssignment, language: Language = PYTHON) -> tuple[Trial
             for change in changes
             if not change.skip_reason
         ),
-        *(
-            [Trial(Role.STARTER, "starter", "the starter package, untouched", None)]
-            if language is PYTHON
-            else []
-        ),
+        Trial(Role.STARTER, "starter", "the starter package, untouched", None),
     )
 
 
@@ -105,11 +102,12 @@ def run_trial(
     reference: Path,
     folder: Path,
     on_graded: Callable[[Graded], None] = lambda _: None,
+    language: Language = PYTHON,
 ) -> TrialResult:
     """Grade one trial."""
     submission = folder / "submissions" / trial.id
     if trial.role is Role.STARTER:
-        write_starter(loaded, submission)
+        write_starter(loaded, submission, cpp=language is CPP)
     elif trial.change is None:
         submission = reference
     else:
@@ -185,7 +183,7 @@ def selftest(
     with Scratch("selftest") as folder:
 
         def work(trial: Trial) -> TrialResult:
-            result = run_trial(trial, loaded, grading, base, folder, on_graded)
+            result = run_trial(trial, loaded, grading, base, folder, on_graded, language)
             if keep is not None and not result.verdict.right:
                 shutil.rmtree(keep / trial.id, ignore_errors=True)
                 for part in ("submissions", "recordings"):
