@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
@@ -11,8 +12,9 @@ import pytest
 from grader import resources, ros
 from grader.assignment.load import load_assignment
 from grader.assignment.mutant import CPP
-from grader.batch.grading import Grading
+from grader.batch.grading import Graded, Grading
 from grader.batch.selftest import TrialResult, selftest
+from grader.findings.finding import Status
 from grader.run.host.load import cpu_count
 from grader.run.runner import Runner
 from tests.compiled.packages import MUTANTS, node, write_package
@@ -50,9 +52,22 @@ SOLUTIONS = {
 }
 
 
+class Results(NamedTuple):
+    """What came of all trials: verdicts by lesson, and what failed checks observed."""
+
+    verdicts: dict[str, list[TrialResult]]
+    observed: list[str]
+
+
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[TrialResult]]:
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
     """The results of all lessons, which are graded at the same time."""
+    observed: list[str] = []
+
+    def note(graded: Graded) -> None:
+        for result in graded.grade.of(Status.FAILED):
+            observed.extend(item.finding.observed for item in result.findings)
+
     folder = tmp_path_factory.mktemp("lessons")
     with Runner(ros.find()) as runner, ThreadPoolExecutor(len(SOLUTIONS)) as pool:
 
@@ -63,19 +78,30 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[TrialRes
             shutil.copy(MUTANTS / f"{name}.yaml", lesson / CPP.mutants)
             loaded = load_assignment(lesson)
             grading = Grading(loaded, runner, resources.cache_folder())
-            return list(selftest(loaded, grading, jobs=cpu_count(), language=CPP))
+            trials = selftest(loaded, grading, jobs=cpu_count(), language=CPP, on_graded=note)
+            return list(trials)
 
-        return dict(zip(SOLUTIONS, pool.map(graded, SOLUTIONS), strict=True))
+        verdicts = dict(zip(SOLUTIONS, pool.map(graded, SOLUTIONS), strict=True))
+        return Results(verdicts, observed)
 
 
 @pytest.mark.timeout(400)
 @pytest.mark.parametrize("name", SOLUTIONS)
 def test_a_right_node_gets_full_points_and_a_wrong_one_loses_what_it_must(
-    name: str, results: dict[str, list[TrialResult]]
+    name: str, results: Results
 ) -> None:
     wrong = {
         result.trial.id: (str(result.verdict), *result.findings)
-        for result in results[name]
+        for result in results.verdicts[name]
         if not result.verdict.right
     }
     assert not wrong
+
+
+@pytest.mark.timeout(400)
+@pytest.mark.parametrize(
+    "end", ["SIGSEGV: segmentation fault", "std::runtime_error: no speed is left"]
+)
+def test_a_crash_is_named_with_the_students_line(end: str, results: Results) -> None:
+    place = re.compile(rf"{re.escape(end)} \(bot_publisher/src/bot_pub\.cpp:\d+\)")
+    assert any(place.search(text) for text in results.observed), results.observed
