@@ -19,6 +19,10 @@ MADE = {
     "ws/build/COLCON_IGNORE": "",
     "ws/build/bot/setup.py": "",
     "ws/.git/config": "",
+    "ws/src/pub/package.xml": "<package/>",
+    "ws/src/pub/build/CMakeCache.txt": "",
+    "ws/src/pub/build/pub": "",
+    "ws/src/pub/CMakeFiles/pub.dir/pub.cpp.o": "",
 }
 
 
@@ -34,7 +38,10 @@ def test_what_builds_and_runs_made_is_known_of_a_folder_and_of_an_archive(tmp_pa
     (tmp_path / "a.zip").write_bytes(zipped(MADE))
     for source in (tmp_path / "handed", tmp_path / "a.zip"):
         with opened(source) as located:
-            assert located.leftovers == ("ws/build", "ws/src/bot/log/__pycache__")
+            assert located.leftovers == (
+                *("ws/build", "ws/src/bot/log/__pycache__"),
+                *("ws/src/pub/CMakeFiles", "ws/src/pub/build"),
+            )
 
 
 def test_archives_that_differ_only_in_leftovers_are_two_submissions(tmp_path: Path) -> None:

@@ -26,9 +26,9 @@ class Clean(Parameters):
 def clean(submission: SubmissionRecord, parameters: Clean) -> Finding:
     """The submission holds nothing that a build or a run makes.
 
-    That is `build`, `install` and `log` of colcon, `__pycache__`, `*.pyc`, `*.egg-info`, virtual
-    environments and caches of tools. A folder is judged as it is, and so is a workspace in which
-    you have just built.
+    That is `build`, `install` and `log` of colcon, `CMakeFiles`, `__pycache__`, `*.pyc`,
+    `*.egg-info`, virtual environments and caches of tools. A folder is judged as it is, and so is a
+    workspace in which you have just built.
     """
     if not submission.leftovers:
         return Finding.passed(parameters.asked_for, "there is nothing of that kind")

@@ -11,13 +11,19 @@ from grader.submission.read.manifest import MANIFEST
 
 _TOOLS = """
 .git .hg .svn __pycache__ .venv node_modules .pytest_cache .mypy_cache .ruff_cache .hypothesis .tox
-.colcon __MACOSX rosgrade-report
+.colcon CMakeFiles __MACOSX rosgrade-report
 """
 TOOL_FOLDERS = frozenset(_TOOLS.split())
 """Folders that tools make, wherever they are."""
 
 COLCON_FOLDERS = ("build", "install", "log")
-_COLCON_MARKS = {"COLCON_IGNORE", ".built_by", ".colcon_install_layout", "local_setup.sh"}
+_COLCON_MARKS = {
+    "COLCON_IGNORE",
+    ".built_by",
+    ".colcon_install_layout",
+    "local_setup.sh",
+    "CMakeCache.txt",
+}
 _VIRTUAL_ENVIRONMENT = "pyvenv.cfg"
 MARKS = (*_COLCON_MARKS, _VIRTUAL_ENVIRONMENT, MANIFEST)
 """Files that tell what a folder is."""
@@ -35,7 +41,7 @@ _EDITORS = re.compile(
 # What git and macOS add without being asked is not among them.
 _MADE = (
     *("__pycache__", "*.pyc", "*.egg-info", ".venv", "venv", "node_modules"),
-    *(".pytest_cache", ".mypy_cache", ".ruff_cache"),
+    *(".pytest_cache", ".mypy_cache", ".ruff_cache", "CMakeFiles"),
 )
 
 
