@@ -29,7 +29,8 @@ _CHATTER = re.compile(r"Starting +>>>|(Finished|Failed|Aborted) +<<<|Summary:|\s
 _STEPS = re.compile(r"-- |\[ *\d+%\] (?!Building)")
 # What a compiler says of headers and templates of others on the way to an error, and the line of
 # code that it shows after it.
-_FOLDED = re.compile(r"(In file included| +)from |/\S+: (In |.*required from)")
+_FOLDED = re.compile(r"(In file included | +)from |/\S+: (In |.*required (from|by))")
+_COMPILING = "Building CXX object "
 _SHOWN = re.compile(r" *\d* \| ")
 _CMAKE = ("ament_cmake", "cmake")
 # What the build adds at the end when it ended colcon itself.
@@ -327,8 +328,10 @@ def _relevant(build: BuildRecord, name: str) -> tuple[str, ...]:
         blamed = next((i for i, line in enumerate(kept) if message and message in line), None)
         # What follows is the complaint of the tools that called the student's file.
         if blamed is not None:
-            shown = takewhile(_SHOWN.match, kept[blamed + 1 :])
-            kept = [*kept[: blamed + 1], *shown]
+            is_own = not kept[blamed].startswith("/")
+            shown = takewhile(_SHOWN.match, kept[blamed + 1 :]) if is_own else ()
+            begin = max((i for i in range(blamed) if _COMPILING in kept[i]), default=-1) + 1
+            kept = [*kept[begin : blamed + 1], *shown]
     return tuple(kept[-_LOG_LINES:])
 
 

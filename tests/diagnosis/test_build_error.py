@@ -9,7 +9,8 @@ import pytest
 
 from grader.diagnosis.build_error import TABLE, BuildError, Row
 from grader.diagnosis.explanation import cause_of, explanations
-from grader.submission.record import SourceError
+from grader.diagnosis.not_built import why_not_built
+from grader.submission.record import BuildRecord, SourceError
 from tests.checks.builder import package, submission
 
 CMAKE = """\
@@ -97,3 +98,28 @@ def test_what_is_missing_is_named_with_the_line_to_write(
 def test_an_exception_of_a_setup_py_is_no_error_of_a_compiler() -> None:
     symptom = error("ValueError: cannot convert float NaN", file="src/bot_publisher/setup.py")
     assert cause_of(symptom).startswith("Run `colcon build --packages-select bot_publisher`")
+
+
+def test_the_log_of_an_error_in_a_header_of_others_is_folded_to_the_students_line() -> None:
+    log = """\
+Starting >>> bot_publisher
+-- Generating done
+[ 50%] Building CXX object CMakeFiles/bot_pub.dir/src/bot.cpp.o
+In file included from src/bot_publisher/src/bot.cpp:2:
+/usr/include/c++/12/functional: In instantiation of ‘struct std::_Bind_check_arity<B*>’:
+/usr/include/c++/12/functional:836:12:   required from ‘struct std::_Bind_helper<B*>’
+src/bot_publisher/src/bot.cpp:16:83:   required from here
+/usr/include/c++/12/functional:820:21: error: static assertion failed: Wrong number
+  819 |       static_assert(_Varargs::value
+Failed   <<< bot_publisher [1.0s, exited with code 2]
+"""
+    place = SourceError(
+        "src/bot_publisher/src/bot.cpp", 16, "static assertion failed: Wrong number"
+    )
+    build = BuildRecord(False, 1.0, failed_packages=("bot_publisher",), culprit=place, log=log)
+    cause = why_not_built(submission(build=build), "bot_publisher")
+    assert cause is not None
+    assert cause.evidence.log == (
+        "src/bot_publisher/src/bot.cpp:16:83:   required from here",
+        "/usr/include/c++/12/functional:820:21: error: static assertion failed: Wrong number",
+    )

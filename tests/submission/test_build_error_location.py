@@ -212,8 +212,7 @@ LOGS = {
     "a header of others": (
         """\
         Starting >>> c
-        In file included from /opt/ros/jazzy/include/a/b.hpp:3,
-                         from src/c/src/x.cpp:6:
+        In file included from src/c/src/x.cpp:6:
         /opt/ros/jazzy/include/a/c.hpp:9:2: error: #error Define A
         """,
         "src/c/src/x.cpp:6: #error Define A",

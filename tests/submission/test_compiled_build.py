@@ -113,6 +113,7 @@ def test_the_first_error_of_a_compiler_is_explained(
     finding = judged(built(tree, real_ros, changes))
     assert seen in finding.observed
     assert hint in finding.hint
+    assert not any(line.startswith("--") for line in finding.evidence.log)
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ _LINKER = re.compile(
 # used (gcc before the error, clang after it), and where a header is included.
 _REQUIRED = re.compile(r"([^\s:]+):(\d+):\d+: +(?:recursively )?required (?:from|by)")
 _REQUESTED = re.compile(r"([^\s:]+):(\d+):\d+: note: in instantiation of")
-_INCLUDED = re.compile(r"(?:In file included| +)from ([^\s:]+):(\d+)")
+_INCLUDED = re.compile(r"(?:In file included | +)from ([^\s:]+):(\d+)")
 _COMPILING = re.compile(r"Building CX{0,2} object CMakeFiles/\S+?\.dir/(\S+)\.o$", re.MULTILINE)
 _MOST_AROUND = 200
 _MANIFEST = re.compile(r"(?:\S*InvalidPackage: )?Error\(s\) in package '([^']+)':")
