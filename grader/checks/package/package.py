@@ -167,7 +167,7 @@ class Dependencies(OfPackage):
 
 @check("package.dependencies", Subject.SUBMISSION, Dependencies)
 def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Finding:
-    """package.xml declares the ROS packages that the code imports or includes.
+    """package.xml declares the ROS packages that the code uses.
 
     Every ROS package that the Python code imports, whose headers the C++ code includes or that
     CMakeLists.txt looks for or links must be named in package.xml by `depend`, `exec_depend`,
