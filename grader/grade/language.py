@@ -28,7 +28,7 @@ class Words(Model):
         literal, *rest = _PLACE.split(self.python)
         found = re.escape(literal)
         for name, after in zip(rest[::2], rest[1::2], strict=True):
-            found += rf"(?P<{name}_{number}>[^()]+?){re.escape(after)}"
+            found += rf"(?P<{name}_{number}>(?:[^()]|\([^()]*\))+?){re.escape(after)}"
         # A word is not replaced within a longer one.
         begin = r"(?<![\w.])" if self.python[0].isalnum() else ""
         end = r"(?!\w)" if self.python[-1].isalnum() else ""
@@ -52,7 +52,7 @@ def in_cpp(text: str) -> str:
 
 def _translated(found: re.Match[str]) -> str:
     number = next(n for n in range(len(WORDS)) if found[f"row_{n}"] is not None)
-    return _PLACE.sub(lambda place: found[f"{place[1]}_{number}"], WORDS[number].cpp)
+    return _PLACE.sub(lambda place: in_cpp(found[f"{place[1]}_{number}"]), WORDS[number].cpp)
 
 
 def is_cpp(submission: SubmissionRecord, names: Collection[str]) -> bool:
