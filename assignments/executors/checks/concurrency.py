@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from grader.findings.finding import Finding
 from grader.findings.wording import code, codes, listing
+from grader.measure.callback_runs import Run, timed
 from grader.measure.declarations import executors
 from grader.recording.model import Recording
 
 _EXCLUSIVE = "MutuallyExclusiveCallbackGroup"
+# The clock of a report and that of the tracer may differ by so much.
+_SLACK_NS = 1_000_000
 
 
 def threads(recording: Recording) -> int:
@@ -63,6 +66,20 @@ def not_judged(
     return None
 
 
+def kept_apart(recording: Recording, runs: Iterable[Run]) -> bool:
+    """Whether one mutually exclusive group made all of these runs, as the tracer timed it."""
+    calls, groups = timed(recording), set[str]()
+    for run in runs:
+        around = {
+            call.group
+            for call in calls
+            if call.begin_ns - _SLACK_NS <= run.begin_ns
+            and (run.end_ns or 0) <= (call.end_ns or 0) + _SLACK_NS
+        }
+        groups |= around if len(around) == 1 else {""}
+    return len(groups) == 1 and groups.pop().startswith(_EXCLUSIVE)
+
+
 def _lacks_threads(recording: Recording, at_once: int) -> bool:
     """Whether all that was spun is one executor of fewer threads: that kept them apart."""
     return len(recording.declared("spin")) == 1 and 0 < threads(recording) < at_once
@@ -97,7 +114,17 @@ def _groups(recording: Recording, kind: str) -> list[tuple[str, Any]]:
         group = item.data.get("group")
         if isinstance(group, Mapping) and isinstance(group.get("type"), str):
             found.append((str(group["type"]), str(group.get("id"))))
-    return found
+    return found or _groups_of_runs(recording, kind)
+
+
+def _groups_of_runs(recording: Recording, kind: str) -> list[tuple[str, Any]]:
+    """Those of a program in C++, of which only the calls tell; as many as there are timers."""
+    is_timer = kind == "timer"
+    runs = [run for run in timed(recording) if run.serves.startswith("/") is not is_timer]
+    parts = [group.partition(" ") for group in dict.fromkeys(run.group for run in runs)]
+    found: list[tuple[str, Any]] = [(type_, id_) for type_, _, id_ in parts if id_]
+    more = len(recording.declared(kind)) - len(found) if is_timer else 0
+    return found + found[-1:] * more
 
 
 def _group_words(groups: list[tuple[str, Any]]) -> str:

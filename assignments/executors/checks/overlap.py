@@ -129,7 +129,8 @@ def overlap(recording: Recording, parameters: Overlapping) -> Finding:
 
     Each of the named callbacks must overlap with one of the others, at least `at_least` times by
     `by` or longer. Judged by their reports on the wire; the executor and the callback groups that
-    the process declared only help to explain.
+    the process declared help to explain. Where one mutually exclusive group kept the callbacks
+    apart, a busy machine is no excuse.
 
     A MultiThreadedExecutor takes as many threads as there are CPUs; the grader gives it four at
     least, and os.cpu_count() says so. If that is not possible and the machine has one CPU, this
@@ -178,15 +179,15 @@ def _serial(
     """The finding of a callback that does not overlap often enough."""
     seen = f"only {counted(number, 'time')}" if number else "never"
     observed = f"{code(callback)} {seen} ran at the same time as {codes(parameters.others, 'or')}"
+    names = {callback, *parameters.others}
+    ended = reports.ended(names)
     most = number + _prevented(recording, parameters, reports, callback)
-    excused = concurrency.not_judged(
-        recording, expected, observed, prevented=most >= parameters.at_least
-    )
+    # With several threads, those of rclcpp that wait for the group take the CPU from each other.
+    prevented = most >= parameters.at_least and not concurrency.kept_apart(recording, ended)
+    excused = concurrency.not_judged(recording, expected, observed, prevented=prevented)
     if excused is not None:
         return excused
-    names = {callback, *parameters.others}
     declared, hint = _why(recording, _concurrency_hint(recording, len(names)))
-    ended = reports.ended(names)
     return Finding.failed(
         expected,
         observed + declared,

@@ -451,6 +451,30 @@ class TestOverlap:
     def words(self, subject, **more):
         return failed("overlap", subject, ["timer_1"], others=["timer_2"], **more)
 
+    def of_cpp(self, group):
+        """One after the other on a busy machine; the tracer saw the group of each call."""
+        made = [declared("timer", number=number, period_s=1.0) for number in (1, 2)]
+        calls = [
+            declared(
+                "ran",
+                began_ns=at(begin) - 1000,
+                ended_ns=at(end) + 1000,
+                serves="/chatter" if name == "chatter" else "1 s",
+                group=group,
+            )
+            for name, begin, end in serial()
+        ]
+        spun = declared("spin", executor="MultiThreadedExecutor", threads=4)
+        busy = taken(1.0, 6.0, waited_s=4.0)
+        return run(*serial(), declarations=(*made, spun, *calls), disturbance=busy)
+
+    def test_a_busy_machine_is_no_excuse_where_one_group_keeps_them_apart(self):
+        words = self.words(self.of_cpp("MutuallyExclusiveCallbackGroup 7"))
+        assert "its timers in one `MutuallyExclusiveCallbackGroup`" in words
+        assert "Without callback_group=..." in words
+        for group in ("ReentrantCallbackGroup 7", "None"):
+            assert self.overlap(self.of_cpp(group)).status is Status.ERROR
+
     def test_timers_that_run_together_pass(self):
         finding = self.overlap(run(*parallel()))
         assert finding.status is Status.PASSED
