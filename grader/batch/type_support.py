@@ -13,7 +13,8 @@ from grader.errors import GraderFault
 from grader.resources import cache_folder
 from grader.ros import RosInstallation, find
 from grader.scratch import Scratch
-from grader.submission.underlay.definition import Underlay, find_underlay
+from grader.submission.prepare import named_packages
+from grader.submission.underlay.definition import Underlay, find_underlay, sets_with
 from grader.submission.underlay.store import UnderlayStore, on_top, packages_in
 
 _WORD = re.compile(r"\w+")
@@ -29,6 +30,19 @@ def _silent(_: str) -> None:
 def underlays_of(loaded: LoadedAssignment) -> list[Underlay]:
     """The underlays that an assignment names."""
     return [find_underlay(given, loaded.folder) for given in loaded.assignment.underlays]
+
+
+def wanted_underlays(loaded: LoadedAssignment, submission: Path | None = None) -> list[Underlay]:
+    """The underlays that it takes to grade a submission, or any submission if none is given."""
+    found, ros = underlays_of(loaded), find()
+    if submission is not None:
+        used = named_packages(submission, ros)
+    else:
+        packages = loaded.assignment.packages
+        in_cpp = (one for one in packages if "ament_cmake" in one.build_types)
+        used = {"rclcpp" for one in in_cpp if not {"rclpy", "rclcpp"}.isdisjoint(one.depends)}
+    by_need = (one for one in sets_with(used - ros.packages) if one.by_need)
+    return [*found, *(one for one in by_need if one not in found)]
 
 
 def missing_underlays(loaded: LoadedAssignment) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,6 +11,7 @@ import typer
 from grader.cli.options import Quiet, SandboxChoice, chosen_sandbox
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
+from grader.errors import UsageError
 from grader.resources import cache_folder
 from grader.sandbox.choice import Choice
 
@@ -22,12 +24,20 @@ app = typer.Typer(
 @app.command()
 def add(
     what: Annotated[
-        list[str],
+        list[str] | None,
         typer.Argument(
             metavar="NAME|FILE.repos|FOLDER",
             help="A named set (see `rosgrade underlay list`), a .repos file, a folder of packages.",
         ),
-    ],
+    ] = None,
+    assignment: Annotated[
+        str | None,
+        typer.Option("--for", metavar="ASSIGNMENT", help="All that its submissions may need."),
+    ] = None,
+    submission: Annotated[
+        Path | None,
+        typer.Option(help="With --for: only what this submission needs."),
+    ] = None,
     wait: Annotated[
         float,
         typer.Option(metavar="SECONDS", help="Longest time until a git server answers.", min=1),
@@ -41,11 +51,17 @@ def add(
     that ROS has already is not built. An interrupted command goes on where it stopped.
     """
     from grader import ros
+    from grader.assignment.load import load_assignment
+    from grader.batch.type_support import wanted_underlays
     from grader.ros2_command import write_command
     from grader.submission.underlay.definition import find_underlay
     from grader.submission.underlay.store import UnderlayStore
 
-    found = [find_underlay(given) for given in what]
+    found = [find_underlay(given) for given in what or ()]
+    if assignment is not None:
+        found += wanted_underlays(load_assignment(assignment), submission)
+    elif not found:
+        raise UsageError("name what to add, such as `rosgrade underlay add rclcpp`, or --for ID")
     progress, installation, began_s = Progress(quiet), ros.find(), time.monotonic()
     with progress.shown():
         place = chosen_sandbox(sandbox, progress)
@@ -86,7 +102,6 @@ def remove(
 ) -> None:
     """Remove underlays from this machine; their sources stay."""
     from grader import ros
-    from grader.errors import UsageError
     from grader.ros2_command import write_command
     from grader.spec.nearest_name import nearest_or_all
     from grader.submission.underlay.store import UnderlayStore

@@ -114,6 +114,23 @@ def refused(source: Path, error: SubmissionError) -> Prepared:
     return Prepared(record, None)
 
 
+def named_packages(path: Path, ros: RosInstallation) -> set[str]:
+    """The packages that a submission names, apart from its own; none if it cannot be read."""
+    allowance = Allowance()
+    try:
+        with opened(path) as located:
+            folders = located.packages[:_MAX_PACKAGES]
+            packages = [read_package(located, folder, ros, allowance) for folder in folders]
+    except SubmissionError:
+        return set()
+    return _named(packages)
+
+
+def _named(packages: Sequence[Package]) -> set[str]:
+    used = {name for package in packages for name in package.named}
+    return used - {package.name for package in packages}
+
+
 def fingerprint(path: Path | str) -> str:
     """The hash that :func:`prepare` will give a submission; nothing is built."""
     source = check_path(path)
@@ -161,8 +178,7 @@ def _prepare(
     )
     if record.problem is not None:
         return Prepared(record, None)
-    used = {name for package in packages for name in package.named}
-    used -= {package.name for package in packages}
+    used = _named(packages)
     ros = store.completed(store.needed(ros, used), used)
     sources = Sources(
         files={file.path for file in located.files},

@@ -15,8 +15,12 @@ def main() -> int:
     made = subprocess.run([sys.executable, "-m", "grader.bootstrap"], cwd=ROSGRADE, check=False)
     if made.returncode:
         return made.returncode
-    command = [str(ROSGRADE / ".venv/bin/rosgrade"), "check", "@ASSIGNMENT@", "."]
-    return subprocess.run([*command, "--github", "--classroom50"], check=False).returncode
+    rosgrade = str(ROSGRADE / ".venv/bin/rosgrade")
+    # Such as rclcpp for nodes in C++; where it cannot be had, `check` says so.
+    underlay = ["underlay", "add", "--for", "@ASSIGNMENT@", "--submission", "."]
+    subprocess.run([rosgrade, *underlay], check=False)
+    command = ["check", "@ASSIGNMENT@", ".", "--github", "--classroom50"]
+    return subprocess.run([rosgrade, *command], check=False).returncode
 
 
 if __name__ == "__main__":

@@ -10,3 +10,5 @@ DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends \
 cd "${AUTOGRADER_ROOT:-/autograder}/source/rosgrade"
 # The locked environment, with ROS 2 Jazzy as wheels.
 python3 -m grader.bootstrap
+# What submissions need beside the wheels, such as rclcpp for nodes in C++.
+.venv/bin/rosgrade underlay add --for @ASSIGNMENT@

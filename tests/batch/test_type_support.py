@@ -11,7 +11,7 @@ import pytest
 from grader import resources, ros
 from grader.assignment.interfaces import FOLDER
 from grader.assignment.load import LoadedAssignment, load_assignment
-from grader.batch.type_support import TypeSupport, missing_underlays
+from grader.batch.type_support import TypeSupport, missing_underlays, wanted_underlays
 from grader.errors import AssignmentError
 from grader.recording.interface import sections_of
 from grader.ros import RosInstallation
@@ -24,6 +24,19 @@ def test_an_assignment_of_ros_messages_needs_nothing(tmp_path: Path) -> None:
     support = TypeSupport(load_assignment("timed_publisher"), installation, tmp_path / "cache")
     assert support.prefixes() == ()
     assert not (tmp_path / "cache").exists()
+
+
+@pytest.mark.parametrize(
+    ("submission", "names"), [(None, ["rclcpp"]), ("cpp/timed_publisher", ["rclcpp"]), ("qos", [])]
+)
+def test_rclcpp_is_wanted_where_a_submission_is_or_may_be_in_cpp(
+    submission: str | None, names: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    installation = RosInstallation("wheels", tmp_path / "python", (tmp_path,))
+    monkeypatch.setattr("grader.batch.type_support.find", lambda: installation)
+    folder = None if submission is None else resources.reference() / submission
+    wanted = wanted_underlays(load_assignment("timed_publisher"), folder)
+    assert [one.name for one in wanted] == names
 
 
 def test_the_copy_is_that_of_the_reference() -> None:
