@@ -19,10 +19,6 @@ settings.register_profile("explore", deadline=None)
 settings.load_profile("no_deadline")
 
 
-# What starts processes or waits runs in one worker, one after the other; the others take the rest.
-ALONE = ("ros", "slow")
-
-
 def pytest_configure() -> None:
     """Let Ctrl-C reach what the tests start, also where they run as a job in the background.
 
@@ -31,12 +27,8 @@ def pytest_configure() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Group the tests for the workers; skip what compiles where nothing can, and say why."""
-    for item in items:
-        if any(item.get_closest_marker(name) for name in ALONE):
-            item.add_marker(pytest.mark.xdist_group("alone"))
+    """Skip what compiles where nothing can, and say why."""
     try:
         check_toolchain(os.environ["PATH"])
         if not has_headers():
