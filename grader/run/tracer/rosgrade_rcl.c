@@ -167,7 +167,8 @@ typedef struct
 
 static entity_t entities[MOST_ENTITIES];
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
-static int count, nodes;
+static int count;
+static atomic_int nodes;
 static atomic_int spinning, reported_runs;
 static _Thread_local entity_t * newest;
 
@@ -292,10 +293,22 @@ static void add_changed(line_t * line, char * const * of, char * const * other)
 
 /* rcl: context, nodes, endpoints, timers */
 
+/* Wait until the cell has seen what was created. */
+static void await_seen(void)
+{
+  struct stat unused;
+  if (nodes > 0 && is_pipe(seen_fd, &unused)) {
+    nodes = 0;
+    line_t line = begin("leaving");
+    send_line(&line);
+    /* The cell closes its end. */
+    poll(&(struct pollfd){.fd = seen_fd, .events = POLLIN}, 1, SEEN_LIMIT_MS);
+  }
+}
+
 /* Let what was published arrive, and what was created be seen, before it goes away. */
 static void flush(void)
 {
-  struct stat unused;
   if (!active) {
     return;
   }
@@ -307,15 +320,8 @@ static void flush(void)
       (void)ret;
     }
   }
-  bool leaves = nodes > 0 && is_pipe(seen_fd, &unused);
-  nodes = 0;
   pthread_mutex_unlock(&lock);
-  if (leaves) {
-    line_t line = begin("leaving");
-    send_line(&line);
-    /* The cell closes its end. */
-    poll(&(struct pollfd){.fd = seen_fd, .events = POLLIN}, 1, SEEN_LIMIT_MS);
-  }
+  await_seen();
 }
 
 PUBLIC rcl_ret_t rcl_init(
@@ -1064,6 +1070,7 @@ static void on_crash(int number)
       }
     }
     show_frames();
+    await_seen();
   }
   /* SA_RESETHAND: this time it has its usual effect. */
   raise(number);
