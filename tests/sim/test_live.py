@@ -60,7 +60,7 @@ def test_without_a_terminal_it_writes_a_line_in_a_second(
 def test_an_interrupt_ends_it_cleanly(domain: str, number: signal.Signals) -> None:
     process = start(domain, ROOM, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None
-    assert process.stdout.readline().startswith(b"    1.00 s")
+    assert process.stdout.readline().startswith(b"    1.")
     process.send_signal(number)
     _, errors = process.communicate(timeout=LIMIT_S)
     assert (process.returncode, errors) == (0, b"")
