@@ -24,7 +24,8 @@ _FACTORS = {
 }
 _FACTOR_TOLERANCE = 2e-3
 MISREAD = "an integer, a text or a numpy.float32"
-# What lies in memory is mostly zero or a pointer: as a float a number that nobody means.
+# A C++ variable without a value shows old memory. Read as a float that is nearly always 0 or a
+# number far outside of this range.
 _LEAST_MEANT, _MOST_MEANT = 1e-30, 1e30
 _FLOAT_HINT = "A number in a message must be a float: write 1.0 instead of 1, or float(value)."
 _SET_HINT = "Give each variable a value where it is declared, as in `double speed = 0.0;`."

@@ -30,10 +30,13 @@ class Solution(NamedTuple):
     depends: tuple[str, ...]
 
 
+_TIMER = 'create_wall_timer(300, [this] {timer_callback();}, "BotPublisher::timer_callback()");'
 _SPINS = {"single_threaded": "spin", "multi_threaded": "spin_in_threads"}
 SOLUTIONS = {
     "simple_publisher": Solution(
-        "bot_publisher", {"bot_pub": node("simple_publisher")}, ("geometry_msgs",)
+        "bot_publisher",
+        {"bot_pub": node("timed_publisher").replace(_TIMER, "timer_callback();")},
+        ("geometry_msgs",),
     ),
     "timed_publisher": Solution(
         "bot_publisher", {"bot_pub": node("timed_publisher")}, ("geometry_msgs",)

@@ -361,9 +361,7 @@ PUBLIC rcl_ret_t rcl_node_init(
   REAL(rcl_node_init, "librcl.so");
   rcl_ret_t result = next(node, name, namespace_, context, options);
   if (result == RCL_RET_OK && active) {
-    pthread_mutex_lock(&lock);
     ++nodes;
-    pthread_mutex_unlock(&lock);
     line_t line = begin("node");
     add_text(&line, "node", CALL(rcl_node_get_fully_qualified_name)(node));
     send_line(&line);
