@@ -14,6 +14,8 @@ from grader.report.model.result_model import CheckPart, Result
 from tests.report.sample import lost_points
 
 MEASURED = {"schema", "rosgrade_version", "environment", "started", "duration_s"}
+# Of a person or of the course: they come after the grade of the checks.
+ADDED = {"adjustments", "comments", "attempts"}
 MEASURED_OF_A_CHECK = {"observed", "disturbed", "traceback", "evidence"}
 
 
@@ -31,8 +33,8 @@ def with_check(**values: Any) -> Result:
 
 
 def test_every_part_of_a_result_is_one_or_the_other() -> None:
-    assert {name.rstrip("_") for name in Result.model_fields} == set(GRADE) | MEASURED
-    assert not set(GRADE) & MEASURED
+    assert {name.rstrip("_") for name in Result.model_fields} == set(GRADE) | MEASURED | ADDED
+    assert not set(GRADE) & (MEASURED | ADDED)
     of_a_check = set(GRADE["checks"]["__all__"])
     assert set(CheckPart.model_fields) == of_a_check | MEASURED_OF_A_CHECK
     assert not of_a_check & MEASURED_OF_A_CHECK

@@ -62,13 +62,13 @@ class ClassRow:
 
     @property
     def score(self) -> float | None:
-        """Its points; None where there is no grade."""
-        return self.result.score if self.result is not None and self.graded else None
+        """Its points with the adjustments; None where there is no grade, or not all of it yet."""
+        return self.result.final_score if self.result is not None and self.graded else None
 
     @property
     def full(self) -> bool:
         """Whether it got all points."""
-        return self.result is not None and self.score == self.result.max_score
+        return self.result is not None and self.score == self.result.final_max_score
 
     @property
     def states(self) -> str:

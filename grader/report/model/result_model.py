@@ -8,12 +8,12 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, computed_field, model_validator
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from grader.findings.finding import Evidence, Status
-from grader.grade.model import reason
+from grader.grade.model import reason, total
 from grader.safe_text import encodable
 from grader.submission.record import BuildRecord
 
@@ -157,11 +157,55 @@ class ScenarioPart(_Part):
         return self.runs > 1 or bool(self.faults)
 
 
+class AdjustmentPart(_Part):
+    """Points that no check gives: a person's, or those of a rule of the course.
+
+    ``kind`` is ``manual`` (an item that a person scores), ``forgiven`` (points of a check, given
+    back), ``late`` or ``attempts`` (rules of the course). ``points`` are added, so a deduction is
+    negative, and null where a manual item waits for a person; ``max_points`` is what a manual item
+    can give, else 0. ``by`` are the initials of the person, empty for a rule; ``check`` is the
+    check that is forgiven.
+    """
+
+    kind: Literal["manual", "forgiven", "late", "attempts"]
+    title: str
+    points: float | None
+    max_points: float = 0.0
+    reason: str = ""
+    by: str = ""
+    check: str | None = None
+
+
+class CommentPart(_Part):
+    """What a person wrote to the student, at a line of a file or about the whole."""
+
+    text: str
+    by: str
+    file: str | None = None
+    line: int | None = None
+
+
+class AttemptPart(_Part):
+    """One of the times that the student handed in, with its grade.
+
+    ``handed_in`` is ISO 8601 with offset, or empty where it is not known; ``counts`` says whether
+    the grade is that of this attempt; ``changes`` are what is different from the one before.
+    """
+
+    sha256: str
+    handed_in: str
+    score: float | None
+    max_score: float
+    counts: bool
+    changes: tuple[str, ...] = ()
+
+
 class Result(_Part):
     """The whole of ``result.json``.
 
-    ``score`` is null where ``graded`` is false, so that no gradebook can take the points of
-    half a grade for a score.
+    ``score`` is that of the checks. It is null where ``graded`` is false, so that no gradebook can
+    take the points of half a grade for a score. ``final_score`` is with the adjustments; it is
+    null too while one of them waits for a person.
     """
 
     schema_: Literal[1] = Field(alias="schema")
@@ -179,8 +223,29 @@ class Result(_Part):
     environment: dict[str, str]
     started: str
     duration_s: float
+    adjustments: tuple[AdjustmentPart, ...] = ()
+    comments: tuple[CommentPart, ...] = ()
+    attempts: tuple[AttemptPart, ...] = ()
 
     model_config = ConfigDict(populate_by_name=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_sums(cls, data: Any) -> Any:
+        sums = ("final_score", "final_max_score")
+        return {name: item for name, item in data.items() if name not in sums}
+
+    @computed_field
+    def final_score(self) -> float | None:
+        """Points with the adjustments, at least 0; None while they are not complete."""
+        parts = [self.score, *(one.points for one in self.adjustments)]
+        known = [points for points in parts if points is not None]
+        return max(0.0, total(known)) if len(known) == len(parts) else None
+
+    @computed_field
+    def final_max_score(self) -> float:
+        """Points that can be had, with those that a person gives."""
+        return total((self.max_score, *(one.max_points for one in self.adjustments)))
 
     def of(self, status: Status) -> tuple[CheckPart, ...]:
         """Checks that ended so, in the author's order."""
