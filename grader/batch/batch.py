@@ -25,6 +25,7 @@ from grader.report.model.result_model import Result
 from grader.spec.nearest_name import did_you_mean
 from grader.submission.intake.locate import NO_FILES
 from grader.submission.intake.paths import shown
+from grader.submission.kept_source import SOURCE_FOLDER
 from grader.submission.prepare import fingerprint
 
 FAULTS_FILE = "faults.log"
@@ -225,6 +226,9 @@ class Batch:
         for file in found.files.values():
             shutil.copyfile(file, recordings / file.name)
         write_whole(recordings / SUBMISSION_FILE, to_json(record))
+        source = self.ledger.folder(key) / SOURCE_FOLDER
+        if source.is_dir():
+            shutil.copytree(source, partial / SOURCE_FOLDER)
         graded = regrade(self.loaded, replace(found, submission=record))
         files = {scenario: recordings / file.name for scenario, file in found.files.items()}
         write_graded(replace(graded, files=files), partial, Clock())

@@ -84,8 +84,13 @@ class Grading:
         name: str | None = None,
         on_output: Callable[[str], None] = lambda _: None,
         given: Mapping[str, str] = MappingProxyType({}),
+        source_folder: Path | None = None,
     ) -> Graded:
-        """Grade one submission; ``given`` are the roster's values of variables."""
+        """Grade one submission; ``given`` are the roster's values of variables.
+
+        Args:
+            source_folder: Where its text files are kept, or None.
+        """
         ros = self._type_support.student(on_build)
         if not self._loaded.values:
             self._type_support.prefixes(on_build)
@@ -109,6 +114,7 @@ class Grading:
                 stop=self._stop,
                 on_output=on_output,
                 tested=tested,
+                source_folder=source_folder,
             )
         if name is not None:
             prepared = prepared.named(name)

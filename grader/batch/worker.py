@@ -25,6 +25,7 @@ from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose
 from grader.scratch import Scratch
 from grader.submission.intake.locate import opened
+from grader.submission.kept_source import SOURCE_FOLDER
 from grader.submission.prepare import Prepared, refused
 
 
@@ -45,7 +46,13 @@ Given = Mapping[str, str]
 def grade_into(grading: Grading, key: str, path: Path, folder: Path, given: Given) -> None:
     """Grade a submission and write report, result and recordings."""
     clock = Clock()
-    graded = grading.grade(path, folder / RECORDINGS_FOLDER, name=key, given=given)
+    graded = grading.grade(
+        path,
+        folder / RECORDINGS_FOLDER,
+        name=key,
+        given=given,
+        source_folder=folder / SOURCE_FOLDER,
+    )
     write_graded(graded, folder, clock)
 
 

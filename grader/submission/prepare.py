@@ -22,6 +22,7 @@ from grader.submission.intake.archive import SUFFIXES
 from grader.submission.intake.locate import Located, check_path, opened, submission_id
 from grader.submission.intake.members import MIB
 from grader.submission.intake.paths import shown
+from grader.submission.kept_source import keep_source
 from grader.submission.read.bag import read_bags
 from grader.submission.read.document import read_headings
 from grader.submission.read.package import Package, read_package, record_packages
@@ -68,6 +69,7 @@ def prepare(
     stop: threading.Event | None = None,
     on_output: Callable[[str], None] = lambda _: None,
     tested: Callable[[SubmissionRecord], frozenset[str]] = lambda _: frozenset(),
+    source_folder: Path | None = None,
 ) -> Prepared:
     """Find the packages of a submission, read them, build them.
 
@@ -80,6 +82,7 @@ def prepare(
         on_output: Called with each line of the build's log as it comes; an earlier build's log
             comes at once.
         tested: Packages whose own tests are run after the build, by what was read before it.
+        source_folder: Where the text files of the submission are kept, or None.
 
     Raises:
         UsageError: Nothing is at ``path``, or it is a URL.
@@ -100,6 +103,8 @@ def prepare(
 
     def attempt(is_second: bool) -> Prepared:
         with opened(source) as located:
+            if source_folder is not None:
+                keep_source(located.root, source_folder)
             return _prepare(located, replace(builder, is_second=is_second), store, tested)
 
     try:

@@ -30,6 +30,7 @@ from grader.errors import GraderFault, UsageError
 from grader.findings.finding import Status
 from grader.report.model.result import make_result
 from grader.run.runner import Runner
+from grader.submission.kept_source import SOURCE_FOLDER, read_source
 from tests.report.sample import not_graded
 
 YAML = """\
@@ -144,6 +145,18 @@ def test_two_who_handed_in_nothing_did_not_copy_from_each_other(course: Class) -
     assert [done[key].entry.same_as for key in ("cai", "dora", "emil")] == ["ana", "", ""]
     told = notes(list(done.values()))
     assert told["dora"] == told["emil"] == "the submission is empty"
+
+
+def test_the_source_of_each_lies_beside_its_result_also_of_the_same_submission(
+    course: Class,
+) -> None:
+    course.grade(course.executor())
+    kept = {
+        key: read_source(course.ledger.folder(key) / SOURCE_FOLDER).files
+        for key in ("ana", "ben", "cai")
+    }
+    first, second = {"notes.txt": "first"}, {"notes.txt": "second"}
+    assert kept == {"ana": first, "ben": second, "cai": first}
 
 
 def test_each_of_those_who_handed_in_the_same_names_the_others(course: Class) -> None:
