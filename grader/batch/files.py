@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 from grader import __version__
@@ -25,9 +26,17 @@ INSTALL_FOLDER = "install"
 
 
 def write_graded(
-    graded: Graded, folder: Path, clock: Clock, json_file: Path | None = None
+    graded: Graded,
+    folder: Path,
+    clock: Clock,
+    json_file: Path | None = None,
+    amended: Callable[[Result], Result] = lambda result: result,
 ) -> Result:
-    """Write report and result of a submission."""
+    """Write report and result of a submission.
+
+    Args:
+        amended: Adds to the result what is not in the grade, such as earlier attempts.
+    """
     first = next(iter(graded.recordings.values()), None)
     facts = RunFacts(
         started=clock.started,
@@ -37,7 +46,7 @@ def write_graded(
         recordings={name: os.path.relpath(file, folder) for name, file in graded.files.items()},
         runs=graded.runs,
     )
-    result = make_result(graded.grade, graded.recordings, facts)
+    result = amended(make_result(graded.grade, graded.recordings, facts))
     write_report(graded, folder, result)
     # Last, so that the report beside a result always has the same grade.
     for file in (folder / RESULT_FILE, json_file):

@@ -28,7 +28,7 @@ BATCH_FILE = "batch.json"
 SUBMISSIONS = "submissions"
 _PARTIAL = ".partial"
 _LOCK = ".lock"
-_EARLIER = "earlier"
+EARLIER = "earlier"
 _REPLACED = "#replaced"
 """Suffix of a result's folder while another one replaces it; no key has such a folder."""
 _LONGEST_NAME = 120
@@ -125,8 +125,8 @@ class Ledger:
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.exists():
             keep_earlier(target / RESULT_FILE)
-            if (target / _EARLIER).is_dir():
-                shutil.copytree(target / _EARLIER, partial / _EARLIER)
+            if (target / EARLIER).is_dir():
+                shutil.copytree(target / EARLIER, partial / EARLIER)
         # Else a power cut could leave a folder in its place with nothing in its files.
         for item in (*partial.rglob("*"), partial):
             _sync(item)
@@ -193,12 +193,12 @@ def folder_name(key: str) -> str:
     return name
 
 
-def keep_earlier(file: Path) -> None:
-    """Keep a file with grades beside the one that is about to replace it."""
+def keep_earlier(file: Path, content: str | None = None) -> None:
+    """Keep a file with grades, or a shorter content of it, when another is about to replace it."""
     if file.is_file():
         stamp = datetime.fromtimestamp(file.stat().st_mtime, timezone.utc)
-        kept = file.parent / _EARLIER / f"{file.stem}-{stamp:%Y%m%dT%H%M%S.%fZ}{file.suffix}"
-        write_whole(kept, file.read_bytes())
+        kept = file.parent / EARLIER / f"{file.stem}-{stamp:%Y%m%dT%H%M%S.%fZ}{file.suffix}"
+        write_whole(kept, file.read_bytes() if content is None else content)
 
 
 def _sync(path: Path) -> None:

@@ -125,6 +125,7 @@ def check(
                     progress.say,
                     on_output=partial(progress.output, "build"),
                 )
+            from grader.batch.attempts import with_history
             from grader.batch.files import keep_install, write_graded
             from grader.report.text.terminal import print_grade
 
@@ -135,7 +136,8 @@ def check(
             runner.close()
         from grader.ros2_command import absence_note
 
-        result = write_graded(graded, report, clock, json_file)
+        history = partial(with_history, report)
+        result = write_graded(graded, report, clock, json_file, history)
         console = output_console()
         print_grade(console, graded.grade.assignment.title, result)
         say(f"Report: {page}")
@@ -172,7 +174,7 @@ def _while_it_starts(narrate: Narrate) -> Narrate:
 
 
 def _get_ready() -> None:
-    for module in ("grader.batch.files", "grader.report.text.terminal"):
+    for module in ("grader.batch.attempts", "grader.report.text.terminal"):
         import_module(module)
     from grader.recording import mcap_reader
     from grader.report.html import page

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -48,6 +49,7 @@ def regrade(
 
 def _one(path: Path, assignment: str | None) -> None:
     from grader.assignment.load import load_assignment
+    from grader.batch.attempts import with_history
     from grader.batch.files import REPORT_FILE, write_graded
     from grader.batch.ledger import Ledger
     from grader.batch.regrading import compare, find, refuse_other, stored_assignment
@@ -73,7 +75,9 @@ def _one(path: Path, assignment: str | None) -> None:
             say(line)
         if batch is not None:
             _in_class(batch, loaded, found.folder)
-        write_graded(graded, found.folder, clock)
+        else:
+            history = partial(with_history, found.folder)
+            write_graded(graded, found.folder, clock, amended=history)
         say(f"Report: {found.folder / REPORT_FILE}")
     grade = graded.grade
     raise typer.Exit(NOT_GRADED if not grade.graded else 0 if grade.full_points else 1)

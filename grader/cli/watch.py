@@ -169,6 +169,7 @@ class _Work:
 
 
 def _follow(work: _Work, page: ReportPage, console: Console) -> None:
+    from grader.batch.attempts import with_history
     from grader.batch.files import write_graded
     from grader.batch.watching import Ended, Step, Watching
     from grader.report.model.facts import Clock
@@ -194,7 +195,8 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
                 print_error(str(event.problem))
                 page.show(f"not graded: {event.problem}", f"! {title}")
             else:
-                result = write_graded(event.graded, work.report, clock)
+                history = partial(with_history, work.report)
+                result = write_graded(event.graded, work.report, clock, amended=history)
                 console.rule(f"{time.strftime('%H:%M:%S')}, after {clock.elapsed_s:.1f} s")
                 if before is None:
                     print_grade(console, title, result)

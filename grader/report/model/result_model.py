@@ -190,6 +190,7 @@ class AttemptPart(_Part):
 
     ``handed_in`` is ISO 8601 with offset, or empty where it is not known; ``counts`` says whether
     the grade is that of this attempt; ``changes`` are what is different from the one before.
+    ``visible`` is the same as far as the student may see it, where checks are hidden.
     """
 
     sha256: str
@@ -198,6 +199,7 @@ class AttemptPart(_Part):
     max_score: float
     counts: bool
     changes: tuple[str, ...] = ()
+    visible: AttemptPart | None = None
 
 
 class Result(_Part):

@@ -39,6 +39,7 @@ def for_student(result: Result) -> Result:
                 for run in result.scenarios
                 if run.id in judged
             ),
+            "attempts": tuple(one.visible for one in result.attempts if one.visible),
         }
     )
     waits = [check.waits_for for check in visible]

@@ -1,0 +1,125 @@
+"""The times that a student handed in: the grade of each, and what changed since the one before."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+from grader.batch.files import RESULT_FILE
+from grader.batch.ledger import EARLIER, keep_earlier
+from grader.errors import RosgradeError
+from grader.findings.finding import Evidence, Status
+from grader.report.model.result import read_result, result_json
+from grader.report.model.result_model import AttemptPart, CheckPart, Result
+from grader.report.model.student import for_student
+from grader.report.text.words import STATUS, number
+from grader.safe_text import one_line
+
+MOST_KEPT = 20
+"""Earlier results that stay in the folder of a report."""
+
+
+def attempts_of(
+    results: Sequence[Result], handed_in: Sequence[str] = (), counts: int = -1
+) -> tuple[AttemptPart, ...]:
+    """The attempts of a student; each with what a student may see of it beside it.
+
+    Args:
+        results: Of the same assignment, first to last.
+        handed_in: When each was handed in, as in AttemptPart; by default when it was graded.
+        counts: Index of the one that counts.
+    """
+    times = list(handed_in) or [result.started for result in results]
+    whole, copies = _parts(results, times, counts), list(map(for_student, results))
+    if all(copy is result for copy, result in zip(copies, results, strict=True)):
+        return whole
+    seen = _parts(copies, times, counts)
+    pairs = zip(whole, seen, strict=True)
+    return tuple(part.model_copy(update={"visible": copy}) for part, copy in pairs)
+
+
+def with_history(folder: Path, result: Result) -> Result:
+    """A new result with the attempts that were graded in the folder of its report.
+
+    Of a submission that was graded several times in a row only the last grade is an attempt, and
+    what was graded with other checks is none. The result that lies in the folder becomes an
+    earlier one; only the newest few stay, and of each only what :func:`attempts_of` needs.
+    """
+    file = folder / RESULT_FILE
+    for replaced in _read([file]):
+        if replaced.submission.sha256 != result.submission.sha256:
+            keep_earlier(file, result_json(_slim(replaced)))
+    files = sorted((folder / EARLIER).glob(f"{file.stem}-*{file.suffix}"))
+    for old in files[:-MOST_KEPT]:
+        old.unlink(missing_ok=True)
+    alike = [one for one in _read(files[-MOST_KEPT:]) if _kind(one) == _kind(result)]
+    earlier = [
+        one
+        for one, following in pairwise([*alike, result])
+        if one.submission.sha256 != following.submission.sha256
+    ]
+    attempts = attempts_of([*earlier, result]) if earlier else ()
+    return result.model_copy(update={"attempts": attempts})
+
+
+def _parts(
+    results: Sequence[Result], handed_in: Sequence[str], counts: int
+) -> tuple[AttemptPart, ...]:
+    before = [None, *results[:-1]]
+    return tuple(
+        AttemptPart(
+            sha256=result.submission.sha256,
+            handed_in=time,
+            score=result.score,
+            max_score=result.max_score,
+            counts=index == counts % len(results),
+            changes=_changes(earlier, result) if earlier else (),
+        )
+        for index, (earlier, result, time) in enumerate(
+            zip(before, results, handed_in, strict=True)
+        )
+    )
+
+
+def _changes(before: Result, after: Result) -> tuple[str, ...]:
+    """Which checks ended differently, a line each."""
+    known = {check.id: check for check in before.checks}
+    return tuple(
+        _change(known[check.id], check)
+        for check in after.checks
+        if check.id in known
+        and (known[check.id].status, known[check.id].points) != (check.status, check.points)
+    )
+
+
+def _change(before: CheckPart, after: CheckPart) -> str:
+    words = f"was {STATUS[before.status].word}, now {STATUS[after.status].word}"
+    judged = Status.ERROR not in (before.status, after.status)
+    if judged and before.points != after.points:
+        words += f" ({number(before.points)} → {number(after.points)} points)"
+    return f"{one_line(after.title)}: {words}"
+
+
+def _kind(result: Result) -> tuple[str, frozenset[str]]:
+    return result.assignment.id, frozenset(check.id for check in result.checks)
+
+
+def _slim(result: Result) -> Result:
+    checks = (
+        check.model_copy(update={"evidence": Evidence(), "other_scenarios": ()})
+        for check in result.checks
+    )
+    nothing = {"scenarios": (), "build": None, "attempts": ()}
+    return result.model_copy(update={"checks": tuple(checks), **nothing})
+
+
+def _read(files: Sequence[Path]) -> list[Result]:
+    """Results of files; one that is missing or damaged is no attempt."""
+    found = []
+    for file in files:
+        try:
+            found.append(read_result(file))
+        except RosgradeError:
+            continue
+    return found
