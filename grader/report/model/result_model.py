@@ -237,14 +237,16 @@ class Result(_Part):
         sums = ("final_score", "final_max_score")
         return {name: item for name, item in data.items() if name not in sums}
 
-    @computed_field
+    @computed_field  # type: ignore[prop-decorator]
+    @property
     def final_score(self) -> float | None:
         """Points with the adjustments, at least 0; None while they are not complete."""
         parts = [self.score, *(one.points for one in self.adjustments)]
         known = [points for points in parts if points is not None]
         return max(0.0, total(known)) if len(known) == len(parts) else None
 
-    @computed_field
+    @computed_field  # type: ignore[prop-decorator]
+    @property
     def final_max_score(self) -> float:
         """Points that can be had, with those that a person gives."""
         return total((self.max_score, *(one.max_points for one in self.adjustments)))
