@@ -68,6 +68,8 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "topics: tf": description.TransformTopic,
         "checks": model.CheckSpec,
         "checks: after, before, while": window.Phase,
+        "manual": model.ManualItem,
+        "manual: levels": model.Level,
     },
     "mutants": {
         "The whole of mutants.yaml": mutant.MutantFile,

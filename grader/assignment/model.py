@@ -394,6 +394,37 @@ class CheckSpec(Model):
         return found if found != Window() else None
 
 
+class Level(Model):
+    """A level of a manual item, such as `{title: complete, points: 2}`."""
+
+    title: str = Field(min_length=1)
+    points: float = Field(ge=0)
+
+
+class ManualItem(Model):
+    """Points that a person gives, such as for a README or an oral exam; see `rosgrade review`."""
+
+    id: Id = Field(description="Short name, unique in the assignment.")
+    title: str = Field(min_length=1, description="One line for the student.")
+    points: float = Field(gt=0, description="Most points that it gives.")
+    levels: tuple[Level, ...] = Field(
+        (),
+        max_length=9,
+        description="Levels to choose from, in the order of the keys 1 to 9; by default any "
+        "number of points from 0.",
+    )
+
+    @model_validator(mode="after")
+    def _within(self) -> ManualItem:
+        for level in self.levels:
+            if level.points > self.points:
+                raise ValueError(
+                    f"the level {level.title!r} gives {level.points:g} points, more than the item "
+                    f"has ({self.points:g})"
+                )
+        return self
+
+
 class Assignment(Model):
     """A lesson's assignment: `assignments/<id>/assignment.yaml`."""
 
@@ -429,6 +460,9 @@ class Assignment(Model):
     )
     scenarios: tuple[Scenario, ...] = Field((), description="The runs.")
     checks: tuple[CheckSpec, ...] = Field(min_length=1, description="What is judged.")
+    manual: tuple[ManualItem, ...] = Field(
+        (), description="What a person judges, in addition to the checks."
+    )
     points: float | None = Field(
-        None, ge=0, description="Sum of all points. If given, rosgrade verifies it."
+        None, ge=0, description="Sum of the points of all checks. If given, rosgrade verifies it."
     )

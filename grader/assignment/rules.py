@@ -44,8 +44,8 @@ def problems(
     source: Source, assignment: Assignment, bound: Sequence[BoundCheck | None]
 ) -> Iterator[Problem]:
     """Find everything that does not fit together."""
-    for key, name in (("packages", "name"), ("scenarios", "id"), ("checks", "id")):
-        yield from source.duplicates(name, key)
+    for name, *keys in (("name", "packages"), ("id", "scenarios"), ("id", "checks", "manual")):
+        yield from source.duplicates(name, *keys)
     for index, package in enumerate(assignment.packages):
         try:
             package_name(package.name)

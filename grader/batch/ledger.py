@@ -7,20 +7,17 @@ killed process or a power cut every submission is either there as a whole or not
 from __future__ import annotations
 
 import fcntl
-import hashlib
 import json
-import os
 import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
 from pathlib import Path
-from urllib.parse import quote
 
 from grader.batch.files import RESULT_FILE
 from grader.errors import RosgradeError, UsageError, machine_fault
-from grader.report.files import check_folder, write_whole
+from grader.report.files import check_folder, folder_name, sync, write_whole
 from grader.report.model.result import read_result
 from grader.report.model.result_model import Result
 
@@ -31,7 +28,6 @@ _LOCK = ".lock"
 EARLIER = "earlier"
 _REPLACED = "#replaced"
 """Suffix of a result's folder while another one replaces it; no key has such a folder."""
-_LONGEST_NAME = 120
 
 
 @dataclass(frozen=True)
@@ -129,7 +125,7 @@ class Ledger:
                 shutil.copytree(target / EARLIER, partial / EARLIER)
         # Else a power cut could leave a folder in its place with nothing in its files.
         for item in (*partial.rglob("*"), partial):
-            _sync(item)
+            sync(item)
         if target.exists():
             old = partial.with_name(partial.name + _REPLACED)
             target.rename(old)
@@ -137,7 +133,7 @@ class Ledger:
             shutil.rmtree(old, ignore_errors=True)
         else:
             partial.rename(target)
-        _sync(target.parent)
+        sync(target.parent)
 
     def _put_back(self) -> None:
         """Undo a :meth:`put` that was killed: the earlier result and its history are whole."""
@@ -184,27 +180,9 @@ class Ledger:
             raise UsageError(f"{file}: is damaged: {error}; run the batch again") from error
 
 
-def folder_name(key: str) -> str:
-    """A folder's name for a key: readable, safe, and another one for every key."""
-    name = quote(key, safe=" @+,()=").strip(" ").replace(".", "%2E", key.startswith(".")) or "_"
-    # Case must not matter where the results are copied to, nor may a name be too long there.
-    if len(name) > _LONGEST_NAME or name != key:
-        name = f"{name[:_LONGEST_NAME]}-{hashlib.sha256(key.encode()).hexdigest()[:8]}"
-    return name
-
-
 def keep_earlier(file: Path, content: str | None = None) -> None:
     """Keep a file with grades, or a shorter content of it, when another is about to replace it."""
     if file.is_file():
         stamp = datetime.fromtimestamp(file.stat().st_mtime, timezone.utc)
         kept = file.parent / EARLIER / f"{file.stem}-{stamp:%Y%m%dT%H%M%S.%fZ}{file.suffix}"
         write_whole(kept, file.read_bytes() if content is None else content)
-
-
-def _sync(path: Path) -> None:
-    """Make a written file, or the renames in a folder, survive a power cut."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

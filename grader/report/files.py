@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import re
 import secrets
 import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from urllib.parse import quote
 
 from grader.errors import UsageError, machine_fault
 
@@ -18,13 +20,26 @@ _SOURCES = re.compile(
     r"|package\.xml|CMakeLists\.txt|README.*|LICENSE.*|result\.json|submission\.json",
     re.IGNORECASE,
 )
+_LONGEST_NAME = 120
 
 
-def write_whole(file: Path, content: str | bytes) -> None:
+def folder_name(key: str) -> str:
+    """A folder's name for a key: readable, safe, and another one for every key."""
+    name = quote(key, safe=" @+,()=").strip(" ").replace(".", "%2E", key.startswith(".")) or "_"
+    # Case must not matter where the results are copied to, nor may a name be too long there.
+    if len(name) > _LONGEST_NAME or name != key:
+        name = f"{name[:_LONGEST_NAME]}-{hashlib.sha256(key.encode()).hexdigest()[:8]}"
+    return name
+
+
+def write_whole(file: Path, content: str | bytes, *, durable: bool = False) -> None:
     """Write a file under a temporary name beside it, then move it into place.
 
     A reader sees the old file or the new one, never half of it. Missing folders are made;
     text is written as UTF-8.
+
+    Args:
+        durable: Return only when it would survive a power cut.
 
     Raises:
         UsageError: It cannot be written there.
@@ -43,12 +58,26 @@ def write_whole(file: Path, content: str | bytes) -> None:
             # "x" and not mkstemp: the file gets the permissions that the user's umask gives.
             with draft.open("xb") as stream:
                 stream.write(data)
+                if durable:
+                    stream.flush()
+                    os.fsync(stream.fileno())
             draft.replace(file)
+            if durable:
+                sync(file.parent)
         finally:
             draft.unlink(missing_ok=True)
     except OSError as error:
         refusal = UsageError(f"{file} cannot be written: {_why(file, error)}")
         raise machine_fault(error, file) or refusal from error
+
+
+def sync(path: Path) -> None:
+    """Make a written file, or the renames in a folder, survive a power cut."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:

@@ -27,6 +27,18 @@ class _Loader(yaml.SafeLoader):
     yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 - a class variable of PyYAML
 
 
+class _Dumper(yaml.SafeDumper):
+    """PyYAML's writer with the same types, so that it quotes what they would read otherwise."""
+
+    yaml_implicit_resolvers = _Loader.yaml_implicit_resolvers
+
+
+def _written(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    return dumper.represent_scalar(f"{_TAG}str", text, "|" if "\n" in text else None)
+
+
+_Dumper.add_representer(str, _written)
+
 for _name, _pattern, _first in (
     ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
     ("bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
@@ -65,6 +77,12 @@ def parse_yaml(text: str, file: Path) -> tuple[Any, dict[Place, int]]:
     if reader.problems:
         raise AssignmentError(file, reader.problems)
     return data, reader.lines
+
+
+def write_yaml(data: Any) -> str:
+    """Write plain data so that :func:`parse_yaml` reads the same, and people can edit it."""
+    text = yaml.dump(data, Dumper=_Dumper, allow_unicode=True, sort_keys=False, width=100)
+    return str(text)
 
 
 def path(place: Place) -> str:

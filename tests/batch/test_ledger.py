@@ -9,8 +9,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from grader.batch.ledger import BATCH_FILE, BatchRows, Entry, Ledger, folder_name
+from grader.batch.ledger import BATCH_FILE, BatchRows, Entry, Ledger
 from grader.errors import UsageError
+from grader.report.files import folder_name
 
 
 @given(st.sets(st.text(min_size=1, max_size=300), min_size=2, max_size=5))

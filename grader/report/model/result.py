@@ -53,6 +53,12 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
         environment=dict(sorted(facts.environment.items())),
         started=facts.started,
         duration_s=facts.duration_s,
+        adjustments=tuple(
+            model.AdjustmentPart(
+                kind="manual", title=one.title, points=None, max_points=one.points, item=one.id
+            )
+            for one in grade.assignment.manual
+        ),
     )
 
 

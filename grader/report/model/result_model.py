@@ -163,8 +163,8 @@ class AdjustmentPart(_Part):
     ``kind`` is ``manual`` (an item that a person scores), ``forgiven`` (points of a check, given
     back), ``late`` or ``attempts`` (rules of the course). ``points`` are added, so a deduction is
     negative, and null where a manual item waits for a person; ``max_points`` is what a manual item
-    can give, else 0. ``by`` are the initials of the person, empty for a rule; ``check`` is the
-    check that is forgiven.
+    can give, else 0. ``by`` are the initials of the person, empty for a rule; ``item`` is the id of
+    the manual item, ``check`` that of the check that is forgiven.
     """
 
     kind: Literal["manual", "forgiven", "late", "attempts"]
@@ -174,6 +174,7 @@ class AdjustmentPart(_Part):
     reason: str = ""
     by: str = ""
     check: str | None = None
+    item: str | None = None
 
 
 class CommentPart(_Part):

@@ -1,0 +1,75 @@
+"""Failures of a class with the same cause."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from grader.findings.finding import Status
+from grader.grade.model import total
+from grader.report.model.class_row import ClassRow
+from grader.report.model.result_model import CheckPart
+from grader.review.adjust import given_back
+from grader.review.cause import cause
+from grader.review.model import ClassReview
+
+_NOTHING = ClassReview()
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Failures of one check for one cause.
+
+    Attributes:
+        check: Id of the check.
+        title: Of the check.
+        cause: In words; together with ``check`` it names the cluster, also in ``class.yaml``.
+        lost: Key of each student -> points that the check cost; in the order of the rows.
+        forgiven: Share of the points that is given back now, in [0, 1].
+    """
+
+    check: str
+    title: str
+    cause: str
+    lost: dict[str, float]
+    forgiven: float = 0.0
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The students."""
+        return tuple(self.lost)
+
+    @property
+    def example(self) -> str:
+        """A student to look at."""
+        return self.keys[0]
+
+    @property
+    def at_stake(self) -> float:
+        """Points that the class lost by it."""
+        return total(self.lost.values())
+
+    def gains(self, share: float = 1.0) -> dict[str, float]:
+        """What each student gets back if it is forgiven."""
+        return {key: given_back(lost, share) for key, lost in self.lost.items()}
+
+
+def clusters(rows: Sequence[ClassRow], of_class: ClassReview = _NOTHING) -> tuple[Cluster, ...]:
+    """Group the failures of a class by check and cause, the most frequent first."""
+    found: dict[tuple[str, str], list[tuple[str, CheckPart]]] = {}
+    for row in rows:
+        for check in row.judged:
+            if check.status is Status.FAILED:
+                found.setdefault((check.id, cause(check)), []).append((row.id, check))
+    shares = {(one.check, one.cause): one.share for one in of_class.forgiven}
+    grouped = [
+        Cluster(
+            name,
+            members[0][1].title,
+            why,
+            {key: total((check.max_points, -check.points)) for key, check in members},
+            shares.get((name, why), 0.0),
+        )
+        for (name, why), members in found.items()
+    ]
+    return tuple(sorted(grouped, key=lambda one: (-len(one.lost), -one.at_stake)))
