@@ -38,10 +38,10 @@ if TYPE_CHECKING:
 
     from grader.assignment.load import LoadedAssignment
     from grader.batch.grading import Graded, Grading
-    from grader.cli.screen.page import ReportPage
     from grader.errors import RosgradeError
     from grader.report.model.result_model import Result
     from grader.run.runner import Runner
+    from grader.server.watch import ReportPage
 
 
 def watch(
@@ -77,10 +77,10 @@ def watch(
     from grader.assignment.load import load_assignment, refuse_swapped
     from grader.assignment.selection import select, visible_part
     from grader.batch.files import refuse_foreign
-    from grader.cli.screen.page import ReportPage
     from grader.errors import UsageError
     from grader.report.files import check_folder, refuse_inputs
     from grader.run.runner import Runner
+    from grader.server.watch import ReportPage
     from grader.submission.intake.locate import check_path
 
     def load() -> LoadedAssignment:

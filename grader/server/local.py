@@ -1,0 +1,59 @@
+"""An HTTP server for this machine only, in a thread of its own."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+import threading
+from typing import TYPE_CHECKING
+
+from grader.server.guard import Guard
+
+if TYPE_CHECKING:
+    from starlette.types import ASGIApp
+
+ADDRESS = "127.0.0.1"
+
+
+class LocalServer:
+    """Serves an application on the loopback, to who knows its address."""
+
+    def __init__(self, app: ASGIApp, port: int = 0) -> None:
+        """Begin to serve; port 0 takes a free one.
+
+        Raises:
+            OSError: The port is taken.
+        """
+        # Imported late: it takes a tenth of a second.
+        import uvicorn
+
+        self._token = secrets.token_urlsafe(32)
+        self._socket = socket.create_server((ADDRESS, port))
+        self.host = f"{ADDRESS}:{self._socket.getsockname()[1]}"
+        """Address and port, as a browser names them in its requests."""
+        config = uvicorn.Config(
+            Guard(app, self.host, self._token),
+            lifespan="off",
+            ws="none",
+            log_config=None,
+            access_log=False,
+            server_header=False,
+            proxy_headers=False,
+            timeout_graceful_shutdown=1,
+        )
+        self._server = uvicorn.Server(config)
+        self._thread = threading.Thread(
+            target=self._server.run, args=([self._socket],), daemon=True, name="server"
+        )
+        self._thread.start()
+
+    @property
+    def url(self) -> str:
+        """What to open; no request without its token is answered."""
+        return f"http://{self.host}/?token={self._token}"
+
+    def close(self) -> None:
+        """Stop; requests that are being answered get a second."""
+        self._server.should_exit = True
+        self._thread.join()
+        self._socket.close()
