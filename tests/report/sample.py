@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rich.console import Console
@@ -18,7 +18,7 @@ from grader.report.html.replay import Replay
 from grader.report.html.report import NO_REFERENCE, render_report
 from grader.report.model.facts import RunFacts
 from grader.report.model.result import make_result
-from grader.report.model.result_model import Result
+from grader.report.model.result_model import AttemptPart, Result
 from grader.report.text.terminal import print_grade
 from grader.submission.record import BuildRecord, SourceError, SubmissionRecord
 from tests.grade.sample import (
@@ -62,10 +62,13 @@ class Sample:
     grade: Grade
     recordings: dict[str, Recording]
     facts: RunFacts
+    added: Mapping[str, Any] = field(default_factory=dict)
+    """Fields of the result that are not in the grade."""
 
     @property
     def result(self) -> Result:
-        return make_result(self.grade, self.recordings, self.facts)
+        made = make_result(self.grade, self.recordings, self.facts)
+        return made.model_copy(update=dict(self.added))
 
     def html(self, references: Mapping[str, Replay] = NO_REFERENCE) -> str:
         return render_report(self.grade, self.result, self.recordings, references)
@@ -138,6 +141,25 @@ def make_run(**changes: object) -> Recording:
             "disturbance": (Disturbance(at(1.0), 400_000, 1_700_000),),
         }
         | changes,
+    )
+
+
+def attempts(*scores: float | None, **changes: Any) -> tuple[AttemptPart, ...]:
+    """Attempts with these scores, of which the last counts."""
+    change = "Rate of `/chatter`: was failed, now passed (0 → 3 points)"
+    return tuple(
+        AttemptPart(
+            score=score,
+            max_score=10.0,
+            counts=index == len(scores) - 1,
+            **{
+                "sha256": f"{index}" * 64,
+                "handed_in": f"2026-03-{index + 1:02}T09:12:33+01:00",
+                "changes": (change,) * index,
+            }
+            | changes,
+        )
+        for index, score in enumerate(scores)
     )
 
 
@@ -244,4 +266,5 @@ def everywhere(text: str) -> Sample:
         recordings={"listen": text},
     )
     found = judged_runs(checks, {"listen": run}, submission, titles={"listen": text}, title=text)
-    return replace(found, facts=facts)
+    tries = attempts(1.0, 2.0, sha256=text, handed_in=text, changes=(text,))
+    return replace(found, facts=facts, added={"attempts": tries})

@@ -5,6 +5,7 @@ import hashlib
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -23,6 +24,7 @@ from tests.report.sample import (
     PROCESS,
     Sample,
     at,
+    attempts,
     everywhere,
     full_points,
     judged,
@@ -200,6 +202,19 @@ def test_full_points_leave_nothing_to_fix_and_what_is_not_graded_has_no_score():
     assert "Fix this first" not in text and "sandbox was reached" not in text
     text = squeezed(page(not_graded()).text)
     assert "2 / 4 points" not in text.split("The checks that could be judged")[0]
+
+
+def test_earlier_attempts_are_shown_with_what_changed():
+    sample = replace(full_points(), added={"attempts": attempts(1.0, None, 4.25)})
+    text = squeezed(page(sample).text)
+    assert "Attempt 3 ; the one before had no score." in text
+    assert "3 counts 4.25 / 10 Rate of /chatter: was failed, now passed (0 → 3 points)" in text
+    assert "2 not graded" in text and "1 1 / 10 the first that is known" in text
+
+
+def test_a_first_attempt_is_not_called_one():
+    for added in ({}, {"attempts": attempts(4.0)}):
+        assert "Attempt" not in page(replace(full_points(), added=added)).text
 
 
 @pytest.mark.parametrize("attack", ATTACKS)

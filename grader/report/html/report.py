@@ -11,6 +11,7 @@ from grader.findings.finding import Plot, Status
 from grader.grade.model import Grade
 from grader.recording.event import Breach
 from grader.recording.model import Recording
+from grader.report.drawing.attempts import draw_attempts
 from grader.report.drawing.callbacks import draw_callbacks
 from grader.report.drawing.cases import draw_cases
 from grader.report.drawing.frames import draw_frames
@@ -58,6 +59,8 @@ def render_report(
         "report.js",
         title=assignment.title,
         result=result,
+        # The first of all has none before it to be compared with.
+        attempts=result.attempts if len(result.attempts) > 1 else (),
         first=next((one for one in result.checks if one.id == result.first_to_fix), None),
         titles={check.id: check.title for check in result.checks},
         sections=sections,
@@ -71,6 +74,7 @@ def render_report(
         SIGNS=SIGNS,
         align=align,
         build_lines=build_lines,
+        draw_attempts=draw_attempts,
         draw_callbacks=draw_callbacks,
         draw_cases=draw_cases,
         draw_frames=draw_frames,
