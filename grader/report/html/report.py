@@ -11,7 +11,6 @@ from grader.findings.finding import Plot, Status
 from grader.grade.model import Grade
 from grader.recording.event import Breach
 from grader.recording.model import Recording
-from grader.report.drawing.attempts import draw_attempts
 from grader.report.drawing.callbacks import draw_callbacks
 from grader.report.drawing.cases import draw_cases
 from grader.report.drawing.frames import draw_frames
@@ -74,7 +73,6 @@ def render_report(
         SIGNS=SIGNS,
         align=align,
         build_lines=build_lines,
-        draw_attempts=draw_attempts,
         draw_callbacks=draw_callbacks,
         draw_cases=draw_cases,
         draw_frames=draw_frames,
