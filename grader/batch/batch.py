@@ -215,7 +215,7 @@ class Batch:
 
     def _copy(self, key: str, twin: Entry) -> None:
         """Give an identical submission of another student the same result, under its own name."""
-        known, original = self.ledger.result(twin.key), self.ledger.result(key)
+        known, original = map(self.ledger.whole_result, (twin.key, key))
         if known and original and grade_json(known) == grade_json(original):
             return
         found = find(self.ledger.folder(key))

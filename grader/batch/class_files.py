@@ -21,6 +21,7 @@ from grader.grade import Grade
 from grader.report.files import write_whole
 from grader.report.formats.gradebook import grades_csv
 from grader.report.html.overview import render_overview
+from grader.report.model.class_result import for_class
 from grader.report.model.class_row import ClassRow
 from grader.report.model.result import read_result
 from grader.report.model.result_model import Result
@@ -156,10 +157,11 @@ def _of_batch(ledger: Ledger) -> tuple[Path, ...]:
 
 def read_class(out: Path) -> list[ClassRow]:
     """The rows of the class at a path; of a folder of single reports, a row for each."""
-    results = [read_result(folder / RESULT_FILE) for folder in find_reports(out)]
+    folders = find_reports(out)
     if (out / BATCH_FILE).is_file():
         ledger = Ledger(out)
         return class_rows([standing(ledger, entry) for entry in ledger.read().entries], ledger)
+    results = (for_class(read_result(folder / RESULT_FILE)) for folder in folders)
     return class_rows([Done(Entry(one.submission.id), one, fresh=False) for one in results])
 
 

@@ -18,6 +18,7 @@ from pathlib import Path
 from grader.batch.files import RESULT_FILE
 from grader.errors import RosgradeError, UsageError, machine_fault
 from grader.report.files import check_folder, folder_name, sync, write_whole
+from grader.report.model.class_result import for_class
 from grader.report.model.result import read_result
 from grader.report.model.result_model import Result
 
@@ -143,7 +144,12 @@ class Ledger:
                 old.rename(target)
 
     def result(self, key: str) -> Result | None:
-        """A row's result, or None where it is not graded yet or was damaged."""
+        """What the class keeps of a row's result; None where there is none or it is damaged."""
+        result = self.whole_result(key)
+        return for_class(result) if result is not None else None
+
+    def whole_result(self, key: str) -> Result | None:
+        """A row's result as it was written; None where there is none or it is damaged."""
         file = self.folder(key) / RESULT_FILE
         if not file.is_file():
             return None
