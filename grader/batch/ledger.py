@@ -144,7 +144,10 @@ class Ledger:
                 old.rename(target)
 
     def result(self, key: str) -> Result | None:
-        """What the class keeps of a row's result; None where there is none or it is damaged."""
+        """What the class keeps of a row's result; None where there is none or it is damaged.
+
+        It lacks plots, logs and figures: to write a result again, read :meth:`whole_result`.
+        """
         result = self.whole_result(key)
         return for_class(result) if result is not None else None
 
