@@ -22,6 +22,7 @@ from grader.cli import (
     check,
     doctor,
     export,
+    instructor,
     regrade,
     replay,
     report,
@@ -75,6 +76,7 @@ app.command("watch")(watch.watch)
 app.command("batch", context_settings={"allow_extra_args": True})(batch.batch)
 app.command("regrade")(regrade.regrade)
 app.command("report")(report.report)
+app.command("similar")(instructor.similar)
 app.command("replay")(replay.replay)
 app.add_typer(export.app, name="export")
 app.command("selftest")(selftest.selftest)

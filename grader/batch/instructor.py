@@ -1,0 +1,69 @@
+"""The pages of a class that only its instructor sees, in ``OUT/instructor/``."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+
+from grader.assignment.load import LoadedAssignment
+from grader.assignment.mutant import CPP, LANGUAGES, reference_of
+from grader.batch.ledger import Entry, Ledger
+from grader.errors import UsageError
+from grader.report.files import write_whole
+from grader.similarity.fingerprints import all_hashes, fingerprints
+from grader.similarity.page import MOST_PAIRS, render_similarity
+from grader.similarity.pairs import find_pairs
+from grader.starter import starter_files
+from grader.submission.kept_source import SOURCE_FOLDER, read_source
+
+INSTRUCTOR_FOLDER = "instructor"
+SIMILARITY_FILE = "similarity.html"
+
+
+def write_similarity(loaded: LoadedAssignment, ledger: Ledger) -> tuple[Path, int]:
+    """Write the page of the submissions that are alike: its file, and how many pairs there are."""
+    entries = ledger.read().entries
+    handed_in = {entry.key: entry for entry in entries if entry.sha256 and not entry.same_as}
+    known = _known(loaded)
+    found = {key: fingerprints(_files(ledger, key)) for key in handed_in}
+    own = {key: prints.keys() - known for key, prints in found.items() if prints}
+    pairs = find_pairs(own, {key: one.team for key, one in handed_in.items() if one.team})
+    names = {key: _name(entry, entries) for key, entry in handed_in.items()}
+    shown = {key for pair in pairs[:MOST_PAIRS] for key in (pair.first, pair.second)}
+    page = render_similarity(
+        loaded.assignment.title,
+        pairs,
+        {key: _files(ledger, key) for key in shown},
+        {key: names[key] for key in own},
+        [name for key, name in names.items() if key not in own],
+    )
+    return _written(ledger, SIMILARITY_FILE, page), len(pairs)
+
+
+def _files(ledger: Ledger, key: str) -> dict[str, str]:
+    return read_source(ledger.folder(key) / SOURCE_FOLDER).files
+
+
+def _name(entry: Entry, entries: tuple[Entry, ...]) -> str:
+    """What a student is called, with those who handed in the same."""
+    same = [one.name or one.key for one in entries if one.same_as == entry.key]
+    return ", ".join([entry.name or entry.key, *same])
+
+
+def _known(loaded: LoadedAssignment) -> set[int]:
+    """Hashes of what counts for nobody: the starter and the reference, in both languages."""
+    known: set[int] = set()
+    for language in LANGUAGES:
+        # An assignment may be for Python only, or have no reference.
+        with suppress(UsageError):
+            known |= all_hashes(starter_files(loaded, cpp=language is CPP))
+        with suppress(UsageError):
+            reference = reference_of(loaded.assignment.id, loaded.folder, language)
+            known |= all_hashes(read_source(reference).files)
+    return known
+
+
+def _written(ledger: Ledger, name: str, page: str) -> Path:
+    file = ledger.out / INSTRUCTOR_FOLDER / name
+    write_whole(file, page)
+    return file

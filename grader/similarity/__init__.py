@@ -1,0 +1,1 @@
+"""Which submissions of a class are alike, after renaming and reformatting."""

@@ -1,0 +1,56 @@
+"""The page of the submissions that are alike, side by side; for the instructor only."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import groupby
+
+from grader.report.html.page import render_page
+from grader.similarity.fingerprints import fingerprints
+from grader.similarity.pairs import Pair, shared_passages
+
+MOST_PAIRS = 100
+"""Pairs that the page shows side by side; more are only counted."""
+Chunk = tuple[int | None, list[tuple[int, str]]]
+"""Lines with their numbers, and the number of the passage that they belong to, if any."""
+Side = tuple[str, dict[str, list[Chunk]]]
+"""A key, and its files with shared passages."""
+
+
+def render_similarity(
+    title: str,
+    pairs: Sequence[Pair],
+    sources: Mapping[str, Mapping[str, str]],
+    names: Mapping[str, str],
+    left_out: Collection[str],
+) -> str:
+    """Render the page, which has no script.
+
+    Args:
+        sources: Files by key.
+        names: What the students are called, by key, of all that were compared.
+        left_out: Names of those whose source could not be compared.
+    """
+    return render_page(
+        "similarity.html.j2",
+        ("report.css", "instructor.css"),
+        title=title,
+        pairs=[(pair, list(_sides(pair, sources))) for pair in pairs[:MOST_PAIRS]],
+        more=len(pairs[MOST_PAIRS:]),
+        names=names,
+        left_out=sorted(left_out),
+    )
+
+
+def _sides(pair: Pair, sources: Mapping[str, Mapping[str, str]]) -> Iterator[Side]:
+    first, second = sources[pair.first], sources[pair.second]
+    marks = shared_passages(fingerprints(first), fingerprints(second), pair.shared)
+    for key, marked in zip((pair.first, pair.second), marks, strict=True):
+        files = sorted({file for file, _ in marked})
+        yield key, {file: _chunks(file, sources[key][file], marked) for file in files}
+
+
+def _chunks(file: str, text: str, marks: Mapping[tuple[str, int], int]) -> list[Chunk]:
+    lines = enumerate(text.rstrip("\n").split("\n"), 1)
+    grouped = groupby(lines, key=lambda line: marks.get((file, line[0])))
+    return [(number, list(group)) for number, group in grouped]
