@@ -9,7 +9,8 @@ from pathlib import Path
 from grader.batch.files import RESULT_FILE
 from grader.batch.ledger import EARLIER, keep_earlier
 from grader.errors import RosgradeError
-from grader.findings.finding import Evidence, Status
+from grader.findings.finding import Status
+from grader.report.model.class_result import for_class
 from grader.report.model.result import read_result, result_json
 from grader.report.model.result_model import AttemptPart, CheckPart, Result
 from grader.report.model.student import for_student
@@ -49,7 +50,8 @@ def with_history(folder: Path, result: Result) -> Result:
     file = folder / RESULT_FILE
     for replaced in _read([file]):
         if replaced.submission.sha256 != result.submission.sha256:
-            keep_earlier(file, result_json(_slim(replaced)))
+            slim = for_class(replaced).model_copy(update={"attempts": ()})
+            keep_earlier(file, result_json(slim))
     files = sorted((folder / EARLIER).glob(f"{file.stem}-*{file.suffix}"))
     for old in files[:-MOST_KEPT]:
         old.unlink(missing_ok=True)
@@ -103,15 +105,6 @@ def _change(before: CheckPart, after: CheckPart) -> str:
 
 def _kind(result: Result) -> tuple[str, frozenset[str]]:
     return result.assignment.id, frozenset(check.id for check in result.checks)
-
-
-def _slim(result: Result) -> Result:
-    checks = (
-        check.model_copy(update={"evidence": Evidence(), "other_scenarios": ()})
-        for check in result.checks
-    )
-    nothing = {"scenarios": (), "build": None, "attempts": ()}
-    return result.model_copy(update={"checks": tuple(checks), **nothing})
 
 
 def _read(files: Sequence[Path]) -> list[Result]:

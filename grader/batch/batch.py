@@ -81,7 +81,7 @@ class Batch:
                 row.key, row.name, row.late, problem=row.problem, fault=row.fault, team=team
             )
             if row.path is not None:
-                entry = self._identified(entry, row.path)
+                entry = self._identified(replace(entry, source=str(row.path.resolve())), row.path)
                 distinct = entry.sha256 in ("", NO_FILES)
                 same = (entry.sha256, str(self._given[row.key]))
                 original = row.key if distinct else first.setdefault(same, row.key)

@@ -43,6 +43,7 @@ class Entry:
         same_as: Key of the row with the same submission that was graded for both, or empty.
         fault: Why it could not be graded, where not even a result could be written.
         team: Key of the first of those who handed it in together, or empty for one alone.
+        source: Path of what was handed in, as it lay when it was read; may be gone by now.
     """
 
     key: str
@@ -53,6 +54,7 @@ class Entry:
     same_as: str = ""
     fault: str = ""
     team: str = ""
+    source: str = ""
 
 
 @dataclass(frozen=True)

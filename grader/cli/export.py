@@ -12,9 +12,12 @@ from grader.cli.options import AssignmentName
 from grader.cli.screen.console import print_error, print_warning, say
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from grader.report.model.class_row import RowStatus
 
 Folder = Annotated[Path, typer.Option("--out", help="Folder to write to.")]
+ClassFolder = Annotated[Path, typer.Argument(help="Folder of a batch.")]
 Results = Annotated[Path, typer.Argument(help="Folder with the reports of a class.")]
 File = Annotated[Path, typer.Option("--output", "-o", help="File to write.")]
 
@@ -106,6 +109,12 @@ def canvas(
         typer.Option(help="Title of the assignment in Canvas; by default the assignment's id."),
     ] = None,
     zero: ZeroFor = None,
+    comments: Annotated[
+        Path | None,
+        typer.Option(
+            help='Also write comments: a .zip for "Upload Submissions", a .json for Canvas\' API.'
+        ),
+    ] = None,
 ) -> None:
     """Fill a Canvas gradebook. Import it in Canvas under Grades.
 
@@ -116,7 +125,9 @@ def canvas(
     from grader.report.files import refuse_inputs, write_whole
     from grader.report.formats.gradebook import canvas_csv, read_canvas
 
-    refuse_inputs([output], [canvas, *_read_of(out)])
+    refuse_inputs([output, comments], [canvas, *_read_of(out)])
+    if comments is not None and comments.suffix not in (".zip", ".json"):
+        raise UsageError(f"--comments {comments}: must end with .zip or .json")
     try:
         text = canvas.read_text(encoding="utf-8-sig")
     except OSError as error:
@@ -126,12 +137,121 @@ def canvas(
     export = read_canvas(text, str(canvas))
     filled = canvas_csv(read_class(out), export, column, _statuses(zero))
     write_whole(output, filled.text)
-    say(f"{output}: {filled.filled} scores")
+    say(f"{output}: {len(filled.scores)} scores")
     for doubt in filled.doubts:
         print_warning(doubt)
-    for problem in filled.problems:
+    problems = list(filled.problems)
+    if comments is not None:
+        problems += _write_comments(comments, out, filled.scores)
+    _end(problems)
+
+
+def _write_comments(file: Path, out: Path, scores: Mapping[str, tuple[str, str]]) -> list[str]:
+    """Write comments for those who have a score; who gets none, and why."""
+    from grader.batch.feedback import class_feedback
+    from grader.report.files import write_whole
+    from grader.report.formats.canvas_comments import is_download, update_grades, upload_zip
+
+    found = [one for one in class_feedback(out)[0] if one.key in scores]
+    if file.suffix == ".json":
+        results = {scores[one.key][0]: one.result for one in found}
+        write_whole(file, update_grades(dict(scores.values()), results))
+        say(f"{file}: {len(found)} grades with comments for Canvas' API; nothing was sent")
+        return []
+    given = [one for one in found if is_download(one.source.name)]
+    comments = {one.source.name: (one.result, one.report.read_bytes()) for one in given}
+    write_whole(file, upload_zip(comments))
+    say(f'{file}: {len(comments)} comments for "Upload Submissions"')
+    return [
+        f"{one.key}: no comment: Canvas takes only an answer to a zip that was downloaded from it"
+        for one in found
+        if one not in given
+    ]
+
+
+@app.command()
+def mail(
+    out: ClassFolder,
+    roster: Annotated[Path, typer.Option(help="CSV of the class, with a column `email`.")],
+    folder: Folder = Path("mail"),
+    sender: Annotated[str | None, typer.Option("--from", help="Your address.")] = None,
+    subject: Annotated[str, typer.Option(help="Of every message.")] = "",
+) -> None:
+    """Write a message for each student, with the report. Nothing is sent.
+
+    mail.mbox is for a mail program, mail.csv for mail merge. Ends with 1 if a student gets no
+    message, and says who and why.
+    """
+    from grader.batch.feedback import Addressees, class_feedback
+    from grader.batch.roster import read_roster
+    from grader.errors import UsageError
+    from grader.report.files import refuse_inputs, write_whole
+    from grader.report.formats.mail import Letter, address, mail_csv, write_mbox
+    from grader.report.text.summary import summary
+
+    mbox, table = folder / "mail.mbox", folder / "mail.csv"
+    refuse_inputs([mbox, table], [roster, *_read_of(out)])
+    own = address(sender) if sender is not None else None
+    if sender is not None and own is None:
+        raise UsageError(f"--from {sender}: is no address; write NAME@HOST")
+    students = Addressees(read_roster(roster))
+    found, problems = class_feedback(out)
+    letters = []
+    for one in found:
+        student = students.of(one)
+        to = address(student.email, student.name or one.name) if student is not None else None
+        if student is None or to is None:
+            why = f"has no address {student.email}".rstrip() if student else "is no student"
+            problems.append(f"{one.key}: {why} in {roster}")
+            continue
+        text = f"Hello {to.display_name},\n\n".replace(" ,", ",") + summary(one.result)
+        text += "\nThe report is attached. Open it in a browser.\n"
+        title = subject or f"Your result: {one.result.assignment.id}"
+        letters.append(Letter(to, title, text, one.report))
+    write_mbox(mbox, letters, own)
+    write_whole(table, mail_csv(letters))
+    say(f"{mbox}, {table}: {len(letters)} messages; nothing was sent")
+    _end(problems)
+
+
+@app.command()
+def feedback(
+    out: ClassFolder,
+    folder: Folder = Path("feedback"),
+    branch: Annotated[
+        str | None,
+        typer.Option(help="Also commit it on this branch of each clone; nothing is pushed."),
+    ] = None,
+) -> None:
+    """Write for each student the files for their repository: a README.md and the report.
+
+    Ends with 1 if a student gets none, and says who and why.
+    """
+    from grader.batch.feedback import class_feedback, write_files
+    from grader.errors import RosgradeError
+    from grader.report.files import refuse_part
+    from grader.submission.git import commit_folder
+
+    refuse_part(folder, out / "submissions", f"the results in {out}")
+    found, problems = class_feedback(out)
+    committed = 0
+    for one in found:
+        files = write_files(one, folder)
+        if branch is not None:
+            try:
+                committed += commit_folder(one.source, branch, files[0].parent.name, files)
+            except RosgradeError as error:
+                problems.append(f"{one.key}: {error}")
+    say(f"{folder}: files for {len(found)} students")
+    if branch is not None:
+        say(f"{committed} clones have a new commit on {branch}; push them yourself")
+    _end(problems)
+
+
+def _end(problems: Sequence[str]) -> None:
+    for problem in problems:
         print_error(problem)
-    if filled.problems:
+    if problems:
         raise typer.Exit(1)
 
 

@@ -32,7 +32,7 @@ _DROPPED = re.compile(
 _POINTS_POSSIBLE = "Points Possible"
 _CANVAS_ID = re.compile(r"\((\d+)\)\s*$")
 # How Canvas names what it lets a teacher download: name, perhaps LATE, user, attachment, file.
-_DOWNLOAD = re.compile(r"^[^_]+_(?:LATE_)?(\d+)_\d+_")
+DOWNLOAD = re.compile(r"^[^_]+_(?:LATE_)?(\d+)_\d+_")
 # What `rosgrade batch` calls such a submission: name and user.
 _DOWNLOADED = re.compile(r"^([^_]+)_(\d+)$")
 # Canvas adds it to every course.
@@ -60,11 +60,12 @@ class CanvasExport:
 class CanvasFile:
     """A gradebook to import into Canvas.
 
+    ``scores`` are the cells that are filled in, by row id with Canvas' number of the student;
     ``problems`` name who has no score in it, ``doubts`` what is odd about the column.
     """
 
     text: str
-    filled: int
+    scores: Mapping[str, tuple[str, str]]
     problems: tuple[str, ...]
     doubts: tuple[str, ...]
 
@@ -184,6 +185,7 @@ def canvas_csv(
         [f"    {_POINTS_POSSIBLE}", *[""] * (len(export.identity) - 1), points],
     ]
     problems: list[str] = []
+    scores: dict[str, tuple[str, str]] = {}
     taken: dict[int, str] = {}
     for who, row, found in _assigned(rows, export):
         if len(found) != 1:
@@ -204,12 +206,13 @@ def canvas_csv(
             name, *rest = export.students[student]
             # Names are free text; the numbers after them are what Canvas matches by.
             table.append([cell(name), *rest[:-1], cell(rest[-1]), number(score)])
+            scores[row.id] = (rest[0], number(score))
         if is_excused or score is not None:
             taken.setdefault(student, who)
-    if len(table) == 2:
+    if not scores:
         raise UsageError("\n".join(["no score could be filled in:", *problems]))
     doubts = tuple(_doubts(export, title, points, max_score))
-    return CanvasFile(_csv(table), len(table) - 2, tuple(problems), doubts)
+    return CanvasFile(_csv(table), scores, tuple(problems), doubts)
 
 
 def _csv(rows: Iterable[Sequence[str]]) -> str:
@@ -309,7 +312,7 @@ def _column(export: CanvasExport, wanted: str) -> str:
 
 def _students(export: CanvasExport, submission: str) -> list[int]:
     """Rows that a submission may belong to, by the best of what identifies it."""
-    download = _DOWNLOAD.match(submission)
+    download = DOWNLOAD.match(submission)
     keys = [("ID", download[1])] if download else []
     keys += [(title, submission) for title in ("ID", *_OPTIONAL[:2], "Student")]
     for title, value in keys:

@@ -1,0 +1,226 @@
+"""What students are given: messages, comments in Canvas, files for their repositories."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import mailbox
+import subprocess
+import zipfile
+from contextlib import closing
+from email import message_from_bytes, policy
+from email.message import EmailMessage
+from pathlib import Path
+
+import pytest
+
+from grader.batch.files import RESULT_FILE
+from grader.batch.ledger import Entry, Ledger
+from grader.report.formats.canvas_comments import is_download
+from grader.report.model.result import result_json
+from grader.report.model.result_model import AdjustmentPart, CommentPart
+from tests.cli.conftest import Rosgrade
+from tests.report.sample import full_points, lost_points, not_graded
+
+ROSTER = """\
+login,name,email
+ana,"López, Ana =x",ana@example.org
+ben,"Ben\u202e, Boll",ben@example.org
+cy,Cy Dee,
+dora,Dora,dora@example.org
+eve,Eve,"eve@example.org, all@example.org"
+"""
+LATE = AdjustmentPart(kind="late", title="Handed in late", points=-0.5, reason="1 day late")
+COMMENT = CommentPart(text="Well done,\nbut:\nFrom here on", by="LP", file="src/a.py", line=7)
+
+
+def handed_in(place: Path, key: str, made, **changes: object) -> tuple[Entry, str]:
+    result = made().result
+    submission = result.submission.model_copy(update={"id": key, "sha256": key})
+    changed = result.model_copy(update={"submission": submission, **changes})
+    clone = place / "clones" / key
+    return Entry(key, sha256=key, source=str(clone)), result_json(changed)
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    """Ana lost points and has a hidden check, Ben has no report without it, Dora no grade."""
+    given = [
+        handed_in(tmp_path, "ana", lost_points, adjustments=(LATE,), comments=(COMMENT,)),
+        *(handed_in(tmp_path, key, full_points) for key in ("ben", "cy", "eve")),
+        handed_in(tmp_path, "dora", not_graded),
+    ]
+    with Ledger(tmp_path / "out").opened() as ledger:
+        for entry, result in given:
+            folder = ledger.partial(entry.key)
+            (folder / RESULT_FILE).write_text(result)
+            (folder / "report.html").write_text(f"whole report of {entry.key}")
+            if entry.key == "ana":
+                (folder / "student-report.html").write_text("copy for ana")
+            ledger.put(entry.key, folder)
+        entries = [entry for entry, _ in given]
+        ledger.write([*entries, Entry("gil", problem="handed in nothing")], "lesson", "f" * 64)
+    (tmp_path / "roster.csv").write_text(ROSTER, encoding="utf-8")
+    return tmp_path / "out"
+
+
+def clone_of(place: Path, key: str) -> Path:
+    clone = place / "clones" / key
+    clone.mkdir(parents=True)
+    git(clone, "init", "-q", "-b", "main")
+    (clone / "node.py").write_text("print()\n")
+    git(clone, "add", ".")
+    who = ("-c", "user.name=x", "-c", "user.email=x@example.org")
+    git(clone, *who, "commit", "-q", "-m", "Hand in")
+    return clone
+
+
+def git(folder: Path, *arguments: str) -> str:
+    done = subprocess.run(
+        ["git", *arguments], cwd=folder, capture_output=True, text=True, check=True
+    )
+    return done.stdout.strip()
+
+
+def messages(file: Path) -> list[EmailMessage]:
+    """What a mail program finds in a mailbox."""
+    with closing(mailbox.mbox(file, create=False)) as box:
+        return [
+            message_from_bytes(box.get_bytes(key), _class=EmailMessage, policy=policy.default)
+            for key in box.iterkeys()
+        ]
+
+
+def test_each_student_gets_a_message_with_the_report_and_who_gets_none_is_named(
+    rosgrade: Rosgrade, out: Path, tmp_path: Path
+) -> None:
+    ended = rosgrade(
+        *("export", "mail", out, "--roster", "roster.csv", "--out", "post"),
+        *("--from", "prof@example.org"),
+    )
+    assert ended.returncode == 1
+    assert "2 messages; nothing was sent" in ended.stdout
+    assert "cy: has no address in roster.csv" in ended.stderr
+    assert "eve: has no address eve@example.org, all@example.org in roster.csv" in ended.stderr
+    assert "dora: not graded" in ended.stderr and "gil: handed in nothing" in ended.stderr
+    ana, ben = messages(tmp_path / "post" / "mail.mbox")
+    assert str(ana["to"]) == '"López, Ana =x" <ana@example.org>'
+    assert "\u202e" not in str(ben["to"]) and ben["to"].addresses[0].addr_spec == "ben@example.org"
+    assert ana["from"] == "prof@example.org" and ana["subject"] == "Your result: timed_publisher"
+    (report,) = ana.iter_attachments()
+    assert (report.get_filename(), report.get_content_type()) == ("report.html", "text/html")
+    assert report.get_content().strip() == "copy for ana"
+    body = ana.get_body(("plain",)).get_content()
+    assert "Hello López, Ana =x,\n\ntimed_publisher: 1.52 of 6 points" in body
+    assert "-0.5: Handed in late, 1 day late" in body
+    assert "It publishes every 300 ms (1.02 / 3 points)\n  expected: a period of 300 ms" in body
+    assert "  try next: " in body and "LP at src/a.py:7:\nWell done,\nbut:" in body
+    assert "ends after SIGINT" not in body
+
+
+def test_the_table_for_mail_merge_has_no_formula_and_says_which_report(
+    rosgrade: Rosgrade, out: Path, tmp_path: Path
+) -> None:
+    rosgrade("export", "mail", out, "--roster", "roster.csv", "--subject", "=1+1\nBcc: x@y")
+    with (tmp_path / "mail" / "mail.csv").open(encoding="utf-8", newline="") as stream:
+        ana, ben = csv.DictReader(stream)
+    assert list(ana) == ["email", "name", "subject", "body", "report"]
+    assert ana["subject"] == "'=1+1 ⏎ Bcc: x@y"
+    assert Path(ana["report"]).read_text() == "copy for ana"
+    assert Path(ben["report"]).read_text() == "whole report of ben"
+    first, _ = messages(tmp_path / "mail" / "mail.mbox")
+    assert first["bcc"] is None and first["from"] is None
+
+
+def test_a_sender_who_is_no_address_is_refused(rosgrade: Rosgrade, out: Path) -> None:
+    ended = rosgrade("export", "mail", out, "--roster", "roster.csv", "--from", "Prof")
+    assert ended.returncode == 2 and "--from Prof: is no address" in ended.stderr
+
+
+def test_the_files_for_a_repository_are_committed_beside_what_is_checked_out(
+    rosgrade: Rosgrade, out: Path, tmp_path: Path
+) -> None:
+    clone = clone_of(tmp_path, "ana")
+    (clone / "node.py").write_text("print('not committed')\n")
+    other = clone_of(tmp_path, "ben")
+    git(other, "branch", "feedback")
+    command = ("export", "feedback", out, "--out", "files", "--branch", "feedback")
+    before = git(clone, "status", "--porcelain"), git(clone, "rev-parse", "HEAD")
+    ended = rosgrade(*command)
+    assert ended.returncode == 1 and "1 clones have a new commit on feedback" in ended.stdout
+    assert "ben: has a branch feedback of its own" in ended.stderr
+    assert f"{tmp_path}/clones/cy is not a clone" in ended.stderr
+    assert (git(clone, "status", "--porcelain"), git(clone, "rev-parse", "HEAD")) == before
+    assert git(clone, "branch", "--show-current") == "main"
+    assert git(clone, "ls-tree", "-r", "--name-only", "feedback").split("\n") == [
+        "node.py",
+        "rosgrade-feedback/README.md",
+        "rosgrade-feedback/report.html",
+    ]
+    assert git(clone, "show", "feedback:rosgrade-feedback/report.html") == "copy for ana"
+    readme = (tmp_path / "files" / "ana" / "rosgrade-feedback" / "README.md").read_text()
+    assert "It publishes every 300 ms" in readme and "ends after SIGINT" not in readme
+    assert "0 clones have a new commit" in rosgrade(*command).stdout
+
+
+def test_a_repository_that_only_points_to_another_one_is_not_written(
+    rosgrade: Rosgrade, out: Path, tmp_path: Path
+) -> None:
+    mine = clone_of(tmp_path, "mine")
+    for key in ("ana", "ben"):
+        (tmp_path / "clones" / key).mkdir()
+    (tmp_path / "clones" / "ana" / ".git").write_text(f"gitdir: {mine}/.git\n")
+    (tmp_path / "clones" / "ben" / ".git").symlink_to(mine / ".git")
+    rosgrade("export", "feedback", out, "--branch", "feedback")
+    assert git(mine, "branch", "--list", "feedback") == ""
+
+
+def canvas(place: Path) -> Path:
+    file = place / "gradebook.csv"
+    file.write_text(
+        "Student,ID,SIS Login ID,Section,lesson (7)\n    Points Possible,,,,6\n"
+        "Ana,90211,ana,S,\nBen,90212,ben,S,\n"
+    )
+    return file
+
+
+def test_comments_for_the_api_of_canvas_go_to_canvas_number(
+    rosgrade: Rosgrade, out: Path, tmp_path: Path
+) -> None:
+    rosgrade("export", "canvas", out, "--canvas", canvas(tmp_path), "--comments", "c.json")
+    data = json.loads((tmp_path / "c.json").read_text())["grade_data"]
+    assert set(data) == {"90211", "90212"}
+    assert data["90211"]["posted_grade"] == "2.52"
+    assert "It publishes every 300 ms" in data["90211"]["text_comment"]
+
+
+def test_comments_to_upload_are_called_as_canvas_called_the_downloads(
+    rosgrade: Rosgrade, out: Path, tmp_path: Path
+) -> None:
+    name = "lopezana_LATE_90211_555_ws-1.zip"
+    ledger = Ledger(out)
+    entries = {entry.key: entry for entry in ledger.read().entries}
+    entries["ana"] = Entry("ana", sha256="ana", source=f"/gone/{name}")
+    ledger.write(entries.values(), "lesson", "f" * 64)
+    ended = rosgrade("export", "canvas", out, "--canvas", canvas(tmp_path), "--comments", "c.zip")
+    assert "1 comments" in ended.stdout and "ben: no comment" in ended.stderr
+    with zipfile.ZipFile(tmp_path / "c.zip") as outer:
+        assert outer.namelist() == [name]
+        with zipfile.ZipFile(io.BytesIO(outer.read(name))) as inner:
+            assert inner.read("report.html") == b"copy for ana"
+            assert b"It publishes every 300 ms" in inner.read("feedback.txt")
+
+
+@pytest.mark.parametrize(
+    ("name", "takes"),
+    [
+        ("lopezana_90211_555_ws.zip", True),
+        ("lopezana_LATE_90211_555_my_ws-2.ZIP", True),
+        ("lopezana_90211_555_ws.tar.gz", False),
+        ("ana.zip", False),
+        ("", False),
+    ],
+)
+def test_canvas_takes_only_what_was_downloaded_as_a_zip(name: str, takes: bool) -> None:
+    assert is_download(name) is takes
