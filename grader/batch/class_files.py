@@ -5,33 +5,29 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
-from grader.assignment.load import load_assignment
-from grader.assignment.selection import select, visible_part
+from grader.batch.adjusting import ClassAdjustments
 from grader.batch.batch import Done
-from grader.batch.files import REPORT_FILE, RESULT_FILE, write_report
+from grader.batch.files import REPORT_FILE, RESULT_FILE
 from grader.batch.ledger import BATCH_FILE, Entry, Ledger
-from grader.batch.regrading import find, regrade, regrade_command, stored_assignment
 from grader.errors import UsageError
 from grader.findings.finding import Status
 from grader.findings.wording import listing
-from grader.grade import Grade
 from grader.report.files import write_whole
 from grader.report.formats.gradebook import grades_csv
 from grader.report.html.overview import render_overview
 from grader.report.model.class_result import for_class
 from grader.report.model.class_row import ClassRow
 from grader.report.model.result import read_result
-from grader.report.model.result_model import Result
+from grader.review.cluster import clusters
+from grader.review.store import ReviewStore
 from grader.safe_text import one_line
 
 GRADES_FILE = "grades.csv"
 OVERVIEW_FILE = "index.html"
 NO_RESULT = "it has no result; run the batch again"
 _MOST_TWINS = 5
-_load = cache(load_assignment)
 
 
 def notes(done: Sequence[Done]) -> dict[str, str]:
@@ -120,7 +116,10 @@ def write_class(done: Sequence[Done], ledger: Ledger) -> Path:
     rows = class_rows(done, ledger)
     write_whole(ledger.out / GRADES_FILE, grades_csv(rows))
     overview = ledger.out / OVERVIEW_FILE
-    write_whole(overview, render_overview(rows))
+    store = ReviewStore(ledger.out)
+    found = clusters(rows, store.of_class().content)
+    vanished = store.vanished({item.entry.review_key for item in done})
+    write_whole(overview, render_overview(rows, found, vanished))
     return overview
 
 
@@ -160,38 +159,10 @@ def read_class(out: Path) -> list[ClassRow]:
     folders = find_reports(out)
     if (out / BATCH_FILE).is_file():
         ledger = Ledger(out)
-        return class_rows([standing(ledger, entry) for entry in ledger.read().entries], ledger)
+        adjust = ClassAdjustments(ledger)
+        rows = [standing(ledger, entry) for entry in ledger.read().entries]
+        return class_rows(
+            [replace(row, result=row.result and adjust(row.result)) for row in rows], ledger
+        )
     results = (for_class(read_result(folder / RESULT_FILE)) for folder in folders)
     return class_rows([Done(Entry(one.submission.id), one, fresh=False) for one in results])
-
-
-def render_again(folder: Path, assignment: str | None = None) -> Result:
-    """Render the report of one submission again from its result and its recordings."""
-    found = find(folder)
-    result = found.result or read_result(folder / RESULT_FILE)
-    loaded = _load(assignment or _stored(folder, result))
-    if loaded.sha256 != result.assignment.sha256:
-        raise UsageError(
-            f"{folder}: the assignment has changed since this was graded. "
-            f"{regrade_command(folder, loaded)} judges again with the new assignment"
-        )
-    shown = visible_part(loaded) if result.withheld.checks else loaded
-    graded = regrade(select(shown, tuple(check.id for check in result.checks)), found)
-    changed = _changed(result, graded.grade)
-    if changed:
-        raise UsageError(
-            f"{folder}: judging again does not give the stored result ({', '.join(changed)}). "
-            f"{regrade_command(folder, loaded)} writes the new result and report"
-        )
-    write_report(graded, folder, result)
-    return result
-
-
-def _stored(folder: Path, result: Result) -> str:
-    assignment = result.assignment
-    return stored_assignment(folder, assignment.id, assignment.location, "report", str(folder))
-
-
-def _changed(result: Result, grade: Grade) -> list[str]:
-    before = {check.id: check.status for check in result.checks}
-    return [one.id for one in grade.results if before.get(one.id) is not one.status]

@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
+from grader.batch.adjusting import ClassAdjustments
 from grader.batch.batch import Done
 from grader.batch.class_files import NO_RESULT, standing
 from grader.batch.files import RESULT_FILE, write_graded
 from grader.batch.ledger import Entry, Ledger, keep_earlier
 from grader.batch.regrading import compare, find, refuse_other, regrade
 from grader.errors import RosgradeError
+from grader.grade.model import total
 from grader.report.model.facts import Clock
 from grader.report.model.result_model import Result
 
@@ -28,11 +30,11 @@ class Regraded:
 
     @property
     def gained(self) -> float:
-        """Points gained, negative if lost; 0 unless both are graded."""
-        before, after = self.before, self.done.result
-        if before is None or before.score is None or after is None or after.score is None:
-            return 0.0
-        return after.score - before.score
+        """Points gained, negative if lost; 0 unless both have all their points."""
+        before, after = (
+            one.final_score if one is not None else None for one in (self.before, self.done.result)
+        )
+        return total((after, -before)) if before is not None and after is not None else 0.0
 
     @property
     def in_doubt(self) -> bool:
@@ -52,6 +54,7 @@ def regrade_class(
     """
     written = ledger.read()
     entries = written.entries
+    adjust = ClassAdjustments(ledger)
     refuse_other(ledger.out, written.assignment, loaded)
     chosen = {
         entry.same_as or entry.key
@@ -65,7 +68,7 @@ def regrade_class(
         elif (entry.same_as or entry.key) not in chosen:
             yield Regraded(standing(ledger, entry), before)
         elif before is not None and entry.sha256 in ("", before.submission.sha256):
-            yield _regrade(loaded, ledger, entry, before)
+            yield _regrade(loaded, ledger, entry, before, adjust)
         elif entry.sha256:
             yield _not_judged(entry, None, NO_RESULT)
         else:
@@ -74,7 +77,13 @@ def regrade_class(
         ledger.write(entries, loaded.assignment.id, loaded.sha256, loaded.location)
 
 
-def _regrade(loaded: LoadedAssignment, ledger: Ledger, entry: Entry, before: Result) -> Regraded:
+def _regrade(
+    loaded: LoadedAssignment,
+    ledger: Ledger,
+    entry: Entry,
+    before: Result,
+    adjust: ClassAdjustments,
+) -> Regraded:
     folder = ledger.folder(entry.key)
     try:
         found = find(folder)
@@ -85,7 +94,7 @@ def _regrade(loaded: LoadedAssignment, ledger: Ledger, entry: Entry, before: Res
     version = (before.assignment.sha256, before.assignment.location)
     if changes or version != (loaded.sha256, loaded.location):
         keep_earlier(folder / RESULT_FILE)
-        write_graded(graded, folder, Clock())
+        write_graded(graded, folder, Clock(), amended=adjust)
     return Regraded(Done(entry, ledger.result(entry.key), fresh=True), before, changes)
 
 

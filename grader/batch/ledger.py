@@ -56,6 +56,11 @@ class Entry:
     team: str = ""
     source: str = ""
 
+    @property
+    def review_key(self) -> str:
+        """Whose review is this row's: a team has one, that of its first member."""
+        return self.team or self.key
+
 
 @dataclass(frozen=True)
 class BatchRows:

@@ -62,10 +62,12 @@ def batch(
     with 0 if every submission was graded, whatever the grades, and with 3 if one was not.
     """
     from grader.assignment.load import load_assignment, refuse_swapped
+    from grader.batch.adjusting import ClassAdjustments
     from grader.batch.batch import Batch
     from grader.batch.class_files import GRADES_FILE, write_class
     from grader.batch.executor import DaskExecutor, ExecutorLost, LocalExecutor
     from grader.batch.ledger import Ledger
+    from grader.batch.rendering import bring_up_to_date
     from grader.batch.worker import Order, make_grading
     from grader.report.files import check_folder, refuse_inputs, refuse_part
     from grader.run.admission import Admission
@@ -99,6 +101,9 @@ def batch(
             work = Batch(loaded, ledger, frozenset(retry or ()))
             progress.begin("reading", len(rows))
             entries, to_do = work.read(rows, progress.advance)
+            # What people wrote must be readable before anything is run.
+            for key in ClassAdjustments(ledger).vanished():
+                progress.note(f"the review of {key} stays, but the class has no such student")
             executor: BatchExecutor | None = None
             if to_do and scheduler is not None:
                 executor = DaskExecutor(scheduler, order)
@@ -119,13 +124,14 @@ def batch(
                     f"interrupted; {len(done)} of {len(entries)} are in {out}. Run the same "
                     "command again to grade the others"
                 )
-                write_class([*done, *work.left(done)], ledger)
+                write_class(bring_up_to_date([*done, *work.left(done)], ledger), ledger)
                 signal.signal(signal.SIGINT, signal.default_int_handler)
                 signal.signal(signal.SIGTERM, signal.default_int_handler)
                 raise
             finally:
                 if executor is not None:
                     executor.close()
+            done = bring_up_to_date(done, ledger)
             overview = write_class(done, ledger)
     console = output_console()
     console.print(_summary(done, time.monotonic() - began_s), soft_wrap=True)
@@ -186,12 +192,14 @@ def _summary(done: Sequence[Done], wall_s: float) -> str:
     scores = [row.score for row in rows if row.score is not None]
     count = Counter(row.status for row in rows)
     fresh = sum(item.fresh for item in done)
-    parts = [f"{len(scores)} of {len(done)} graded ({fresh} now, in {wall_s:.0f} s)"]
+    graded = len(scores) + count[RowStatus.WAITING]
+    parts = [f"{graded} of {len(done)} graded ({fresh} now, in {wall_s:.0f} s)"]
     if scores:
-        most = next(row.result.max_score for row in rows if row.graded and row.result is not None)
+        most = max(row.result.final_max_score for row in rows if row.graded and row.result)
         parts.append(f"median {median(scores):g} of {most:g} points")
         parts.append(f"{sum(row.full for row in rows)} with full points")
     counts = {
+        "wait for a person (rosgrade review)": count[RowStatus.WAITING],
         "the same as another": copies(done),
         "could not be graded (again with --retry errors)": count[RowStatus.NOT_GRADED],
         "unreadable, without a score": count[RowStatus.UNREADABLE],

@@ -49,6 +49,7 @@ def regrade(
 
 def _one(path: Path, assignment: str | None) -> None:
     from grader.assignment.load import load_assignment
+    from grader.batch.adjusting import ClassAdjustments
     from grader.batch.attempts import with_history
     from grader.batch.files import REPORT_FILE, write_graded
     from grader.batch.ledger import Ledger
@@ -69,6 +70,8 @@ def _one(path: Path, assignment: str | None) -> None:
     graded = judge_again(loaded, found)
     say(f"Assignment: {loaded.file}")
     result = make_result(graded.grade, graded.recordings, RunFacts(clock.started, clock.elapsed_s))
+    if batch is not None:
+        result = ClassAdjustments(batch)(result)
     print_grade(output_console(), loaded.assignment.title, result)
     if found.result is not None:
         for line in compare(found.result, graded.grade) or ["no check changed"]:
@@ -103,10 +106,11 @@ def _write(ledger: Ledger, rows: Sequence[Regraded]) -> None:
     """Write the gradebook and the overview again; a gradebook that changes is kept as earlier."""
     from grader.batch.class_files import GRADES_FILE, write_class
     from grader.batch.ledger import keep_earlier
+    from grader.batch.rendering import bring_up_to_date
 
     if any(row.changes for row in rows):
         keep_earlier(ledger.out / GRADES_FILE)
-    overview = write_class([row.done for row in rows], ledger)
+    overview = write_class(bring_up_to_date((row.done for row in rows), ledger), ledger)
     say(f"Overview: {overview}")
     say(f"Grades: {ledger.out / GRADES_FILE}")
 

@@ -32,13 +32,17 @@ def report(
     gradescope_metadata: GradescopeMetadata = None,
     github: Github = False,
 ) -> None:
-    """Write reports again, also in other formats. Nothing is run, no grade changes.
+    """Write reports again, also in other formats. Nothing is run, no check ends differently.
 
-    The options of the formats work for one report. For a class, every report is written.
+    The options of the formats work for one report. For a class, every report is written, with what
+    `rosgrade review` added, and so are the gradebook and the overview.
     """
-    from grader.batch.class_files import find_reports, render_again
+    from grader.batch.adjusting import ClassAdjustments
+    from grader.batch.class_files import find_reports, standing, write_class
     from grader.batch.files import REPORT_FILE, RESULT_FILE
     from grader.batch.grading import RECORDINGS_FOLDER
+    from grader.batch.ledger import BATCH_FILE, Ledger
+    from grader.batch.rendering import bring_up_to_date, render_again
     from grader.errors import UsageError
     from grader.report.files import refuse_inputs
 
@@ -49,8 +53,13 @@ def report(
             f"{out} has {len(folders)} reports, and a file of such a format holds one: "
             "give the folder of one report"
         )
+    ledger = Ledger(out) if (out / BATCH_FILE).is_file() else Ledger.around(folders[0])
+    adjust = ClassAdjustments(ledger) if ledger is not None else None
     for folder in folders:
         read = [folder / RESULT_FILE, folder / RECORDINGS_FOLDER, gradescope_metadata]
         refuse_inputs([folder / REPORT_FILE, *files.values()], read)
-        formats.write(render_again(folder, assignment))
+        formats.write(render_again(folder, assignment, adjust))
         say(f"Report: {folder / REPORT_FILE}")
+    if ledger is not None:
+        rows = [standing(ledger, entry) for entry in ledger.read().entries]
+        say(f"Overview: {write_class(bring_up_to_date(rows, ledger), ledger)}")

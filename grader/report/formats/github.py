@@ -60,8 +60,8 @@ def outputs(result: Result, delimiter: str) -> str:
     """
     copy = for_student(result)
     values = {
-        "score": number(copy.score) if copy.score is not None else "",
-        "max-score": number(copy.max_score),
+        "score": number(copy.known_score) if copy.known_score is not None else "",
+        "max-score": number(copy.known_max_score),
         "status": status(copy),
         "summary": explanation.headline(copy),
     }
@@ -72,7 +72,7 @@ def status(result: Result) -> str:
     """``passed`` with full points, ``failed`` without, ``error`` where there is no grade."""
     if not result.graded:
         return "error"
-    return "passed" if result.score == result.max_score else "failed"
+    return "passed" if result.known_score == result.known_max_score else "failed"
 
 
 def stop_commands(token: str) -> str:

@@ -17,8 +17,9 @@ from itertools import zip_longest
 
 from grader.errors import UsageError
 from grader.findings.finding import Status
+from grader.grade.model import total
 from grader.report.model.class_row import ClassRow, RowStatus
-from grader.report.model.result_model import Result
+from grader.report.model.result_model import AdjustmentPart, Result
 from grader.report.text.words import number
 from grader.safe_text import one_line
 from grader.spec.nearest_name import did_you_mean
@@ -73,6 +74,7 @@ class CanvasFile:
 def grades_csv(rows: Sequence[ClassRow], zero: Collection[RowStatus] = ()) -> str:
     """The gradebook of a class as CSV: a row for each submission, a column for each check.
 
+    Then come a column for each manual item and one for each other kind of adjustment that there is.
     What could not be judged is an empty cell, and so is the score of a row without a grade.
 
     Args:
@@ -82,19 +84,28 @@ def grades_csv(rows: Sequence[ClassRow], zero: Collection[RowStatus] = ()) -> st
     if results:
         _one_assignment(results)
     checks: dict[str, float] = {}
+    added: dict[str, str] = {}
     for result in results:
         for check in result.checks:
             checks.setdefault(check.id, check.max_points)
+        for one in result.adjustments:
+            added.setdefault(*_column_of(one))
     table = [
         [
             *("submission", "name", "late", "status", "score", "max_score", "graded"),
             *(f"{name} ({number(most)})" for name, most in checks.items()),
+            *added.values(),
             "note",
         ]
     ]
     for row in rows:
         judged = [check for check in row.judged if check.status is not Status.ERROR]
         earned = {check.id: number(check.points) for check in judged}
+        sums: dict[str, float] = {}
+        for one in row.result.adjustments if row.result is not None and row.judged else ():
+            if one.points is not None:
+                name = _column_of(one)[0]
+                sums[name] = total((sums.get(name, 0.0), one.points))
         score = _score(row, zero)
         table.append(
             [
@@ -103,13 +114,21 @@ def grades_csv(rows: Sequence[ClassRow], zero: Collection[RowStatus] = ()) -> st
                 "yes" if row.late else "",
                 row.status.value,
                 "" if score is None else number(score),
-                number(row.result.max_score) if row.result is not None else "",
+                number(row.result.final_max_score) if row.result is not None else "",
                 "yes" if row.graded else "no",
                 *(earned.get(name, "") for name in checks),
+                *(number(sums[name]) if name in sums else "" for name in added),
                 cell(row.note),
             ]
         )
     return _csv(table)
+
+
+def _column_of(one: AdjustmentPart) -> tuple[str, str]:
+    """The key and the title of the column of an adjustment."""
+    if one.kind != "manual":
+        return one.kind, one.kind
+    return f"manual {one.item}", f"{one.item} ({number(one.max_points)})"
 
 
 def _score(row: ClassRow, zero: Collection[RowStatus]) -> float | None:
@@ -177,7 +196,7 @@ def canvas_csv(
     results = [row.result for row in rows if row.result is not None]
     assignment = _one_assignment(results)
     title = _column(export, column or assignment)
-    max_score = max(result.max_score for result in results)
+    max_score = max(result.final_max_score for result in results)
     # Canvas takes this row for a change of the assignment, so what it says itself is kept.
     points = export.points.get(title) or number(max_score)
     table = [
@@ -277,6 +296,8 @@ def _assigned(
 def _why_no_score(row: ClassRow) -> str:
     if row.status is RowStatus.MISSING:
         return "handed in nothing"
+    if row.status is RowStatus.WAITING:
+        return f"waits for a person ({', '.join(map(one_line, row.waits_for))})"
     problem = row.result.submission.problem if row.result is not None else None
     return "not graded" if problem is None else f"unreadable ({one_line(problem)})"
 

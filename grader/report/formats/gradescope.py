@@ -67,7 +67,7 @@ def render(result: Result, options: FormatOptions = DEFAULTS) -> str:
         extra["late_s"] = metadata.late_s
     return _json(
         {
-            "score": result.score if result.score is not None else 0,
+            "score": result.known_score if result.known_score is not None else 0,
             "execution_time": round(result.duration_s),
             "output": _output(copy, graded=result.graded),
             "output_format": "md",
@@ -120,7 +120,8 @@ def _output(copy: Result, *, graded: bool) -> str:
     if graded:
         score = f"**{explanation.score(copy)}.** {explanation.headline(copy)}"
         lines = [score, *markdown.first_to_fix(copy)]
-    return "\n".join([*lines, *(f"\n{block.rstrip()}" for block in markdown.notes(copy))])
+    blocks = (*markdown.added(copy), *markdown.notes(copy))
+    return "\n".join([*lines, *(f"\n{block.rstrip()}" for block in blocks)])
 
 
 def _test(number: int, check: CheckPart, copy: Result) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from grader.findings.finding import Status
 from grader.report.formats.options import DEFAULTS, FormatOptions
 from grader.report.html.page import environment
 from grader.report.model.result_model import Result
-from grader.report.text import explanation
+from grader.report.text import additions, explanation
 from grader.report.text.words import number
 
 _ENDINGS = {Status.FAILED: "failure", Status.ERROR: "error", Status.SKIPPED: "skipped"}
@@ -46,19 +46,24 @@ def render(result: Result, options: FormatOptions = DEFAULTS) -> str:
         timestamp=timestamp[0] if timestamp else "",
         properties=_properties(result),
         xunit1=int(options.xunit1),
-        notes=[line for kind in notes for line in (f"{kind.title}:", *kind.lines)],
+        notes=[
+            *(line for kind in notes for line in (f"{kind.title}:", *kind.lines)),
+            *map(additions.comment_line, result.comments),
+        ],
     )
 
 
 def _properties(result: Result) -> dict[str, str]:
     found = {
         "submission": result.submission.id,
-        "score": number(result.score) if result.score is not None else "not graded",
-        "max_score": number(result.max_score),
+        "score": number(result.known_score) if result.known_score is not None else "not graded",
+        "max_score": number(result.known_max_score),
         "rosgrade": result.rosgrade_version,
     }
     if result.withheld.checks:
         found["hidden_checks"] = str(result.withheld.checks)
         found["hidden_points"] = number(result.withheld.points)
     found |= {f"points.{check.id}": explanation.points(check) for check in result.checks}
+    added = enumerate(map(additions.line, result.adjustments), 1)
+    found |= {f"adjustment.{index}": line for index, line in added}
     return found | {f"environment.{name}": value for name, value in result.environment.items()}

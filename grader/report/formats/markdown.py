@@ -15,7 +15,7 @@ from grader.findings.finding import Status
 from grader.report.formats.options import FormatOptions
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
-from grader.report.text import explanation
+from grader.report.text import additions, explanation
 from grader.report.text.words import STATUS, cut
 from grader.safe_text import clean, one_line
 
@@ -46,7 +46,8 @@ def render_markdown(result: Result, most_bytes: int | None = None) -> str:
     """
     title = f"## {literal(result.assignment.id)}: {explanation.score(result)}"
     head = [title, "", explanation.headline(result), *first_to_fix(result), ""]
-    blocks = ["\n".join(head), _table(result), *notes(result), *_explanations(result)]
+    parts = (*added(result), *notes(result), *_explanations(result))
+    blocks = ["\n".join(head), _table(result), *parts]
     whole = "\n".join(blocks)
     if most_bytes is None or len(whole.encode()) <= most_bytes:
         return whole
@@ -117,6 +118,18 @@ def _table(result: Result) -> str:
         title = prose(check.title, cell=True)
         lines.append(f"| {words.symbol} {words.word} | {title} | {explanation.points(check)} |")
     return "\n".join([*lines, ""])
+
+
+def added(result: Result) -> Iterator[str]:
+    """What persons and the rules of the course add, a block for each kind."""
+    kinds = {
+        "Added to the checks": map(additions.line, result.adjustments),
+        "Comments": map(additions.comment_line, result.comments),
+    }
+    for title, lines in kinds.items():
+        items = [f"- {literal(one)}" for one in lines]
+        if items:
+            yield "\n".join([f"**{title}**", "", *items, ""])
 
 
 def notes(result: Result) -> Iterator[str]:

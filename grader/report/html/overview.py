@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import fmean, median
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from grader.findings.finding import Status
@@ -18,7 +19,13 @@ from grader.report.model.class_row import ClassRow, RowStatus
 from grader.report.model.result_model import ScenarioPart
 from grader.safe_text import one_line
 
+if TYPE_CHECKING:
+    from grader.review.cluster import Cluster
+
 MOST_DISTURBED = 50
+MOST_CLUSTERS = 30
+MOST_NAMED = 20
+"""Students that are named in one line."""
 _UNGRADED = (RowStatus.NOT_GRADED, RowStatus.UNREADABLE, RowStatus.MISSING)
 
 
@@ -31,11 +38,18 @@ class Column:
     counts: Counter[Status]
 
 
-def render_overview(rows: Sequence[ClassRow]) -> str:
-    """Render the overview of a class; its links are relative to the folder that it lies in."""
+def render_overview(
+    rows: Sequence[ClassRow], clusters: Sequence[Cluster] = (), vanished: Sequence[str] = ()
+) -> str:
+    """Render the overview of a class; its links are relative to the folder that it lies in.
+
+    Args:
+        clusters: Failures with the same cause, the most frequent first.
+        vanished: Students with a review who are not in the class any more.
+    """
     columns = _columns(rows)
     scores = [row.score for row in rows if row.score is not None]
-    most = max((row.result.max_score for row in rows if row.result is not None), default=0.0)
+    most = max((row.result.final_max_score for row in rows if row.result is not None), default=0.0)
     failed = [column for column in columns if column.counts[Status.FAILED]]
     return render_page(
         "overview.html.j2",
@@ -57,6 +71,11 @@ def render_overview(rows: Sequence[ClassRow]) -> str:
         why=_why_ungraded,
         disturbed=_disturbed(rows),
         link=_link,
+        rows_by_id={row.id: row for row in rows},
+        clusters=[one for one in clusters if len(one.lost) > 1][:MOST_CLUSTERS],
+        waiting=[row for row in rows if row.status is RowStatus.WAITING],
+        vanished=vanished,
+        MOST_NAMED=MOST_NAMED,
     )
 
 

@@ -19,7 +19,7 @@ from markupsafe import Markup, escape
 from grader import resources
 from grader.findings.finding import Status
 from grader.findings.wording import counted
-from grader.report.text import explanation, words
+from grader.report.text import additions, explanation, words
 from grader.safe_text import clean, one_line
 
 if TYPE_CHECKING:
@@ -81,7 +81,9 @@ def environment() -> Environment:
     environment.filters["prose"] = prose
     environment.filters["number"] = words.number
     environment.filters["one_line"] = one_line
-    environment.globals.update(Status=Status, counted=counted, explanation=explanation, words=words)
+    environment.globals.update(
+        Status=Status, additions=additions, counted=counted, explanation=explanation, words=words
+    )
     return environment
 
 

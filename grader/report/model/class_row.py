@@ -12,6 +12,8 @@ class RowStatus(str, Enum):
     """Whether a row has a grade, and if not, why."""
 
     GRADED = "graded"
+    WAITING = "waits for a person"
+    """Every check is judged, but not every manual item has its points."""
     NOT_GRADED = "not graded"
     """rosgrade or the machine failed, or the batch has not graded it yet."""
     UNREADABLE = "unreadable"
@@ -46,7 +48,9 @@ class ClassRow:
             return RowStatus.MISSING if self.missing else RowStatus.NOT_GRADED
         if self.result.submission.problem is not None:
             return RowStatus.UNREADABLE
-        return RowStatus.GRADED if self.result.graded else RowStatus.NOT_GRADED
+        if not self.result.graded:
+            return RowStatus.NOT_GRADED
+        return RowStatus.WAITING if self.result.final_score is None else RowStatus.GRADED
 
     @property
     def judged(self) -> tuple[CheckPart, ...]:
@@ -66,6 +70,13 @@ class ClassRow:
         return self.result.final_score if self.result is not None and self.graded else None
 
     @property
+    def waits_for(self) -> tuple[str, ...]:
+        """Titles of the manual items that wait for a person."""
+        if self.status is not RowStatus.WAITING or self.result is None:
+            return ()
+        return tuple(one.title for one in self.result.adjustments if one.points is None)
+
+    @property
     def full(self) -> bool:
         """Whether it got all points."""
         return self.result is not None and self.score == self.result.final_max_score
@@ -77,6 +88,7 @@ class ClassRow:
         found = {
             "full": self.full,
             "lost": self.graded and not self.full,
+            "waiting": self.status is RowStatus.WAITING,
             "ungraded": self.status is RowStatus.NOT_GRADED,
             "unreadable": self.status is RowStatus.UNREADABLE,
             "missing": self.status is RowStatus.MISSING,

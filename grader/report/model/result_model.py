@@ -242,15 +242,26 @@ class Result(_Part):
     @property
     def final_score(self) -> float | None:
         """Points with the adjustments, at least 0; None while they are not complete."""
-        parts = [self.score, *(one.points for one in self.adjustments)]
-        known = [points for points in parts if points is not None]
-        return max(0.0, total(known)) if len(known) == len(parts) else None
+        waits = any(one.points is None for one in self.adjustments)
+        return None if waits else self.known_score
 
     @computed_field  # type: ignore[prop-decorator]
     @property
     def final_max_score(self) -> float:
         """Points that can be had, with those that a person gives."""
         return total((self.max_score, *(one.max_points for one in self.adjustments)))
+
+    @property
+    def known_score(self) -> float | None:
+        """Points as far as they are known: without manual items that wait for a person."""
+        points = (one.points for one in self.adjustments if one.points is not None)
+        return max(0.0, total((self.score, *points))) if self.score is not None else None
+
+    @property
+    def known_max_score(self) -> float:
+        """What :attr:`known_score` could be at most."""
+        known = (one.max_points for one in self.adjustments if one.points is not None)
+        return total((self.max_score, *known))
 
     def of(self, status: Status) -> tuple[CheckPart, ...]:
         """Checks that ended so, in the author's order."""

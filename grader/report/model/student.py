@@ -20,6 +20,7 @@ def for_student(result: Result) -> Result:
     """
     visible = [check for check in result.checks if check.visibility == Visibility.VISIBLE.value]
     hidden = [check for check in result.checks if check.visibility != Visibility.VISIBLE.value]
+    shown = {None, *(check.id for check in visible)}
     if not hidden:
         return result
     judged = {item.scenario for check in visible for item in check.findings}
@@ -39,6 +40,7 @@ def for_student(result: Result) -> Result:
                 for run in result.scenarios
                 if run.id in judged
             ),
+            "adjustments": tuple(one for one in result.adjustments if one.check in shown),
             "attempts": tuple(one.visible for one in result.attempts if one.visible),
         }
     )

@@ -10,6 +10,7 @@ from grader.findings.wording import counted, listing
 from grader.grade import model as grades
 from grader.grade.model import total
 from grader.report.model.result_model import CheckPart, FindingPart, Result
+from grader.report.text import additions
 from grader.report.text.words import ADVICE, counted_points, cut, number
 from grader.safe_text import clean, one_line
 from grader.submission.record import SourceError
@@ -144,10 +145,12 @@ def only_shown(result: Result) -> frozenset[str]:
 
 
 def score(result: Result) -> str:
-    """``7 of 10 points``, or that there is no score."""
-    if result.score is None:
+    """``7 of 10 points``, perhaps with what waits for a person, or that there is no score."""
+    if result.known_score is None:
         return "Not graded"
-    return f"{number(result.score)} of {counted_points(result.max_score)}"
+    waits = additions.waiting(result)
+    points = f"{number(result.known_score)} of {counted_points(result.known_max_score)}"
+    return f"{points}; {waits}" if waits else points
 
 
 def headline(result: Result) -> str:
@@ -157,10 +160,11 @@ def headline(result: Result) -> str:
         len(result.of(status))
         for status in (Status.PASSED, Status.FAILED, Status.SKIPPED, Status.ERROR)
     )
+    full = "Full points for the checks" if result.adjustments else "Full points"
     if not result.graded:
         text = "Something failed in the grader or the machine; no points are lost"
     elif result.score == result.max_score > 0 or passed == every:
-        text = f"{passed} of {every} visible checks passed" if withheld.checks else "Full points"
+        text = f"{passed} of {every} visible checks passed" if withheld.checks else full
         if failed:
             text += f"; {counted(failed, 'check')} without points failed"
     else:

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from grader.findings.finding import Status
 from grader.report.model.result_model import CheckPart, Result
-from grader.report.text import explanation
+from grader.report.text import additions, explanation
 from grader.report.text.words import STATUS, number
 from grader.safe_text import clean, one_line
 
@@ -161,10 +161,14 @@ def _conclude(console: Console, result: Result, before: Result | None = None) ->
         text = f"Not graded. {explanation.headline(result)}"
         console.print(Text(text, "bold magenta"))
         return
-    text = f"Score: {number(result.score or 0.0)} of {number(result.max_score)} points"
-    full = result.score == result.max_score
-    if before is not None and before.graded and before.score != result.score:
-        text = f"{text}, before {number(before.score or 0.0)}"
+    for line in map(additions.line, result.adjustments):
+        console.print(_hanging(console, "", line))
+    for line in map(additions.comment_line, result.comments):
+        console.print(_hanging(console, "comment", line))
+    text = f"Score: {explanation.score(result)}"
+    full = result.final_score == result.final_max_score
+    if before is not None and before.graded and before.known_score != result.known_score:
+        text = f"{text}, before {number(before.known_score or 0.0)}"
     console.print(Text(text, "bold green" if full else "bold"))
     if result.withheld.checks:
         console.print(Text(explanation.headline(result)))

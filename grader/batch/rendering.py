@@ -1,0 +1,95 @@
+"""Reports rendered again from what is stored; nothing is run, and no check ends differently."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+from grader.assignment.load import load_assignment
+from grader.assignment.selection import select, visible_part
+from grader.batch.adjusting import ClassAdjustments
+from grader.batch.batch import Done
+from grader.batch.files import RESULT_FILE, write_report
+from grader.batch.ledger import Ledger
+from grader.batch.regrading import find, regrade, regrade_command, stored_assignment
+from grader.errors import UsageError
+from grader.grade import Grade
+from grader.report.files import write_whole
+from grader.report.model.result import read_result, result_json
+from grader.report.model.result_model import Result
+
+_load = cache(load_assignment)
+
+
+def bring_up_to_date(done: Iterable[Done], ledger: Ledger) -> list[Done]:
+    """Write every report of a class that differs from what is written down about it now.
+
+    That is what a person or a rule of the course adds. A report that cannot be rendered is left as
+    it is, and its row says why; the points of the row count all the same.
+
+    Returns:
+        The rows with the results as they are now.
+    """
+    adjust = ClassAdjustments(ledger)
+    rows = []
+    for row in done:
+        result = adjust(row.result) if row.result is not None else None
+        entry = row.entry
+        if result is not None and not _same_additions(result, row.result):
+            try:
+                render_again(ledger.folder(entry.key), amended=adjust)
+            except UsageError as error:
+                why = f"its report is not up to date: {error}"
+                entry = replace(entry, problem="; ".join(filter(None, (entry.problem, why))))
+        rows.append(replace(row, entry=entry, result=result))
+    return rows
+
+
+def _same_additions(one: Result, other: Result | None) -> bool:
+    parts = [(each.adjustments, each.comments) for each in (one, other) if each is not None]
+    return parts[0] == parts[-1]
+
+
+def render_again(
+    folder: Path,
+    assignment: str | None = None,
+    amended: Callable[[Result], Result] | None = None,
+) -> Result:
+    """Render the report of one submission again from its result and its recordings.
+
+    Args:
+        amended: Gives the result with what is added to it now.
+    """
+    found = find(folder)
+    result = found.result or read_result(folder / RESULT_FILE)
+    loaded = _load(assignment or _stored(folder, result))
+    if loaded.sha256 != result.assignment.sha256:
+        raise UsageError(
+            f"{folder}: the assignment has changed since this was graded. "
+            f"{regrade_command(folder, loaded)} judges again with the new assignment"
+        )
+    shown = visible_part(loaded) if result.withheld.checks else loaded
+    graded = regrade(select(shown, tuple(check.id for check in result.checks)), found)
+    changed = _changed(result, graded.grade)
+    if changed:
+        raise UsageError(
+            f"{folder}: judging again does not give the stored result ({', '.join(changed)}). "
+            f"{regrade_command(folder, loaded)} writes the new result and report"
+        )
+    now = amended(result) if amended is not None else result
+    write_report(graded, folder, now)
+    if now != result:
+        write_whole(folder / RESULT_FILE, result_json(now))
+    return now
+
+
+def _stored(folder: Path, result: Result) -> str:
+    assignment = result.assignment
+    return stored_assignment(folder, assignment.id, assignment.location, "report", str(folder))
+
+
+def _changed(result: Result, grade: Grade) -> list[str]:
+    before = {check.id: check.status for check in result.checks}
+    return [one.id for one in grade.results if before.get(one.id) is not one.status]
