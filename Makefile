@@ -1,4 +1,4 @@
-.PHONY: help setup demo test lint lock bench soak docs clean
+.PHONY: help setup demo test lint lock bench soak docs wheels clean
 
 PYTHON ?= python3
 run := .venv/bin/python
@@ -35,6 +35,10 @@ bench: setup ## measure rosgrade's own overhead
 
 soak: setup ## grade a class of 200 (or N=...) under load, and look for a grade that changes
 	@$(run) -m grader.soak $(if $(N),--students $(N))
+
+wheels: setup ## build both wheels in dist/: rosgrade, and the solutions for instructors
+	@$(run) -m hatchling build -t wheel
+	@cd solutions && ../$(run) -m hatchling build -t wheel -d ../dist
 
 docs: setup ## regenerate docs/, and build the site in build/site
 	@$(run) -m grader.docs

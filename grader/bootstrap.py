@@ -1,4 +1,4 @@
-"""Make rosgrade's environment: `python3 -m grader.bootstrap` in a checkout.
+"""Make rosgrade's environment: `python3 -m grader.bootstrap` in a checkout, or `setup.sh` in a kit.
 
 Runs on the machine's own python3 before anything is installed, so it uses only the standard
 library and syntax that any python3 parses: one that is too old still says what to install.
@@ -85,8 +85,8 @@ def plan(
         )
     if not distro and platform != WHEELS_PLATFORM:
         raise SetupError(
-            f"{jazzy} comes as wheels for {WHEELS_PLATFORM} only and this is {platform}: install "
-            f"{jazzy} here, source it and try again"
+            f"{jazzy} comes as wheels for {WHEELS_PLATFORM} only and this is {platform}: source "
+            f"{jazzy} and try again, or use a container that has it, such as ros:{DISTRO}"
         )
     wanted = (ros_python,) if distro else SUPPORTED
     seen: List[str] = []
@@ -162,6 +162,9 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
     """Bring the environment in `root` up to date; quick when it already is.
 
     Nothing half-made is left, only perhaps a whole environment that waits for rosgrade itself.
+
+    Args:
+        root: A checkout, or a course kit, which has a wheel of rosgrade in the place of sources.
     """
     lock_text = (root / "requirements.lock").read_text(encoding="utf-8")
     chosen = plan(
@@ -178,8 +181,9 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
         "lock": _digest(lock_text),
         "pyproject": "",
     }
-    pyproject = _digest((root / "pyproject.toml").read_text(encoding="utf-8"))
-    wanted = {**without_rosgrade, "pyproject": pyproject}
+    is_kit = not (root / "pyproject.toml").exists()
+    source = max(root.glob("rosgrade-*.whl")) if is_kit else root / "pyproject.toml"
+    wanted = {**without_rosgrade, "pyproject": hashlib.sha256(source.read_bytes()).hexdigest()}
     venv = root / VENV
     with _alone(root):
         installed = _read_stamp(venv)
@@ -201,7 +205,8 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
         # Only now, so that an interrupted set-up is not taken for a finished one.
         _write_stamp(venv, without_rosgrade)
         _say("installing rosgrade itself")
-        options = ["--no-deps", "--no-build-isolation", "--editable", str(root)]
+        itself = ["--force-reinstall", str(source)] if is_kit else ["--editable", str(root)]
+        options = ["--no-deps", "--no-build-isolation", *itself]
         _pip(venv, options, "rosgrade itself could not be installed")
         _write_stamp(venv, wanted)
         if chosen.ros == "wheels":
@@ -209,10 +214,10 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
     _say(f"ready: {VENV}/bin/rosgrade --help")
 
 
-def main() -> int:
-    """Set up the checkout that this file lies in; return the exit code."""
+def main(root: Optional[str] = None) -> int:
+    """Set up a course kit, or the checkout that this file lies in; return the exit code."""
     try:
-        set_up(Path(__file__).resolve().parent.parent, os.environ)
+        set_up(Path(root or Path(__file__).parent.parent).resolve(), os.environ)
     except SetupError as error:
         print(error, file=sys.stderr)
         return 2

@@ -6,16 +6,15 @@ import io
 import re
 import shutil
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from grader import resources
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.mutant import LANGUAGES
-from grader.assignment.selection import visible_part
 from grader.errors import UsageError
 from grader.report.files import refuse_inputs, refuse_part, write_whole
+from grader.visible_files import files_in, grading_files, visible_files
 
 _CHECKOUT = ("pyproject.toml", "requirements.lock", "README.md", "LICENSE")
 _PACKAGES = ("grader", "sim", "templates")
@@ -38,7 +37,7 @@ def gradescope(loaded: LoadedAssignment, out: Path) -> Path:
     members = {
         "setup.sh": _template("gradescope-setup.sh", loaded, executable=True),
         "run_autograder": _template("gradescope-run_autograder", loaded, executable=True),
-        **_rosgrade(loaded),
+        **_rosgrade(loaded, grading_files(loaded)),
     }
     file = out / f"gradescope-{loaded.assignment.id}.zip"
     refuse_part(file, loaded.folder, f"the assignment in {loaded.folder}")
@@ -51,22 +50,22 @@ def classroom50(loaded: LoadedAssignment, out: Path) -> Path:
 
     Everybody who knows the classroom's address can read its files, so it holds no hidden check.
     """
-    _refuse_hidden(loaded, "everybody can read the files of a Classroom 50 autograder")
     folder = out / f"classroom50-{loaded.assignment.id}"
     refuse_part(folder, loaded.folder, f"the assignment in {loaded.folder}")
     members = {
         "autograder.py": _template("classroom50-autograder.py", loaded),
-        **_rosgrade(loaded),
+        **_rosgrade(loaded, visible_files(loaded)),
     }
     shutil.rmtree(folder, ignore_errors=True)
-    _write_members(folder, members)
+    write_members(folder, members)
     return folder
 
 
 def github(loaded: LoadedAssignment, out: Path, action: str) -> Path:
     """Write the workflow that goes into a template repository.
 
-    An assignment that is not one of rosgrade's own is copied beside it, without its solution.
+    An assignment that is not one of rosgrade's own is copied beside it, without its solution and
+    its hidden checks.
     """
     if not _ACTION.fullmatch(action):
         raise UsageError(
@@ -75,27 +74,22 @@ def github(loaded: LoadedAssignment, out: Path, action: str) -> Path:
     refuse_inputs([out], [loaded.folder])
     name = loaded.assignment.id
     if loaded.folder.resolve().parent != resources.assignments().resolve():
-        _refuse_hidden(loaded, "students can read the files of their repository")
         name = f".github/rosgrade/{loaded.assignment.id}"
-        for inside, path in _assignment(loaded).items():
-            write_whole(out / name / inside, path.read_bytes())
+        for inside, content in visible_files(loaded).items():
+            write_whole(out / name / inside, content)
     text = _read_template("github-workflow.yml", name)
     file = out / ".github" / "workflows" / "rosgrade.yml"
     write_whole(file, text.replace("@ACTION@", action))
     return file
 
 
-def _refuse_hidden(loaded: LoadedAssignment, why: str) -> None:
-    hidden = visible_part(loaded).withheld.checks
-    if hidden:
-        raise UsageError(
-            f"the assignment {loaded.assignment.id!r} has checks that are not visible ({hidden}), "
-            f"and {why}: export a copy without them, and grade with them yourself"
-        )
+def _rosgrade(loaded: LoadedAssignment, files: Mapping[str, bytes]) -> dict[str, Member]:
+    members = checkout({loaded.assignment.id: files})
+    return {f"{_OWN_FOLDER}/{name}": member for name, member in members.items()}
 
 
-def _rosgrade(loaded: LoadedAssignment) -> dict[str, Member]:
-    """A checkout of rosgrade with one assignment: what its own set-up needs."""
+def checkout(assignments: Mapping[str, Mapping[str, bytes]]) -> dict[str, Member]:
+    """A checkout of rosgrade with these assignments' files: what its own set-up needs."""
     root = resources.root()
     missing = [name for name in _CHECKOUT if not (root / name).is_file()]
     if missing:
@@ -105,34 +99,16 @@ def _rosgrade(loaded: LoadedAssignment) -> dict[str, Member]:
         )
     paths = {name: root / name for name in _CHECKOUT}
     for package in _PACKAGES:
-        for path in _files(root / package):
+        for path in files_in(root / package):
             paths[path.relative_to(root).as_posix()] = path
-    for inside, path in _assignment(loaded).items():
-        paths[f"assignments/{loaded.assignment.id}/{inside}"] = path
-    return {
-        f"{_OWN_FOLDER}/{name}": Member(path.read_bytes(), path.stat().st_mode & 0o100 != 0)
-        for name, path in sorted(paths.items())
+    members = {
+        name: Member(path.read_bytes(), path.stat().st_mode & 0o100 != 0)
+        for name, path in paths.items()
     }
-
-
-def _assignment(loaded: LoadedAssignment) -> dict[str, Path]:
-    """The files of an assignment that grading needs: without its solution and its mutants."""
-    solutions = {name for one in LANGUAGES for name in (one.mutants, one.reference)}
-    found = {path.relative_to(loaded.folder): path for path in _files(loaded.folder)}
-    return {
-        inside.as_posix(): path
-        for inside, path in found.items()
-        if inside.parts[0] not in solutions
-    }
-
-
-def _files(folder: Path) -> Iterator[Path]:
-    """Every file in a folder, without caches and hidden ones, sorted."""
-    for path in sorted(folder.rglob("*")):
-        inside = path.relative_to(folder).parts
-        ignored = any(part.startswith(".") or part == "__pycache__" for part in inside)
-        if path.is_file() and not ignored:
-            yield path
+    for assignment, files in assignments.items():
+        for inside, content in files.items():
+            members[f"assignments/{assignment}/{inside}"] = Member(content)
+    return dict(sorted(members.items()))
 
 
 def _template(name: str, loaded: LoadedAssignment, *, executable: bool = False) -> Member:
@@ -155,7 +131,8 @@ def _zipped(members: Mapping[str, Member]) -> bytes:
     return stream.getvalue()
 
 
-def _write_members(folder: Path, members: Mapping[str, Member]) -> None:
+def write_members(folder: Path, members: Mapping[str, Member]) -> None:
+    """Write the files of an export into a folder."""
     for name, member in members.items():
         write_whole(folder / name, member.content)
         if member.executable:

@@ -129,7 +129,7 @@ def test_the_missing_python_of_a_sourced_jazzy_is_named() -> None:
 
 
 def test_a_platform_without_wheels_needs_a_sourced_ros() -> None:
-    with pytest.raises(SetupError, match="this is linux-aarch64: install ROS 2 Jazzy"):
+    with pytest.raises(SetupError, match="this is linux-aarch64: source ROS 2 Jazzy"):
         bootstrap.plan({}, pythons("3.11"), "linux-aarch64")
 
 

@@ -177,11 +177,11 @@ def test_the_solution_does_not_go_where_submissions_are_graded(tmp_path, kind):
 def test_hidden_checks_do_not_go_where_students_can_read_them(tmp_path, kind):
     hidden = lesson(tmp_path, HIDDEN)
     out = tmp_path / "out"
-    with pytest.raises(UsageError, match=r"'lesson' has checks that are not visible \(1\), and"):
-        export.github(hidden, out, "c/r@v1") if kind == "github" else export.classroom50(
-            hidden, out
-        )
-    assert not out.exists()
+    export.github(hidden, out, "c/r@v1") if kind == "github" else export.classroom50(hidden, out)
+    files = [path for path in out.rglob("lesson/*") if path.is_file()]
+    assert [path.name for path in files] == ["assignment.yaml"]
+    assert "secret" not in files[0].read_text(encoding="utf-8")
+    assert load_assignment(files[0]).withheld.checks == 1
 
 
 @pytest.mark.parametrize("action", ["rosgrade", "a/b", "a/b@v1\n  evil: 1", ""])

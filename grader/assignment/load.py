@@ -134,7 +134,9 @@ def load_assignment(
         raise AssignmentError(file, in_order(found))
     digest = folder_sha256(file.parent) if file.name == ASSIGNMENT_FILE else _sha256(file)
     assignment, bound = with_runs(assignment, bound)
-    return LoadedAssignment(assignment, file, digest, bound, values=values, source=written)
+    return LoadedAssignment(
+        assignment, file, digest, bound, assignment.withheld, values=values, source=written
+    )
 
 
 def bound_checks(

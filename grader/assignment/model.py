@@ -6,7 +6,6 @@ renders them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Literal
 
@@ -82,16 +81,15 @@ SHOWN_FROM = tuple(Visibility)
 """Earliest first; the order in which students get to see checks."""
 
 
-@dataclass(frozen=True)
-class Withheld:
+class Withheld(Model):
     """Number and points of the checks that a student does not see yet."""
 
-    checks: int = 0
-    points: float = 0.0
+    checks: int = Field(0, ge=0, description="Number of the checks.")
+    points: float = Field(0.0, ge=0, description="Their points.")
 
     def __add__(self, other: Withheld) -> Withheld:
         """Both together."""
-        return Withheld(self.checks + other.checks, self.points + other.points)
+        return Withheld(checks=self.checks + other.checks, points=self.points + other.points)
 
 
 NOTHING_WITHHELD = Withheld()
@@ -465,4 +463,9 @@ class Assignment(Model):
     )
     points: float | None = Field(
         None, ge=0, description="Sum of the points of all checks. If given, rosgrade verifies it."
+    )
+    withheld: Withheld = Field(
+        NOTHING_WITHHELD,
+        description="Hidden checks that are not in this file: `rosgrade export` writes it into "
+        "the copy for students.",
     )

@@ -254,7 +254,8 @@ def reference_of(assignment: str, folder: Path | None = None, language: Language
         if place.is_dir():
             return place
     listed = " or ".join(map(str, places))
-    raise UsageError(f"the assignment {assignment!r} has no reference solution: {listed}")
+    advice = "" if resources.reference().is_dir() else "; install rosgrade-solutions"
+    raise UsageError(f"the assignment {assignment!r} has no reference solution: {listed}{advice}")
 
 
 def load_mutants(

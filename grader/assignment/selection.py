@@ -81,7 +81,7 @@ def visible_part(loaded: LoadedAssignment) -> LoadedAssignment:
             f"assignment {loaded.assignment.id!r} has no visible check: everything is judged at "
             "grading, with --hidden"
         )
-    withheld = Withheld(len(hidden), math.fsum(spec.points for spec in hidden))
+    withheld = Withheld(checks=len(hidden), points=math.fsum(spec.points for spec in hidden))
     part = select(loaded, tuple(spec.id for spec in visible))
     return dataclasses.replace(part, withheld=loaded.withheld + withheld)
 

@@ -10,7 +10,7 @@ import gzip
 import hashlib
 import json
 import zlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -64,11 +64,20 @@ def write_references(loaded: LoadedAssignment, recordings: Mapping[str, Recordin
     }
     if not runs:
         return None
-    text = json.dumps({"schema": SCHEMA, "scenarios": runs}, separators=(",", ":"), sort_keys=True)
     file = loaded.folder / REFERENCE_FILE
-    # Without the time of writing, so that the same runs are the same bytes.
-    write_whole(file, gzip.compress(text.encode(), mtime=0))
+    write_whole(file, _packed(runs))
     return file
+
+
+def only_scenarios(file: Path, scenarios: Collection[str]) -> bytes:
+    """The content of such a file with the runs of these scenarios alone."""
+    return _packed({name: run for name, run in _read(file).items() if name in scenarios})
+
+
+def _packed(runs: Mapping[str, Any]) -> bytes:
+    text = json.dumps({"schema": SCHEMA, "scenarios": runs}, separators=(",", ":"), sort_keys=True)
+    # Without the time of writing, so that the same runs are the same bytes.
+    return gzip.compress(text.encode(), mtime=0)
 
 
 def fingerprint(loaded: LoadedAssignment, scenario: Scenario) -> str:

@@ -22,7 +22,7 @@ def list_command() -> None:
         table.add_column(column, justify="right" if side == "right" else "left")
     for name in list_assignments():
         loaded = load_assignment(name)
-        points = sum(bound.spec.points for bound in loaded.checks)
+        points = sum(one.spec.points for one in loaded.checks) + loaded.withheld.points
         table.add_row(name, f"{points:g}", loaded.assignment.title)
     output_console().print(table)
 

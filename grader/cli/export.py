@@ -81,6 +81,34 @@ def classroom50(assignment: AssignmentName, out: Folder = Path()) -> None:
 
 
 @app.command()
+def course(
+    assignments: Annotated[
+        list[str], typer.Argument(metavar="ID...", help="Ids of assignments, or their folders.")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="A new folder, or an earlier kit.")],
+    title: Annotated[str, typer.Option(help="Name of the course.")] = "ROS 2 assignments",
+    tag: Annotated[
+        str,
+        typer.Option(
+            metavar="PATTERN",
+            help="On GitHub, grade only when such a tag is pushed, as `submit*`; by default "
+            "every push.",
+        ),
+    ] = "",
+) -> None:
+    """Write a course kit: what you give to students.
+
+    It holds rosgrade, the assignments without solutions and hidden checks, a set-up command, a
+    GitHub workflow, a devcontainer, and a README.
+    """
+    from grader.assignment.load import load_assignment
+    from grader.course_kit import write_kit
+
+    kit = write_kit([load_assignment(name) for name in assignments], out, title, tag)
+    say(f"Give this folder to your students, for example as a template repository: {kit}")
+
+
+@app.command()
 def csv(out: Results, output: File = Path("grades.csv"), zero: ZeroFor = None) -> None:
     """Write a CSV with a row for each submission and a column for each check.
 

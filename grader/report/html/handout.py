@@ -40,9 +40,9 @@ def make_handout(loaded: LoadedAssignment) -> Handout:
         text = file.read_text(encoding="utf-8") if file.is_file() else ""
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"{file} cannot be read: {error}") from error
-    all_points = total(bound.spec.points for bound in loaded.checks)
+    all_points = total((*(one.spec.points for one in loaded.checks), loaded.withheld.points))
     here = total(bound.spec.points for bound in visible)
-    hidden = len(loaded.checks) - len(visible)
+    hidden = len(loaded.checks) - len(visible) + loaded.withheld.checks
     words = f"{counted_points(all_points)} in all"
     if hidden:
         more = counted_points(total((all_points, -here)))
