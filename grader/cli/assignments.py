@@ -23,6 +23,7 @@ def list_command() -> None:
     for name in list_assignments():
         loaded = load_assignment(name)
         points = sum(one.spec.points for one in loaded.checks) + loaded.withheld.points
+        points += sum(item.points for item in loaded.assignment.manual)
         table.add_row(name, f"{points:g}", loaded.assignment.title)
     output_console().print(table)
 
@@ -68,6 +69,8 @@ def show(
     table.add_column("POINTS", justify="right")
     for bound in handout.checks:
         table.add_row(bound.spec.id, bound.title, f"{bound.spec.points:g}")
+    for item in handout.manual:
+        table.add_row(item.id, f"{item.title} (by a person)", f"{item.points:g}")
     console.print(table)
     console.print(handout.total)
     note = absence_note(handout.text)

@@ -20,7 +20,9 @@ _NAMES = re.compile(r"(`|\"|(?<!\w)')(.*?)\1(?!\w)")
 _FILE = re.compile(r"[\w./-]*?([\w-]+\.(?:py|xml|cfg|txt|toml|ya?ml|[ch](?:pp)?|cc))(?::\d+)*\b")
 _ONE = re.compile(r"\b1 ([a-z]{4,})\b(?P<of> of \d+)?(?: (was|is|has|differs)\b)?")
 _MANY = {"was": " were", "is": " are", "has": " have", "differs": " differ"}
-_NUMBER = re.compile(r"(?<![\w.…])[-+]?\d[\d.,/e+-]*(?<![.,])(?: (?:ns|us|ms|s|min|h)\b)?")
+_NUMBER = re.compile(
+    r"(?<![\w.…])[-+]?\d[\d.,/e+-]*(?<![.,])(?: (?:[num]?s|min|h|[mck]?m)(?![\w/]))?"
+)
 
 
 def cause(check: CheckPart) -> str:

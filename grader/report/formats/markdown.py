@@ -123,7 +123,7 @@ def _table(result: Result) -> str:
 def added(result: Result) -> Iterator[str]:
     """What persons and the rules of the course add, a block for each kind."""
     kinds = {
-        "Added to the checks": map(additions.line, result.adjustments),
+        "In addition to the checks": map(additions.line, result.adjustments),
         "Comments": map(additions.comment_line, result.comments),
     }
     for title, lines in kinds.items():

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from grader.assignment.binding import BoundCheck
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.model import Visibility
+from grader.assignment.model import ManualItem, Visibility
 from grader.errors import UsageError
 from grader.findings.wording import counted
 from grader.grade.model import total
@@ -23,12 +23,13 @@ HANDOUT_FILE = "README.md"
 
 @dataclass(frozen=True)
 class Handout:
-    """What a student is given: Markdown, visible checks, and in words what they give."""
+    """What a student is given: Markdown, visible checks, manual items, and what they give."""
 
     id: str
     title: str
     text: str
     checks: tuple[BoundCheck, ...]
+    manual: tuple[ManualItem, ...]
     total: str
 
 
@@ -49,7 +50,11 @@ def make_handout(loaded: LoadedAssignment) -> Handout:
         checks = counted(hidden, "more check")
         words += f": {counted_points(here)} here, and {more} for {checks} at grading"
     assignment = loaded.assignment
-    return Handout(assignment.id, assignment.title, text, visible, f"{words}.")
+    words += "."
+    if assignment.manual:
+        more = counted_points(total(item.points for item in assignment.manual))
+        words += f" A person gives up to {more} in addition."
+    return Handout(assignment.id, assignment.title, text, visible, assignment.manual, total=words)
 
 
 def render_handout(handout: Handout) -> str:
