@@ -40,6 +40,12 @@ def attempts_of(
     return tuple(part.model_copy(update={"visible": copy}) for part, copy in pairs)
 
 
+def read_earlier(folder: Path) -> dict[str, Result]:
+    """Earlier results in the folder of a report by the submission's hash, oldest first."""
+    files = sorted((folder / EARLIER).glob(f"{RESULT_FILE.removesuffix('.json')}-*.json"))
+    return {one.submission.sha256: one for one in _read(files)}
+
+
 def with_history(folder: Path, result: Result) -> Result:
     """A new result with the attempts that were graded in the folder of its report.
 

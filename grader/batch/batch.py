@@ -45,11 +45,15 @@ class Done:
 
 @dataclass
 class Batch:
-    """Grades the rows of a class into a folder; ``retry`` holds keys, ``all`` or ``errors``."""
+    """Grades the rows of a class into a folder.
+
+    ``retry`` holds keys, ``all`` or ``errors``; ``course`` is the path of the rules, if any.
+    """
 
     loaded: LoadedAssignment
     ledger: Ledger
     retry: frozenset[str] = frozenset()
+    course: str | None = None
     _entries: dict[str, Entry] = field(default_factory=dict)
     _twins: dict[str, list[str]] = field(default_factory=dict)
     _given: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -58,7 +62,7 @@ class Batch:
         self, rows: Sequence[HandedIn], on_read: Callable[[str], None] = lambda _: None
     ) -> tuple[list[Entry], dict[str, Path]]:
         """Read what was handed in, and find identical submissions."""
-        self._refuse_other()
+        earlier = self._earlier()
         unknown = self.retry - {RETRY_ALL, RETRY_ERRORS} - {row.key for row in rows}
         if unknown:
             name = min(unknown)
@@ -78,10 +82,20 @@ class Batch:
             self._given[row.key] = {name: value for name, value in given.items() if value}
             team = teams.get(row.key, "")
             entry = Entry(
-                row.key, row.name, row.late, problem=row.problem, fault=row.fault, team=team
+                row.key,
+                row.name,
+                row.late,
+                problem=row.problem,
+                fault=row.fault,
+                team=team,
+                handed_in=row.time[0],
+                handed_in_from=row.time[1],
+                attempt_of=row.attempt_of,
             )
             if row.path is not None:
                 entry = self._identified(replace(entry, source=str(row.path.resolve())), row.path)
+                before = earlier[row.key].history if row.key in earlier else {}
+                entry = replace(entry, history={**before, entry.sha256: row.time})
                 distinct = entry.sha256 in ("", NO_FILES)
                 same = (entry.sha256, str(self._given[row.key]))
                 original = row.key if distinct else first.setdefault(same, row.key)
@@ -152,14 +166,17 @@ class Batch:
             return False
         return not (RETRY_ERRORS in self.retry and not result.graded)
 
-    def _refuse_other(self) -> None:
+    def _earlier(self) -> dict[str, Entry]:
+        """The rows as an earlier batch wrote them."""
         try:
-            name = self.ledger.read().assignment
+            written = self.ledger.read()
         except UsageError:
             # There is none yet, or it is damaged; it is written again from the class.
-            return
+            return {}
+        name = written.assignment
         if name != self.loaded.assignment.id:
             raise UsageError(f"{self.ledger.out}: holds the grades of {name}; use a new folder")
+        return {entry.key: entry for entry in written.entries}
 
     def _refuse_changed(self, keys: Iterable[str]) -> None:
         changed = sorted(key for key in keys if not self._is_of_this_version(key))
@@ -236,9 +253,8 @@ class Batch:
 
     def _write(self) -> None:
         loaded = self.loaded
-        self.ledger.write(
-            self._entries.values(), loaded.assignment.id, loaded.sha256, loaded.location
-        )
+        version = (loaded.assignment.id, loaded.sha256, loaded.location)
+        self.ledger.write(self._entries.values(), *version, self.course)
 
 
 def _teams(rows: Sequence[HandedIn]) -> dict[str, str]:

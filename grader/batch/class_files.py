@@ -56,7 +56,7 @@ def _original(entry: Entry) -> str:
 
 
 def _hand(entry: Entry) -> str:
-    return entry.team or entry.key
+    return entry.attempt_of or entry.team or entry.key
 
 
 def _note(done: Done, same: Sequence[Entry]) -> str:
@@ -90,7 +90,8 @@ def standing(ledger: Ledger, entry: Entry) -> Done:
 def class_rows(done: Sequence[Done], ledger: Ledger | None = None) -> list[ClassRow]:
     """The rows of a class as the overview shows them, sorted by key."""
     noted = notes(done)
-    rows = sorted(done, key=lambda item: item.entry.key)
+    own = (item for item in done if not item.entry.attempt_of)
+    rows = sorted(own, key=lambda item: item.entry.key)
     return [
         ClassRow(
             id=item.entry.key,
@@ -160,9 +161,7 @@ def read_class(out: Path) -> list[ClassRow]:
     if (out / BATCH_FILE).is_file():
         ledger = Ledger(out)
         adjust = ClassAdjustments(ledger)
-        rows = [standing(ledger, entry) for entry in ledger.read().entries]
-        return class_rows(
-            [replace(row, result=row.result and adjust(row.result)) for row in rows], ledger
-        )
+        rows = (standing(ledger, entry) for entry in ledger.read().entries)
+        return class_rows([adjust.row(row) for row in rows], ledger)
     results = (for_class(read_result(folder / RESULT_FILE)) for folder in folders)
     return class_rows([Done(Entry(one.submission.id), one, fresh=False) for one in results])

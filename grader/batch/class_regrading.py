@@ -74,7 +74,8 @@ def regrade_class(
         else:
             yield Regraded(Done(entry, None, fresh=False), None)
     if only is None:
-        ledger.write(entries, loaded.assignment.id, loaded.sha256, loaded.location)
+        version = (loaded.assignment.id, loaded.sha256, loaded.location)
+        ledger.write(entries, *version, written.course)
 
 
 def _regrade(

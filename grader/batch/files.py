@@ -16,7 +16,7 @@ from grader.report.html.report import render_report
 from grader.report.model.facts import Clock, RunFacts
 from grader.report.model.result import make_result, result_json
 from grader.report.model.result_model import Result
-from grader.report.model.student import for_student
+from grader.report.model.student import VISIBLE_ONLY, for_student
 
 REPORT_FILE = "report.html"
 STUDENT_FILE = "student-report.html"
@@ -55,17 +55,20 @@ def write_graded(
     return result
 
 
-def write_report(graded: Graded, folder: Path, result: Result) -> None:
+def write_report(
+    graded: Graded, folder: Path, result: Result, visible: frozenset[str] = VISIBLE_ONLY
+) -> None:
     """Write ``report.html``, and a Foxglove layout beside the recordings.
 
-    Where checks are hidden, the copy that a student may see is written too.
+    Where checks are hidden, the copy that a student may see is written too; ``visible`` are the
+    visibilities in it.
     """
     if graded.recordings and (folder / RECORDINGS_FOLDER).is_dir():
         layout = render_layout(graded.recordings.values())
         write_whole(folder / RECORDINGS_FOLDER / LAYOUT_FILE, layout)
     whole = render_report(graded.grade, result, graded.recordings, graded.references)
     write_whole(folder / REPORT_FILE, whole)
-    copy, file = for_student(result), folder / STUDENT_FILE
+    copy, file = for_student(result, visible), folder / STUDENT_FILE
     if copy is result:
         file.unlink(missing_ok=True)
     else:

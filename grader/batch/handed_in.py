@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -12,6 +13,7 @@ from grader.submission.read.manifest import MANIFEST
 
 # Archives that cannot be read; they are rows all the same, with this as their reason.
 FOREIGN = (".rar", ".7z")
+_ATTEMPT = re.compile(r"attempt[-_ ]?(\d{1,4})(?!\d)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,9 @@ class HandedIn:
         name: The student's, as people write it, or empty.
         problem: Why there is nothing to grade, or what the instructor should look at.
         columns: What the roster says of the student, by header in lower case.
+        time: When it was handed in, as in :mod:`~grader.batch.hand_in_time`.
+        earlier: Earlier attempts that lie beside it, first to last.
+        attempt_of: Key of the student's row, where this is an earlier attempt.
     """
 
     key: str
@@ -33,6 +38,9 @@ class HandedIn:
     problem: str = ""
     fault: str = ""
     columns: Mapping[str, str] = field(default_factory=dict, compare=False)
+    time: tuple[str, str] = ("", "")
+    earlier: tuple[Path, ...] = ()
+    attempt_of: str = ""
 
 
 @dataclass(frozen=True)
@@ -45,12 +53,17 @@ class Entry:
     name: str = ""
     late: bool = False
     fault: str = ""
+    time: tuple[str, str] = ("", "")
+    attempts: tuple[Path, ...] = ()
 
 
 def row_of(entry: Entry) -> HandedIn:
     """The row of an entry, before a roster says whose it is."""
-    path = None if entry.fault else _archive_in(entry.path) or entry.path
-    return HandedIn(entry.key, path, entry.name, entry.late, fault=entry.fault)
+    last = (*entry.attempts, entry.path)[max(0, len(entry.attempts) - 1)]
+    path = None if entry.fault else _archive_in(last) or last
+    row = HandedIn(entry.key, path, entry.name, entry.late, fault=entry.fault)
+    earlier = tuple(_archive_in(each) or each for each in entry.attempts[:-1])
+    return replace(row, time=entry.time, earlier=earlier)
 
 
 def stem_of(item: Path) -> str:
@@ -76,6 +89,19 @@ def _archive_in(folder: Path) -> Path | None:
     except OSError:
         # Reading it fails later, with its reason.
         return None
+
+
+def attempts_in(folder: Path) -> tuple[Path, ...]:
+    """The attempts in the folder of a student, by their numbers; none if it holds other things."""
+    try:
+        inside = [item for item in folder.iterdir() if not is_ignored(item)]
+    except OSError:
+        return ()
+    matches = {item: _ATTEMPT.match(item.name) for item in inside}
+    numbers = {item: int(match[1]) for item, match in matches.items() if match}
+    plain = all(item.is_dir() or item.name.lower().endswith(SUFFIXES) for item in inside)
+    complete = plain and len(set(numbers.values())) == len(inside)
+    return tuple(sorted(numbers, key=numbers.__getitem__)) if complete else ()
 
 
 def only_archive(files: Mapping[str, Path]) -> Path | None:

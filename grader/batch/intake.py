@@ -12,10 +12,13 @@ from typing import Any
 
 import yaml
 
+from grader.batch.groups import with_groups
+from grader.batch.hand_in_time import of_metadata, timed
 from grader.batch.handed_in import (
     FOREIGN,
     Entry,
     HandedIn,
+    attempts_in,
     is_ignored,
     only_archive,
     row_of,
@@ -24,6 +27,7 @@ from grader.batch.handed_in import (
 )
 from grader.batch.roster import Roster, Student
 from grader.batch.roster_match import matched, unique
+from grader.course.load import Course
 from grader.errors import GraderFault, RosgradeError, SubmissionError, UsageError
 from grader.submission.git import run_git
 from grader.submission.intake.archive import SUFFIXES, unpack
@@ -52,20 +56,28 @@ def take_in(
     on_left_out: Callable[[str], None] = lambda _: None,
     out: Path | None = None,
     on_prefix: Callable[[str], None] = lambda _: None,
+    course: Course | None = None,
 ) -> list[HandedIn]:
-    """Find out who handed in what."""
+    """Find out who handed in what, and when."""
     folder = _opened(source, staging)
     _refuse_single(folder, source)
     entries = list(_entries(folder, staging, on_left_out, out))
     if not entries:
         raise UsageError(f"{source}: holds no submission; expected one folder or archive for each")
-    if roster is None:
-        return unique([row_of(item) for item in entries])
-    return unique(matched(entries, roster, on_prefix))
+    rows = matched(entries, roster, on_prefix) if roster else [row_of(item) for item in entries]
+    return _complete(rows, staging, course)
+
+
+def _complete(rows: list[HandedIn], staging: Path, course: Course | None) -> list[HandedIn]:
+    return unique(timed(with_groups(unique(rows), course), staging))
 
 
 def take_in_roster(
-    roster: Roster, base: Path, staging: Path, on_taken: Callable[[str], None] = lambda _: None
+    roster: Roster,
+    base: Path,
+    staging: Path,
+    on_taken: Callable[[str], None] = lambda _: None,
+    course: Course | None = None,
 ) -> list[HandedIn]:
     """Take in what a roster itself names, as paths or URLs of git repositories."""
     if not any(student.submission for student in roster.students):
@@ -82,7 +94,7 @@ def take_in_roster(
         if _REPOSITORY.match(student.submission):
             cloned.setdefault(student.submission, row)
         on_taken(student.key)
-    return unique(rows)
+    return _complete(rows, staging, course)
 
 
 def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn | None) -> HandedIn:
@@ -172,7 +184,8 @@ def _entries(
         elif item.is_dir() or item.name.lower().endswith((*SUFFIXES, *FOREIGN)):
             stem = stem_of(item)
             moodle = _MOODLE.fullmatch(stem)
-            yield Entry(shown(stem), item, (moodle["name"] if moodle else stem,))
+            names = (moodle["name"] if moodle else stem,)
+            yield Entry(shown(stem), item, names, attempts=attempts_in(item))
         else:
             on_left_out(shown(item.name))
     for files in canvas.values():
@@ -183,6 +196,9 @@ def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> Entry:
     match = files[0][1]
     named = _names(files)
     path, fault = only_archive(named), ""
+    attempts = _attempts(files) if path is None else ()
+    if attempts:
+        path = attempts[-1]
     if path is None:
         path = staging / f"canvas-{match['user']}"
         fault = _gather(named, path)
@@ -193,7 +209,20 @@ def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> Entry:
         (match["user"], match["name"]),
         late=late,
         fault=fault,
+        attempts=attempts,
     )
+
+
+def _attempts(files: list[tuple[Path, re.Match[str]]]) -> tuple[Path, ...]:
+    """The archives, where all are one that was handed in again: ``ws.zip``, ``ws-1.zip``."""
+    numbers: dict[str, dict[int, Path]] = {}
+    for file, named in files:
+        again = _AGAIN.search(named["file"])
+        if named["file"].lower().endswith(SUFFIXES):
+            number = int(again[0][1:]) if again else 0
+            numbers.setdefault(_AGAIN.sub("", named["file"]), {})[number] = file
+    (found, *others) = numbers.values() or ({},)
+    return tuple(found[at] for at in sorted(found)) if len(found) > 1 and not others else ()
 
 
 def _names(files: list[tuple[Path, re.Match[str]]]) -> dict[str, Path]:
@@ -251,7 +280,9 @@ def _of_gradescope(item: Path, about: Any) -> Iterator[Entry]:
     submitters = about.get(":submitters") if isinstance(about, dict) else None
     listed = submitters if isinstance(submitters, list) else []
     people = [person for person in listed if isinstance(person, dict)]
+    time = of_metadata(about) if isinstance(about, dict) else ("", "")
     for person in people or [{}]:
         values = (person.get(field) for field in (":sid", ":email", ":name"))
         names = tuple(str(value) for value in values if value) or (item.name,)
-        yield Entry(shown(names[0]), item, names, shown(str(person.get(":name") or "")))
+        entry = Entry(shown(names[0]), item, names, shown(str(person.get(":name") or "")))
+        yield replace(entry, time=time)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import fcntl
 import json
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -44,6 +44,10 @@ class Entry:
         fault: Why it could not be graded, where not even a result could be written.
         team: Key of the first of those who handed it in together, or empty for one alone.
         source: Path of what was handed in, as it lay when it was read; may be gone by now.
+        handed_in: ISO 8601, without an offset where its source has none; or empty.
+        handed_in_from: What tells it, such as ``Gradescope's metadata``.
+        attempt_of: Key of the student's row, where this is an earlier attempt beside it.
+        history: Of each submission of the row so far, by its hash: handed_in and handed_in_from.
     """
 
     key: str
@@ -55,6 +59,10 @@ class Entry:
     fault: str = ""
     team: str = ""
     source: str = ""
+    handed_in: str = ""
+    handed_in_from: str = ""
+    attempt_of: str = ""
+    history: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     @property
     def review_key(self) -> str:
@@ -64,11 +72,12 @@ class Entry:
 
 @dataclass(frozen=True)
 class BatchRows:
-    """The assignment and the rows of a batch."""
+    """The assignment and the rows of a batch; ``course`` is the path of the rules, if any."""
 
     assignment: str
     location: str | None
     entries: tuple[Entry, ...]
+    course: str | None = None
 
 
 class Ledger:
@@ -174,10 +183,12 @@ class Ledger:
         assignment: str,
         assignment_sha256: str,
         location: str | None = None,
+        course: str | None = None,
     ) -> None:
         """Write the assignment and the rows."""
         data = {
             "assignment": {"id": assignment, "sha256": assignment_sha256, "location": location},
+            "course": course,
             "rows": [asdict(entry) for entry in entries],
         }
         write_whole(self.out / BATCH_FILE, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
@@ -189,7 +200,8 @@ class Ledger:
             data = json.loads(file.read_text(encoding="utf-8"))
             entries = tuple(Entry(**row) for row in data["rows"])
             assignment = data["assignment"]
-            return BatchRows(str(assignment["id"]), assignment.get("location"), entries)
+            location, course = assignment.get("location"), data.get("course")
+            return BatchRows(str(assignment["id"]), location, entries, course)
         except FileNotFoundError as error:
             raise UsageError(f"{self.out}: is not the folder of a batch") from error
         except (OSError, ValueError, KeyError, TypeError) as error:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
+from datetime import datetime
 from functools import cache
 from pathlib import Path
 
@@ -19,11 +20,14 @@ from grader.grade import Grade
 from grader.report.files import write_whole
 from grader.report.model.result import read_result, result_json
 from grader.report.model.result_model import Result
+from grader.report.model.student import VISIBLE_ONLY
 
 _load = cache(load_assignment)
 
 
-def bring_up_to_date(done: Iterable[Done], ledger: Ledger) -> list[Done]:
+def bring_up_to_date(
+    done: Iterable[Done], ledger: Ledger, now: datetime | None = None
+) -> list[Done]:
     """Write every report of a class that differs from what is written down about it now.
 
     That is what a person or a rule of the course adds. A report that cannot be rendered is left as
@@ -32,35 +36,46 @@ def bring_up_to_date(done: Iterable[Done], ledger: Ledger) -> list[Done]:
     Returns:
         The rows with the results as they are now.
     """
-    adjust = ClassAdjustments(ledger)
+    adjust = ClassAdjustments(ledger, now)
     rows = []
-    for row in done:
-        result = adjust(row.result) if row.result is not None else None
-        entry = row.entry
-        if result is not None and not _same_additions(result, row.result):
+    for before in done:
+        row = adjust.row(before)
+        entry, result = row.entry, row.result
+        if result is not None and (
+            not _same_additions(result, before.result)
+            or (row.fresh and _is_released(result, adjust.visible))
+        ):
             try:
                 render_again(ledger.folder(entry.key), amended=adjust)
             except UsageError as error:
                 why = f"its report is not up to date: {error}"
                 entry = replace(entry, problem="; ".join(filter(None, (entry.problem, why))))
-        rows.append(replace(row, entry=entry, result=result))
+        rows.append(replace(row, entry=entry))
     return rows
 
 
 def _same_additions(one: Result, other: Result | None) -> bool:
-    parts = [(each.adjustments, each.comments) for each in (one, other) if each is not None]
+    parts = [
+        (each.adjustments, each.comments, each.attempts)
+        for each in (one, other)
+        if each is not None
+    ]
     return parts[0] == parts[-1]
+
+
+def _is_released(result: Result, visible: frozenset[str]) -> bool:
+    return any(check.visibility in visible - VISIBLE_ONLY for check in result.checks)
 
 
 def render_again(
     folder: Path,
     assignment: str | None = None,
-    amended: Callable[[Result], Result] | None = None,
+    amended: ClassAdjustments | None = None,
 ) -> Result:
     """Render the report of one submission again from its result and its recordings.
 
     Args:
-        amended: Gives the result with what is added to it now.
+        amended: What is added to the results of its class now.
     """
     found = find(folder)
     result = found.result or read_result(folder / RESULT_FILE)
@@ -79,7 +94,7 @@ def render_again(
             f"{regrade_command(folder, loaded)} writes the new result and report"
         )
     now = amended(result) if amended is not None else result
-    write_report(graded, folder, now)
+    write_report(graded, folder, now, amended.visible if amended is not None else VISIBLE_ONLY)
     if now != result:
         write_whole(folder / RESULT_FILE, result_json(now))
     return now

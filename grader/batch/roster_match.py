@@ -138,7 +138,8 @@ def _missing(student: Student) -> HandedIn:
     why = "handed in nothing"
     if student.submission:
         why += f": {shown(student.submission)} is not among the submissions"
-    return with_problem(HandedIn(student.key, None, student.name, problem=student.problem), why)
+    row = HandedIn(student.key, None, student.name, problem=student.problem)
+    return with_problem(replace(row, columns=student.columns), why)
 
 
 def unique(rows: list[HandedIn]) -> list[HandedIn]:

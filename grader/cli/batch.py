@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from grader.batch.executor import BatchExecutor
     from grader.batch.handed_in import HandedIn
     from grader.batch.roster import Roster
+    from grader.course.load import Course
 
 NOT_GRADED = 3
 _AUTO = "auto"
@@ -45,6 +46,10 @@ def batch(
         str, typer.Option(help="Submissions at once; auto adapts to the load of the machine.")
     ] = _AUTO,
     roster: Annotated[Path | None, typer.Option(help="CSV with all students of the class.")] = None,
+    course: Annotated[
+        Path | None,
+        typer.Option(help="YAML with the rules of the course: due dates, lateness, attempts."),
+    ] = None,
     retry: Annotated[
         list[str] | None,
         typer.Option(help="Grade this submission again, or `errors`, or `all`. May be repeated."),
@@ -65,7 +70,9 @@ def batch(
     from grader.batch.adjusting import ClassAdjustments
     from grader.batch.batch import Batch
     from grader.batch.class_files import GRADES_FILE, write_class
+    from grader.batch.course_rules import course_of
     from grader.batch.executor import DaskExecutor, ExecutorLost, LocalExecutor
+    from grader.batch.groups import strangers
     from grader.batch.ledger import Ledger
     from grader.batch.rendering import bring_up_to_date
     from grader.batch.worker import Order, make_grading
@@ -78,10 +85,11 @@ def batch(
         count = 1 + len(context.args)
         raise UsageError(f"batch takes one folder, not {count} submissions: give their folder")
     refuse_swapped(assignment, submissions)
-    refuse_inputs([out], [*assignment_places(assignment), submissions, roster])
+    refuse_inputs([out], [*assignment_places(assignment), submissions, roster, course])
     check_folder(out)
     loaded = load_assignment(assignment)
     refuse_part(out, loaded.folder, f"the assignment in {loaded.folder}")
+    rules = course_of(out, course, loaded.assignment.id)
     order = Order(str(loaded.folder.resolve()), loaded.sha256, seed, sandbox)
     admission = Admission(cells=at_once)
     # Before anything is read or written: without a sandbox there is no batch.
@@ -90,15 +98,18 @@ def batch(
     with Scratch("batch") as staging, Progress(quiet).shown() as progress:
         if grading is not None and not quiet:
             progress.note(f"sandbox: {grading.process_sandbox}")
-        names, rows = _rows(submissions, roster, out, staging, progress)
+        names, rows = _rows(submissions, roster, rules, out, staging, progress)
         for problem in names.problems if names else ():
             progress.note(f"{roster or submissions}: {problem}")
+        for stranger in strangers(rows, rules) if rules is not None else ():
+            progress.note(stranger)
         for row in rows:
             if row.path is not None:
                 # Results within a submission would be a part of it.
                 refuse_part(out, row.path, f"the submission of {row.key}")
         with Ledger(out).opened() as ledger:
-            work = Batch(loaded, ledger, frozenset(retry or ()))
+            place = str(rules.file) if rules is not None else None
+            work = Batch(loaded, ledger, frozenset(retry or ()), place)
             progress.begin("reading", len(rows))
             entries, to_do = work.read(rows, progress.advance)
             # What people wrote must be readable before anything is run.
@@ -144,7 +155,12 @@ def batch(
 
 
 def _rows(
-    submissions: Path, roster: Path | None, out: Path, staging: Path, progress: Progress
+    submissions: Path,
+    roster: Path | None,
+    course: Course | None,
+    out: Path,
+    staging: Path,
+    progress: Progress,
 ) -> tuple[Roster | None, list[HandedIn]]:
     from grader.batch.intake import take_in, take_in_roster
     from grader.batch.roster import read_roster
@@ -152,7 +168,7 @@ def _rows(
     if submissions.suffix.lower() == ".csv" and submissions.is_file():
         known = read_roster(submissions)
         progress.begin("fetching", len(known.students))
-        return known, take_in_roster(known, submissions.parent, staging, progress.advance)
+        return known, take_in_roster(known, submissions.parent, staging, progress.advance, course)
     read = read_roster(roster) if roster else None
 
     not_taken = "is neither a folder nor an archive, so it is left out"
@@ -163,6 +179,7 @@ def _rows(
         on_left_out=lambda name: progress.note(f"{name} {not_taken}"),
         out=out,
         on_prefix=lambda prefix: progress.say(f"names of submissions are read as {prefix}LOGIN"),
+        course=course,
     )
 
 
@@ -193,7 +210,7 @@ def _summary(done: Sequence[Done], wall_s: float) -> str:
     count = Counter(row.status for row in rows)
     fresh = sum(item.fresh for item in done)
     graded = len(scores) + count[RowStatus.WAITING]
-    parts = [f"{graded} of {len(done)} graded ({fresh} now, in {wall_s:.0f} s)"]
+    parts = [f"{graded} of {len(rows)} graded ({fresh} now, in {wall_s:.0f} s)"]
     if scores:
         most = max(row.result.final_max_score for row in rows if row.graded and row.result)
         parts.append(f"median {median(scores):g} of {most:g} points")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from enum import Enum
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -18,12 +19,14 @@ class Document(str, Enum):
 
     ASSIGNMENT = "assignment"
     MUTANTS = "mutants"
+    COURSE = "course"
     RESULT = "result"
 
 
 def validate(
     files: Annotated[
-        list[str], typer.Argument(help="assignment.yaml files, folders, or ids of assignments.")
+        list[str],
+        typer.Argument(help="assignment.yaml or course.yaml, folders, or ids of assignments."),
     ],
 ) -> None:
     """Check assignments without running anything.
@@ -34,11 +37,17 @@ def validate(
     from grader.assignment.load import load_assignment
     from grader.assignment.mutant import LANGUAGES, load_mutants
     from grader.batch.type_support import missing_underlays
+    from grader.course.load import is_course, load_course
     from grader.sandbox.python_tree import not_installed
 
     broken = 0
     for name in files:
         try:
+            if is_course(Path(name)):
+                rules = load_course(Path(name)).spec
+                count = counted(len(rules.assignments), "assignment")
+                typer.echo(f"{name}: rules of {count}: valid")
+                continue
             loaded = load_assignment(name)
             mutants = [
                 mutant
@@ -72,11 +81,13 @@ def schema(
     """Print the JSON Schema of a file, for editors."""
     from grader.assignment.own_check import all_checks
     from grader.assignment.schema import assignment_schema, mutants_schema
+    from grader.course.model import course_schema
     from grader.report.model.result import result_schema
 
     make = {
         Document.ASSIGNMENT: lambda: assignment_schema(all_checks()),
         Document.MUTANTS: mutants_schema,
+        Document.COURSE: course_schema,
         Document.RESULT: result_schema,
     }[document]
     typer.echo(json.dumps(make(), indent=2))

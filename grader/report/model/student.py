@@ -6,8 +6,10 @@ from grader.assignment.model import Visibility
 from grader.grade.model import every_point_judged, first_to_fix, total
 from grader.report.model.result_model import CheckPart, Result, WithheldPart
 
+VISIBLE_ONLY = frozenset({Visibility.VISIBLE.value})
 
-def for_student(result: Result) -> Result:
+
+def for_student(result: Result, shown: frozenset[str] = VISIBLE_ONLY) -> Result:
     """Leave out what a student does not get to see before grading.
 
     Checks that are not visible go with all that they say, and so do scenarios that only they
@@ -17,10 +19,11 @@ def for_student(result: Result) -> Result:
 
     Args:
         result: The whole result; no visible check waits for one that is not.
+        shown: The visibilities that the student gets to see by now.
     """
-    visible = [check for check in result.checks if check.visibility == Visibility.VISIBLE.value]
-    hidden = [check for check in result.checks if check.visibility != Visibility.VISIBLE.value]
-    shown = {None, *(check.id for check in visible)}
+    visible = [check for check in result.checks if check.visibility in shown]
+    hidden = [check for check in result.checks if check.visibility not in shown]
+    ids = {None, *(check.id for check in visible)}
     if not hidden:
         return result
     judged = {item.scenario for check in visible for item in check.findings}
@@ -40,7 +43,7 @@ def for_student(result: Result) -> Result:
                 for run in result.scenarios
                 if run.id in judged
             ),
-            "adjustments": tuple(one for one in result.adjustments if one.check in shown),
+            "adjustments": tuple(one for one in result.adjustments if one.check in ids),
             "attempts": tuple(one.visible for one in result.attempts if one.visible),
         }
     )

@@ -1,0 +1,155 @@
+"""The rules of a course, applied to the results of a class."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import datetime
+from functools import cached_property
+from pathlib import Path
+
+from grader.batch.attempts import attempts_of, read_earlier
+from grader.batch.ledger import BATCH_FILE, Entry, Ledger
+from grader.course.attempts import Attempt, Ruled, ruled
+from grader.course.late import HandInTime, known_time
+from grader.course.load import Course, Rules, load_course, utc
+from grader.errors import UsageError
+from grader.report.model.result_model import AttemptPart, Result
+from grader.report.model.student import VISIBLE_ONLY
+
+
+class ClassRules:
+    """What the rules of a course make of the rows of a batch; without rules the last counts."""
+
+    def __init__(self, ledger: Ledger) -> None:
+        """Read the rows, and the rules where the batch has some."""
+        self._ledger, self._written = ledger, ledger.read()
+        written = self._written
+        course = written.course
+        self.course = _load(course, ledger.out, written.assignment) if course else None
+        self._spent: dict[str, int] = {}
+
+    def visible(self, now: datetime) -> frozenset[str]:
+        """Which checks the students may see at a time, by their visibility."""
+        if self.course is None:
+            return VISIBLE_ONLY
+        return self.course.visible(self._written.assignment, now)
+
+    def applied(
+        self, entry: Entry, result: Result, reviewed: Callable[[Result], Result]
+    ) -> tuple[Result, tuple[str, ...]]:
+        """A result with its attempts and the lines of the rules; and notes for the instructor.
+
+        They replace those that it has, so doing it twice is the same as once.
+
+        Args:
+            reviewed: Gives the result of an attempt with what persons add to it.
+        """
+        attempts = [
+            replace(each, result=reviewed(each.result)) for each in self._attempts(entry, result)
+        ]
+        found = self._ruled(entry, attempts)
+        parts: tuple[AttemptPart, ...] = ()
+        if len(attempts) > 1:
+            times = [each.time.at for each in attempts]
+            parts = attempts_of([each.result for each in attempts], times, found.counts)
+        whole = attempts[-1].result
+        update = {"attempts": parts, "adjustments": (*whole.adjustments, *found.lines)}
+        return whole.model_copy(update=update), found.notes
+
+    def _ruled(self, entry: Entry, attempts: list[Attempt]) -> Ruled:
+        if self.course is None or entry.attempt_of:
+            return Ruled(len(attempts) - 1)
+        rules = self.course.rules(self._written.assignment, entry.key)
+        tokens = rules.tokens.each if rules.tokens and _is_late(attempts, rules) else 0
+        if tokens:
+            tokens = max(0, tokens - sum(one.spent(entry.key) for one in self._before))
+        return ruled(attempts, rules, tokens)
+
+    def spent(self, key: str) -> int:
+        """Late tokens that a student used in this class."""
+        if key not in self._spent:
+            entry, result = self.entries.get(key), self._ledger.result(key)
+            self._spent[key] = 0
+            if entry is not None and result is not None:
+                self._spent[key] = self._ruled(entry, self._attempts(entry, result)).tokens
+        return self._spent[key]
+
+    @cached_property
+    def entries(self) -> dict[str, Entry]:
+        """The rows by their keys."""
+        return {entry.key: entry for entry in self._written.entries}
+
+    @cached_property
+    def _beside(self) -> dict[str, list[Entry]]:
+        """Earlier attempts that were handed in beside the row's own."""
+        found: dict[str, list[Entry]] = {}
+        for entry in self._written.entries:
+            if entry.attempt_of:
+                found.setdefault(entry.attempt_of, []).append(entry)
+        return found
+
+    @cached_property
+    def _before(self) -> list[ClassRules]:
+        """The classes of assignments that were due before this one."""
+        if self.course is None:
+            return []
+        due = {
+            name: (utc(self.course.rules(name, "").due), name)
+            for name in self.course.spec.assignments
+        }
+        return [
+            ClassRules(Ledger(folder))
+            for name, one in self.course.spec.assignments.items()
+            if one.results and due[name] < due[self._written.assignment]
+            for folder in [self.course.file.parent / one.results]
+            if (folder / BATCH_FILE).is_file()
+        ]
+
+    def _attempts(self, entry: Entry, result: Result) -> list[Attempt]:
+        """All attempts that are graded, the current one last."""
+        results = {}
+        if len(entry.history) > 1:
+            results = read_earlier(self._ledger.folder(entry.key))
+        found = {
+            sha: Attempt(one, _time(entry, sha, one))
+            for sha, one in results.items()
+            if sha in entry.history
+        }
+        for other in self._beside.get(entry.key, ()):
+            graded = self._ledger.result(other.key)
+            if graded is not None and graded.submission.sha256 == other.sha256:
+                found[other.sha256] = Attempt(graded, _time(other, other.sha256, graded))
+        found.pop(result.submission.sha256, None)
+        return [*found.values(), Attempt(result, _time(entry, entry.sha256, result))]
+
+
+def course_of(out: Path, named: Path | None, assignment: str) -> Course | None:
+    """The rules for a batch: those that are named, else those that it was graded with before."""
+    course = str(named.resolve()) if named else None
+    if named is None and (out / BATCH_FILE).is_file():
+        course = Ledger(out).read().course
+    return _load(course, out, assignment) if course else None
+
+
+def _load(course: str, out: Path, assignment: str) -> Course:
+    if not Path(course).is_file():
+        raise UsageError(
+            f"{course}: does not exist, and the rules of {out} lie there. Put it back, or name "
+            "another place with `rosgrade batch ... --course FILE`"
+        )
+    found = load_course(Path(course))
+    # Refuse rules of other assignments at once.
+    found.rules(assignment, "")
+    return found
+
+
+def _is_late(attempts: list[Attempt], rules: Rules) -> bool:
+    times = [known_time(each.time, rules)[0] for each in attempts]
+    return any(time is not None and utc(time) > utc(rules.due) for time in times)
+
+
+def _time(entry: Entry, sha256: str, result: Result) -> HandInTime:
+    at, source = entry.history.get(sha256, (entry.handed_in, entry.handed_in_from))
+    late = entry.late and sha256 == entry.sha256
+    return HandInTime(at, source, late, result.started)

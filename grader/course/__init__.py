@@ -1,0 +1,1 @@
+"""The rules of a course: due dates, lateness, attempts, groups and extensions."""

@@ -1,0 +1,359 @@
+"""The rules of a course in a batch: from what platforms give an instructor to lines of reports."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import zipfile
+from collections.abc import Mapping
+from concurrent.futures import Future
+from datetime import datetime, timezone
+from html import unescape
+from pathlib import Path
+
+import pytest
+
+from grader.assignment.load import LoadedAssignment, load_assignment
+from grader.batch.batch import Batch, Done
+from grader.batch.class_files import read_class, standing, write_class
+from grader.batch.course_rules import course_of
+from grader.batch.files import REPORT_FILE, RESULT_FILE, STUDENT_FILE, write_graded
+from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
+from grader.batch.groups import strangers
+from grader.batch.intake import take_in
+from grader.batch.ledger import Ledger
+from grader.batch.regrading import find, regrade
+from grader.batch.rendering import bring_up_to_date
+from grader.batch.roster import parse_roster
+from grader.errors import UsageError
+from grader.recording.model import to_json
+from grader.report.files import write_whole
+from grader.report.model.class_row import ClassRow
+from grader.report.model.facts import Clock
+from grader.submission.intake.locate import opened
+from grader.submission.prepare import fingerprint
+from grader.submission.record import PackageRecord, SubmissionRecord
+
+YAML = """\
+rosgrade: 1
+id: lesson
+title: Test
+packages: [{name: bot, executables: [bot]}, {name: extra, executables: [extra]}]
+scenarios:
+  - {id: run, launch: [{package: bot, executable: bot}], timeout: 5 s}
+checks:
+  - {id: package, uses: package.found, with: {package: bot}, points: 6}
+  - {id: extra, uses: package.found, with: {package: extra}, points: 2}
+  - {id: secret, uses: package.found, with: {package: bot}, points: 2, visibility: after_due_date}
+"""
+COURSE = """\
+title: Robotics
+time_zone: Europe/Berlin
+assignments: {lesson: {due: 2026-10-12 23:59}}
+late: {per: day, deduct: 10 %}
+"""
+NOW = datetime(2026, 10, 12, 12, 0, tzinfo=timezone.utc)
+
+
+class Reader:
+    """Grades by the packages in a submission; nothing is built or run."""
+
+    capacity = 1
+
+    def __init__(self, loaded: LoadedAssignment) -> None:
+        self._loaded = loaded
+
+    def submit(self, key: str, path: Path, folder: Path, given: Mapping[str, str]) -> Future[None]:
+        """Grade at once."""
+        with opened(path) as located:
+            found = sorted(file.parent.name for file in located.root.rglob("package.xml"))
+        packages = tuple(PackageRecord(name, name) for name in found)
+        record = SubmissionRecord(key, fingerprint(path), packages=packages)
+        (folder / RECORDINGS_FOLDER).mkdir()
+        write_whole(folder / RECORDINGS_FOLDER / SUBMISSION_FILE, to_json(record))
+        write_graded(regrade(self._loaded, find(folder)), folder, Clock())
+        done: Future[None] = Future()
+        done.set_result(None)
+        return done
+
+    def close(self) -> None:
+        """There is nothing to end."""
+
+
+class Class:
+    """A class and the rules of its course."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        (folder / "lesson").mkdir()
+        (folder / "lesson" / "assignment.yaml").write_text(YAML, encoding="utf-8")
+        self.loaded = load_assignment(folder / "lesson")
+        self.name = "lesson"
+        self.out = folder / "out"
+        self.handed = folder / "class"
+        self.handed.mkdir()
+        self.rules(COURSE)
+
+    def rules(self, text: str) -> None:
+        """Write course.yaml."""
+        (self.folder / "course.yaml").write_text(text, encoding="utf-8")
+
+    def hand_in(self, name: str, *packages: str, text: str = "") -> Path:
+        """A folder, or a zip, with the names of packages."""
+        target = self.handed / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        files = {f"{one}/package.xml": "<package/>" for one in packages}
+        files["notes.txt"] = text
+        if name.endswith(".zip"):
+            with zipfile.ZipFile(target, "w") as made:
+                for file, content in files.items():
+                    made.writestr(file, content)
+            return target
+        for file, content in files.items():
+            (target / file).parent.mkdir(parents=True, exist_ok=True)
+            (target / file).write_text(content)
+        return target
+
+    def grade(self, roster: str = "", now: datetime = NOW) -> dict[str, ClassRow]:
+        """Run a batch as the command does; the rows as everything else reads them then."""
+        course = course_of(self.out, self.folder / "course.yaml", self.name)
+        known = parse_roster(roster, "class.csv") if roster else None
+        staging = self.folder / f"staging{len(list(self.folder.iterdir()))}"
+        staging.mkdir()
+        with Ledger(self.out).opened() as ledger:
+            batch = Batch(self.loaded, ledger, course=str(course.file) if course else None)
+            _, to_do = batch.read(take_in(self.handed, staging, known, course=course))
+            done: list[Done] = list(batch.grade(to_do, Reader(self.loaded)))
+            write_class(bring_up_to_date(done, ledger, now), ledger)
+        return {row.id: row for row in read_class(self.out)}
+
+
+def lines(row: ClassRow) -> list[tuple[str, float | None]]:
+    """Adjustments of a row."""
+    assert row.result is not None
+    return [(one.kind, one.points) for one in row.result.adjustments]
+
+
+@pytest.fixture
+def course(tmp_path: Path) -> Class:
+    return Class(tmp_path)
+
+
+def test_gradescope_s_times_cost_what_the_rules_say(course: Class) -> None:
+    course.hand_in("submission_1", "bot")
+    course.hand_in("submission_2", "bot", text="ben")
+    (course.handed / "submission_metadata.yml").write_text(
+        "submission_1:\n  :submitters:\n  - :name: Ana\n"
+        "  :created_at: 2026-10-12 22:20:00.567158000 Z\n"
+        "submission_2:\n  :submitters:\n  - :name: Ben\n  :created_at: 2026-10-12 21:59:59 Z\n"
+    )
+    rows = course.grade()
+    assert lines(rows["Ana"]) == [("late", -1)] and lines(rows["Ben"]) == []
+    assert (rows["Ana"].score, rows["Ben"].score) == (7, 8)
+    entries = {one.key: one for one in Ledger(course.out).read().entries}
+    assert entries["Ana"].handed_in == "2026-10-12T22:20:00+00:00"
+    report = unescape((Ledger(course.out).folder("Ana") / REPORT_FILE).read_text())
+    assert "handed in 2026-10-13 00:20 Europe/Berlin by Gradescope's metadata, 21 min" in report
+    assert "7" in (course.out / "grades.csv").read_text().splitlines()[1].split(",")
+
+
+def test_without_rules_nothing_is_deducted_and_the_times_are_kept(course: Class) -> None:
+    (course.folder / "course.yaml").unlink()
+    course.hand_in("ana_2030-01-01T10-00-00Z", "bot")
+    with Ledger(course.out).opened() as ledger:
+        batch = Batch(course.loaded, ledger)
+        _, to_do = batch.read(take_in(course.handed, course.folder))
+        done = list(batch.grade(to_do, Reader(course.loaded)))
+        write_class(bring_up_to_date(done, ledger, NOW), ledger)
+        (entry,) = ledger.read().entries
+    (row,) = read_class(course.out)
+    assert lines(row) == [] and row.score == 8
+    assert (entry.handed_in, entry.handed_in_from) == (
+        "2030-01-01T10:00:00+00:00",
+        "the name of the file",
+    )
+
+
+def test_who_canvas_calls_late_without_a_time_loses_nothing_and_has_a_note(course: Class) -> None:
+    course.hand_in("lopezana_LATE_90211_1234_ws.zip", "bot")
+    (row,) = course.grade().values()
+    assert lines(row) == []
+    assert "marked late, but not by how much, so nothing is deducted" in row.note
+
+
+def test_the_roster_says_when_and_goes_before_the_platform(course: Class) -> None:
+    course.hand_in("lopezana_LATE_90211_1234_ws.zip", "bot")
+    course.hand_in("ngwei_90212_1235_ws.zip", "bot", text="wei")
+    course.hand_in("raybo_90213_1236_ws.zip", "bot", text="bo")
+    rows = course.grade(
+        "id,name,handed_in\n90211,Ana Lopez,2026-10-14 09:00+02:00\n90212,Wei Ng,2026-10-15 09:00\n"
+        "90213,Bo Ray,yesterday\n"
+    )
+    assert lines(rows["90211"]) == [("late", -2)]
+    assert lines(rows["90212"]) == lines(rows["90213"]) == []
+    assert "without a zone by the roster: nothing is deducted" in rows["90212"].note
+    assert "when it was handed in is not known: 'yesterday' is not a date" in rows["90213"].note
+
+
+def commit(folder: Path, when: str, *config: str) -> None:
+    """Make a repository of a folder, committed at a time."""
+    own = {"GIT_COMMITTER_DATE": when, "GIT_AUTHOR_DATE": "2000-01-01T00:00:00Z"}
+    named = ["-c", "user.name=Ana", "-c", "user.email=a@b.c"]
+    for command in (["init", "-q"], ["add", "."], [*named, "commit", "-qm", "done"]):
+        subprocess.run(["git", *command], cwd=folder, env=os.environ | own, check=True)
+    for key in config:
+        name, _, value = key.partition("=")
+        subprocess.run(["git", "config", name, value], cwd=folder, check=True)
+
+
+def test_a_repository_is_as_late_as_its_last_commit(course: Class) -> None:
+    trap = course.folder / "trap"
+    script = course.folder / "evil.sh"
+    script.write_text(f"#!/bin/sh\ntouch {trap}\n")
+    script.chmod(0o755)
+    evil = f"={script}"
+    commit(
+        course.hand_in("ana", "bot"),
+        "2026-10-13T00:30:00+02:00",
+        *(f"{name}{evil}" for name in ("core.fsmonitor", "gpg.program", "core.sshCommand")),
+        "log.showSignature=true",
+    )
+    (course.hand_in("ben", "bot", text="ben") / ".git").mkdir()
+    rows = course.grade()
+    assert lines(rows["ana"]) == [("late", -1)] and lines(rows["ben"]) == []
+    assert rows["ana"].result is not None
+    assert "by the committer date of git commit" in rows["ana"].result.adjustments[0].reason
+    assert not trap.exists()
+
+
+@pytest.mark.parametrize(("counts", "score"), [("best", 8), ("last", 6)])
+def test_all_attempts_of_a_folder_are_graded_and_the_rule_says_which_counts(
+    course: Class, counts: str, score: int
+) -> None:
+    course.rules(f"{COURSE}attempts: {{counts: {counts}}}\n")
+    course.hand_in("ana/attempt-1_2026-10-11T10-00-00Z", "bot", "other", text="1")
+    course.hand_in("ana/attempt-2_2026-10-11T11-00-00Z", text="2")
+    course.hand_in("ana/attempt-10_2026-10-13T11-00-00Z.zip", "bot", "extra", text="3")
+    course.rules(f"{COURSE}attempts: {{counts: {counts}}}\n".replace("10 %", "4"))
+    rows = course.grade()
+    assert list(rows) == ["ana"]
+    (result,) = [row.result for row in rows.values()]
+    assert result is not None
+    assert [(one.score, one.counts) for one in result.attempts] == [
+        (8, counts == "best"),
+        (0, False),
+        (10, counts == "last"),
+    ]
+    assert rows["ana"].score == score
+    assert result.attempts[0].handed_in == "2026-10-11T10:00:00+00:00"
+    report = (Ledger(course.out).folder("ana") / REPORT_FILE).read_text()
+    assert ("Attempt 1 of 3 counts (best)" in report) == (counts == "best")
+
+
+def test_canvas_resubmissions_side_by_side_are_attempts(course: Class) -> None:
+    for number, name in ((31, "ws.zip"), (32, "ws-1.zip"), (40, "ws-2.zip")):
+        course.hand_in(f"lopezana_90211_{number}_{name}", "bot", text=name)
+    course.hand_in("ngwei_90212_33_bot.zip", "bot")
+    course.hand_in("ngwei_90212_34_bot_msgs.zip", "extra")
+    rows = course.grade()
+    assert {key: len(row.result.attempts) if row.result else None for key, row in rows.items()} == {
+        "lopezana_90211": 3,
+        "ngwei_90212": 0,
+    }
+    assert rows["ngwei_90212"].score == 10
+
+
+def test_a_week_later_the_better_grade_of_the_same_folder_counts(course: Class) -> None:
+    course.rules(COURSE + "attempts: {counts: best}\n")
+    course.hand_in("ana", "bot")
+    roster = "login,handed_in\nana,2026-10-11T10:00Z\n"
+    assert course.grade(roster)["ana"].score == 8
+    (course.handed / "ana" / "bot" / "package.xml").unlink()
+    row = course.grade(roster.replace("10-11", "10-13"))["ana"]
+    assert row.score == 8 and lines(row) == [("attempts", 8)]
+    assert row.result is not None and row.result.score == 0
+    assert [one.handed_in[:10] for one in row.result.attempts] == ["2026-10-11", "2026-10-13"]
+    # What is applied again is the same.
+    written = {file: file.stat().st_mtime_ns for file in course.out.rglob(RESULT_FILE)}
+    ledger = Ledger(course.out)
+    bring_up_to_date([standing(ledger, entry) for entry in ledger.read().entries], ledger)
+    assert {file: file.stat().st_mtime_ns for file in course.out.rglob(RESULT_FILE)} == written
+
+
+@pytest.mark.parametrize("groups", ["groups: [[ana, Ben], [cai, dee]]\n", "groups: Team\n"])
+def test_a_group_has_what_one_of_them_handed_in(course: Class, groups: str) -> None:
+    course.rules(COURSE + groups)
+    course.hand_in("ana", "bot")
+    course.hand_in("cai", "bot", "extra")
+    course.hand_in("dee", "extra")
+    rows = course.grade("login,team\nana,1\nben,1\ncai,2\ndee,2\neva,\n")
+    assert {key: row.score for key, row in rows.items()} == {
+        "ana": 8,
+        "ben": 8,
+        "cai": 10,
+        "dee": 2,
+        "eva": None,
+    }
+    assert rows["ben"].note == rows["ana"].note == ""
+    assert rows["dee"].note == "cai and dee of one group handed in different files"
+    assert {one.key: one.team for one in Ledger(course.out).read().entries}["ben"] == "ana"
+
+
+def test_a_group_of_a_column_that_the_roster_lacks_is_an_error(course: Class) -> None:
+    course.rules(COURSE + "groups: teem\n")
+    course.hand_in("ana", "bot")
+    with pytest.raises(UsageError, match=r"no column 'teem'. Did you mean 'team'\?"):
+        course.grade("login,team\nana,1\n")
+
+
+def test_students_that_only_the_rules_know_are_named(course: Class) -> None:
+    course.rules(COURSE + "extensions: [{student: anna, assignment: lesson, days: 1}]\n")
+    course.hand_in("ana", "bot")
+    rules = course_of(course.out, course.folder / "course.yaml", "lesson")
+    assert rules is not None
+    (line,) = strangers(take_in(course.handed, course.folder), rules)
+    assert line.endswith("an extension names 'anna', not in this class. Did you mean 'ana'?")
+
+
+def test_hidden_checks_are_in_the_students_report_when_the_rules_release_them(
+    course: Class,
+) -> None:
+    course.hand_in("ana", "bot")
+    course.grade(now=NOW)
+    copy = Ledger(course.out).folder("ana") / STUDENT_FILE
+    assert copy.is_file()
+    (course.handed / "ana" / "notes.txt").write_text("again")
+    course.grade(now=NOW.replace(day=13))
+    assert not copy.exists()
+
+
+def test_tokens_are_used_up_in_the_order_of_due_dates(course: Class) -> None:
+    course.rules(
+        "title: Robotics\ntime_zone: UTC\nlate: {per: day, deduct: 1}\n"
+        "tokens: {each: 2, worth: day}\n"
+        "assignments:\n  first: {due: 2026-10-01 12:00, results: first}\n"
+        "  lesson: {due: 2026-10-12 12:00, results: out}\n"
+    )
+    first = Class.__new__(Class)
+    first.__dict__.update(course.__dict__, out=course.folder / "first")
+    text = YAML.replace("id: lesson", "id: first")
+    (course.folder / "elsewhere" / "first").mkdir(parents=True)
+    (course.folder / "elsewhere" / "first" / "assignment.yaml").write_text(text)
+    first.loaded = load_assignment(course.folder / "elsewhere" / "first")
+    first.name = "first"
+    course.hand_in("ana", "bot")
+    assert lines(first.grade("login,handed_in\nana,2026-10-02T00:00Z\n")["ana"]) == [("late", 0)]
+    row = course.grade("login,handed_in\nana,2026-10-14T00:00Z\n")["ana"]
+    assert lines(row) == [("late", -1)]
+    assert row.result is not None
+    assert row.result.adjustments[0].reason.endswith("1 late token used; 1 day × 1 points")
+
+
+def test_rules_that_are_gone_are_one_message_and_change_nothing(course: Class) -> None:
+    course.hand_in("ana", "bot")
+    course.grade()
+    before = (course.out / "grades.csv").read_text()
+    (course.folder / "course.yaml").rename(course.folder / "elsewhere.yaml")
+    with pytest.raises(UsageError, match=r"course.yaml: does not exist, and the rules of"):
+        read_class(course.out)
+    assert (course.out / "grades.csv").read_text() == before
