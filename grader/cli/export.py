@@ -227,7 +227,9 @@ def mail(
     letters = []
     for one in found:
         student = students.of(one)
-        to = address(student.email, student.name or one.name) if student is not None else None
+        # "Lopez, Ana" is Ana Lopez.
+        name = " ".join(reversed((student.name if student else one.name).split(",", 1))).strip()
+        to = address(student.email, name) if student is not None else None
         if student is None or to is None:
             why = f"has no address {student.email}".rstrip() if student else "is no student"
             problems.append(f"{one.key}: {why} in {roster}")

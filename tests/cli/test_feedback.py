@@ -105,14 +105,14 @@ def test_each_student_gets_a_message_with_the_report_and_who_gets_none_is_named(
     assert "eve: has no address eve@example.org, all@example.org in roster.csv" in ended.stderr
     assert "dora: not graded" in ended.stderr and "gil: handed in nothing" in ended.stderr
     ana, ben = messages(tmp_path / "post" / "mail.mbox")
-    assert str(ana["to"]) == '"López, Ana =x" <ana@example.org>'
+    assert str(ana["to"]) == "Ana =x López <ana@example.org>"
     assert "\u202e" not in str(ben["to"]) and ben["to"].addresses[0].addr_spec == "ben@example.org"
     assert ana["from"] == "prof@example.org" and ana["subject"] == "Your result: timed_publisher"
     (report,) = ana.iter_attachments()
     assert (report.get_filename(), report.get_content_type()) == ("report.html", "text/html")
     assert report.get_content().strip() == "copy for ana"
     body = ana.get_body(("plain",)).get_content()
-    assert "Hello López, Ana =x,\n\ntimed_publisher: 1.52 of 6 points" in body
+    assert "Hello Ana =x López,\n\ntimed_publisher: 1.52 of 6 points" in body
     assert "-0.5: Handed in late, 1 day late" in body
     assert "It publishes every 300 ms (1.02 / 3 points)\n  expected: a period of 300 ms" in body
     assert "  try next: " in body and "LP at src/a.py:7:\nWell done,\nbut:" in body
