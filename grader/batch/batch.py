@@ -87,6 +87,7 @@ class Batch:
                 row.late,
                 problem=row.problem,
                 fault=row.fault,
+                email=row.email,
                 team=team,
                 handed_in=row.time[0],
                 handed_in_from=row.time[1],

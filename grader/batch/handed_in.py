@@ -25,6 +25,7 @@ class HandedIn:
         path: What was handed in, or None for nothing; those of a team have the same.
         name: The student's, as people write it, or empty.
         problem: Why there is nothing to grade, or what the instructor should look at.
+        email: As the roster says it, or empty.
         columns: What the roster says of the student, by header in lower case.
         time: When it was handed in, as in :mod:`~grader.batch.hand_in_time`.
         earlier: Earlier attempts that lie beside it, first to last.
@@ -37,6 +38,7 @@ class HandedIn:
     late: bool = False
     problem: str = ""
     fault: str = ""
+    email: str = ""
     columns: Mapping[str, str] = field(default_factory=dict, compare=False)
     time: tuple[str, str] = ("", "")
     earlier: tuple[Path, ...] = ()

@@ -99,7 +99,12 @@ def take_in_roster(
 
 def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn | None) -> HandedIn:
     row = HandedIn(
-        student.key, None, student.name, problem=student.problem, columns=student.columns
+        student.key,
+        None,
+        student.name,
+        problem=student.problem,
+        email=student.email,
+        columns=student.columns,
     )
     if not student.submission:
         return with_problem(row, "handed in nothing")

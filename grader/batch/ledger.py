@@ -43,6 +43,7 @@ class Entry:
         same_as: Key of the row with the same submission that was graded for both, or empty.
         fault: Why it could not be graded, where not even a result could be written.
         team: Key of the first of those who handed it in together, or empty for one alone.
+        email: The student's, or empty.
         source: Path of what was handed in, as it lay when it was read; may be gone by now.
         handed_in: ISO 8601, without an offset where its source has none; or empty.
         handed_in_from: What tells it, such as ``Gradescope's metadata``.
@@ -58,6 +59,7 @@ class Entry:
     same_as: str = ""
     fault: str = ""
     team: str = ""
+    email: str = ""
     source: str = ""
     handed_in: str = ""
     handed_in_from: str = ""

@@ -117,7 +117,7 @@ def matched(
             student = students[key]
             handed.setdefault(key, []).append((len(rows), shown(entry.path.name)))
             row = replace(row_of(entry), key=key, name=student.name, problem=student.problem)
-            rows.append(replace(row, columns=student.columns))
+            rows.append(replace(row, columns=student.columns, email=student.email))
     for key, found in handed.items():
         for at, file in found if len(found) > 1 else ():
             others = [other for _, other in found[:_MOST_TWICE] if other != file] or [file]

@@ -180,18 +180,18 @@ def _write_comments(file: Path, out: Path, scores: Mapping[str, tuple[str, str]]
     from grader.report.files import write_whole
     from grader.report.formats.canvas_comments import is_download, update_grades, upload_zip
 
-    found = [one for one in class_feedback(out)[0] if one.key in scores]
+    found = [one for one in class_feedback(out)[0] if one.entry.key in scores]
     if file.suffix == ".json":
-        results = {scores[one.key][0]: one.result for one in found}
+        results = {scores[one.entry.key][0]: one.result for one in found}
         write_whole(file, update_grades(dict(scores.values()), results))
         say(f"{file}: {len(found)} grades with comments for Canvas' API; nothing was sent")
         return []
-    given = [one for one in found if is_download(one.source.name)]
-    comments = {one.source.name: (one.result, one.report.read_bytes()) for one in given}
+    given = [one for one in found if is_download(Path(one.entry.source).name)]
+    comments = {Path(one.entry.source).name: (one.result, one.report.read_bytes()) for one in given}
     write_whole(file, upload_zip(comments))
     say(f'{file}: {len(comments)} comments for "Upload Submissions"')
     return [
-        f"{one.key}: no comment: Canvas takes only an answer to a zip that was downloaded from it"
+        f"{one.entry.key}: no comment: Canvas takes one only for a zip downloaded from it"
         for one in found
         if one not in given
     ]
@@ -200,39 +200,36 @@ def _write_comments(file: Path, out: Path, scores: Mapping[str, tuple[str, str]]
 @app.command()
 def mail(
     out: ClassFolder,
-    roster: Annotated[Path, typer.Option(help="CSV of the class, with a column `email`.")],
     folder: Folder = Path("mail"),
     sender: Annotated[str | None, typer.Option("--from", help="Your address.")] = None,
     subject: Annotated[str, typer.Option(help="Of every message.")] = "",
 ) -> None:
     """Write a message for each student, with the report. Nothing is sent.
 
-    mail.mbox is for a mail program, mail.csv for mail merge. Ends with 1 if a student gets no
+    mail.mbox is for a mail program, mail.csv for mail merge. The addresses are those of the roster
+    that the class was graded with. Ends with 1 if a student gets no
     message, and says who and why.
     """
-    from grader.batch.feedback import Addressees, class_feedback
-    from grader.batch.roster import read_roster
+    from grader.batch.feedback import class_feedback
     from grader.errors import UsageError
     from grader.report.files import refuse_inputs, write_whole
     from grader.report.formats.mail import Letter, address, mail_csv, write_mbox
     from grader.report.text.summary import summary
 
     mbox, table = folder / "mail.mbox", folder / "mail.csv"
-    refuse_inputs([mbox, table], [roster, *_read_of(out)])
+    refuse_inputs([mbox, table], _read_of(out))
     own = address(sender) if sender is not None else None
     if sender is not None and own is None:
         raise UsageError(f"--from {sender}: is no address; write NAME@HOST")
-    students = Addressees(read_roster(roster))
     found, problems = class_feedback(out)
     letters = []
     for one in found:
-        student = students.of(one)
         # "Lopez, Ana" is Ana Lopez.
-        name = " ".join(reversed((student.name if student else one.name).split(",", 1))).strip()
-        to = address(student.email, name) if student is not None else None
-        if student is None or to is None:
-            why = f"has no address {student.email}".rstrip() if student else "is no student"
-            problems.append(f"{one.key}: {why} in {roster}")
+        name = " ".join(reversed(one.entry.name.split(",", 1))).strip()
+        to = address(one.entry.email, name)
+        if to is None:
+            email = one.entry.email or "in the roster's column `email`"
+            problems.append(f"{one.entry.key}: has no usable address: {email}")
             continue
         text = f"Hello {to.display_name},\n\n".replace(" ,", ",") + summary(one.result)
         text += "\nThe report is attached. Open it in a browser.\n"
@@ -269,9 +266,11 @@ def feedback(
         files = write_files(one, folder)
         if branch is not None:
             try:
-                committed += commit_folder(one.source, branch, files[0].parent.name, files)
+                committed += commit_folder(
+                    Path(one.entry.source), branch, files[0].parent.name, files
+                )
             except RosgradeError as error:
-                problems.append(f"{one.key}: {error}")
+                problems.append(f"{one.entry.key}: {error}")
     say(f"{folder}: files for {len(found)} students")
     if branch is not None:
         say(f"{committed} clones have a new commit on {branch}; push them yourself")

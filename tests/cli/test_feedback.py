@@ -6,9 +6,11 @@ import csv
 import io
 import json
 import mailbox
+import re
 import subprocess
 import zipfile
 from contextlib import closing
+from dataclasses import replace
 from email import message_from_bytes, policy
 from email.message import EmailMessage
 from pathlib import Path
@@ -19,49 +21,58 @@ from grader.batch.files import RESULT_FILE
 from grader.batch.ledger import Entry, Ledger
 from grader.report.formats.canvas_comments import is_download
 from grader.report.model.result import result_json
-from grader.report.model.result_model import AdjustmentPart, CommentPart
+from grader.report.model.result_model import AdjustmentPart
+from grader.review.adjust import adjusted
+from grader.review.model import ClassReview, Comment, ManualScore, StudentReview
+from grader.review.store import ReviewStore
 from tests.cli.conftest import Rosgrade
 from tests.report.sample import full_points, lost_points, not_graded
 
-ROSTER = """\
-login,name,email
-ana,"López, Ana =x",ana@example.org
-ben,"Ben\u202e, Boll",ben@example.org
-cy,Cy Dee,
-dora,Dora,dora@example.org
-eve,Eve,"eve@example.org, all@example.org"
-"""
-LATE = AdjustmentPart(kind="late", title="Handed in late", points=-0.5, reason="1 day late")
-COMMENT = CommentPart(text="Well done,\nbut:\nFrom here on", by="LP", file="src/a.py", line=7)
-
-
-def handed_in(place: Path, key: str, made, **changes: object) -> tuple[Entry, str]:
-    result = made().result
-    submission = result.submission.model_copy(update={"id": key, "sha256": key})
-    changed = result.model_copy(update={"submission": submission, **changes})
-    clone = place / "clones" / key
-    return Entry(key, sha256=key, source=str(clone)), result_json(changed)
+EMAILS = {
+    "ana": ("López, Ana =x", "ana@example.org"),
+    "ben": ("Ben\u202e, Boll", "ben@example.org"),
+    "cy": ("Cy Dee", ""),
+    "dora": ("Dora", "dora@example.org"),
+    "eve": ("Eve", "eve@example.org, all@example.org"),
+    "flo": ("Flo", "flo@example.org"),
+    "hal": ("Hal", "hal@example.org"),
+}
+README = AdjustmentPart(kind="manual", item="readme", title="README", points=None, max_points=2)
 
 
 @pytest.fixture
 def out(tmp_path: Path) -> Path:
-    """Ana lost points and has a hidden check, Ben has no report without it, Dora no grade."""
-    given = [
-        handed_in(tmp_path, "ana", lost_points, adjustments=(LATE,), comments=(COMMENT,)),
-        *(handed_in(tmp_path, key, full_points) for key in ("ben", "cy", "eve")),
-        handed_in(tmp_path, "dora", not_graded),
-    ]
+    """A class: Ana lost points and has a hidden check, others have no grade or no report."""
+    made = {"ana": lost_points, "dora": not_graded}
+    store, entries = ReviewStore(tmp_path / "out"), []
     with Ledger(tmp_path / "out").opened() as ledger:
-        for entry, result in given:
-            folder = ledger.partial(entry.key)
-            (folder / RESULT_FILE).write_text(result)
-            (folder / "report.html").write_text(f"whole report of {entry.key}")
-            if entry.key == "ana":
+        for key, (name, email) in EMAILS.items():
+            result = made.get(key, full_points)().result
+            submission = result.submission.model_copy(update={"id": key, "sha256": key})
+            result = result.model_copy(update={"submission": submission})
+            review = StudentReview(key=key)
+            if key in ("ana", "flo"):
+                result = result.model_copy(update={"adjustments": (README,)})
+            if key == "ana":
+                manual = {"readme": ManualScore(points=1.5, by="LP", note="too short")}
+                comment = Comment(
+                    text="Well done,\nbut:\nFrom here on", by="LP", file="a.py", line=7
+                )
+                review = StudentReview(key=key, manual=manual, comments=(comment,))
+                result = adjusted(result, review, ClassReview())
+            if key == "hal":
+                review = StudentReview(key=key, comments=(Comment(text="New", by="LP"),))
+            if review != StudentReview(key=key):
+                store.save(review, "")
+            folder = ledger.partial(key)
+            (folder / RESULT_FILE).write_text(result_json(result))
+            (folder / "report.html").write_text(f"whole report of {key}")
+            if key == "ana":
                 (folder / "student-report.html").write_text("copy for ana")
-            ledger.put(entry.key, folder)
-        entries = [entry for entry, _ in given]
+            ledger.put(key, folder)
+            source = str(tmp_path / "clones" / key)
+            entries.append(Entry(key, name, sha256=key, email=email, source=source))
         ledger.write([*entries, Entry("gil", problem="handed in nothing")], "lesson", "f" * 64)
-    (tmp_path / "roster.csv").write_text(ROSTER, encoding="utf-8")
     return tmp_path / "out"
 
 
@@ -92,18 +103,26 @@ def messages(file: Path) -> list[EmailMessage]:
         ]
 
 
+def named(stderr: str) -> list[str]:
+    """The beginnings of the errors."""
+    lines = re.split("^rosgrade: error: ", stderr, flags=re.MULTILINE)[1:]
+    return [re.sub(r"(?<=up to date).*|\n$", "", line, flags=re.DOTALL) for line in lines]
+
+
 def test_each_student_gets_a_message_with_the_report_and_who_gets_none_is_named(
     rosgrade: Rosgrade, out: Path, tmp_path: Path
 ) -> None:
-    ended = rosgrade(
-        *("export", "mail", out, "--roster", "roster.csv", "--out", "post"),
-        *("--from", "prof@example.org"),
-    )
+    ended = rosgrade("export", "mail", out, "--out", "post", "--from", "prof@example.org")
     assert ended.returncode == 1
     assert "2 messages; nothing was sent" in ended.stdout
-    assert "cy: has no address in roster.csv" in ended.stderr
-    assert "eve: has no address eve@example.org, all@example.org in roster.csv" in ended.stderr
-    assert "dora: not graded" in ended.stderr and "gil: handed in nothing" in ended.stderr
+    assert named(ended.stderr) == [
+        "dora: not graded",
+        "flo: waits for a person (README)",
+        "gil: handed in nothing",
+        "hal: its report is not up to date",
+        "cy: has no usable address: in the roster's column `email`",
+        "eve: has no usable address: eve@example.org, all@example.org",
+    ]
     ana, ben = messages(tmp_path / "post" / "mail.mbox")
     assert str(ana["to"]) == "Ana =x López <ana@example.org>"
     assert "\u202e" not in str(ben["to"]) and ben["to"].addresses[0].addr_spec == "ben@example.org"
@@ -112,17 +131,17 @@ def test_each_student_gets_a_message_with_the_report_and_who_gets_none_is_named(
     assert (report.get_filename(), report.get_content_type()) == ("report.html", "text/html")
     assert report.get_content().strip() == "copy for ana"
     body = ana.get_body(("plain",)).get_content()
-    assert "Hello Ana =x López,\n\ntimed_publisher: 1.52 of 6 points" in body
-    assert "-0.5: Handed in late, 1 day late" in body
+    assert "Hello Ana =x López,\n\ntimed_publisher: 3.52 of 8 points" in body
+    assert "  README: 1.5 of 2 points, by LP: too short\n" in body
     assert "It publishes every 300 ms (1.02 / 3 points)\n  expected: a period of 300 ms" in body
-    assert "  try next: " in body and "LP at src/a.py:7:\nWell done,\nbut:" in body
+    assert "  try next: " in body and "LP (a.py:7):\nWell done,\nbut:" in body
     assert "ends after SIGINT" not in body
 
 
 def test_the_table_for_mail_merge_has_no_formula_and_says_which_report(
     rosgrade: Rosgrade, out: Path, tmp_path: Path
 ) -> None:
-    rosgrade("export", "mail", out, "--roster", "roster.csv", "--subject", "=1+1\nBcc: x@y")
+    rosgrade("export", "mail", out, "--subject", "=1+1\nBcc: x@y")
     with (tmp_path / "mail" / "mail.csv").open(encoding="utf-8", newline="") as stream:
         ana, ben = csv.DictReader(stream)
     assert list(ana) == ["email", "name", "subject", "body", "report"]
@@ -134,7 +153,7 @@ def test_the_table_for_mail_merge_has_no_formula_and_says_which_report(
 
 
 def test_a_sender_who_is_no_address_is_refused(rosgrade: Rosgrade, out: Path) -> None:
-    ended = rosgrade("export", "mail", out, "--roster", "roster.csv", "--from", "Prof")
+    ended = rosgrade("export", "mail", out, "--from", "Prof")
     assert ended.returncode == 2 and "--from Prof: is no address" in ended.stderr
 
 
@@ -191,7 +210,7 @@ def test_comments_for_the_api_of_canvas_go_to_canvas_number(
     rosgrade("export", "canvas", out, "--canvas", canvas(tmp_path), "--comments", "c.json")
     data = json.loads((tmp_path / "c.json").read_text())["grade_data"]
     assert set(data) == {"90211", "90212"}
-    assert data["90211"]["posted_grade"] == "2.52"
+    assert data["90211"]["posted_grade"] == "4.52"
     assert "It publishes every 300 ms" in data["90211"]["text_comment"]
 
 
@@ -201,7 +220,7 @@ def test_comments_to_upload_are_called_as_canvas_called_the_downloads(
     name = "lopezana_LATE_90211_555_ws-1.zip"
     ledger = Ledger(out)
     entries = {entry.key: entry for entry in ledger.read().entries}
-    entries["ana"] = Entry("ana", sha256="ana", source=f"/gone/{name}")
+    entries["ana"] = replace(entries["ana"], source=f"/gone/{name}")
     ledger.write(entries.values(), "lesson", "f" * 64)
     ended = rosgrade("export", "canvas", out, "--canvas", canvas(tmp_path), "--comments", "c.zip")
     assert "1 comments" in ended.stdout and "ben: no comment" in ended.stderr

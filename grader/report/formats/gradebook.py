@@ -219,7 +219,7 @@ def canvas_csv(
         if student in taken:
             problems.append(f"{who}: the same student as {taken[student]}, left out")
         elif is_excused or score is None:
-            why = "excused in Canvas" if is_excused else _why_no_score(row)
+            why = "excused in Canvas" if is_excused else why_no_score(row)
             problems.append(f"{who}: {why}, so the cell is left as it is")
         else:
             name, *rest = export.students[student]
@@ -293,7 +293,8 @@ def _assigned(
             yield who, ClassRow(student[1], missing=True), [index]
 
 
-def _why_no_score(row: ClassRow) -> str:
+def why_no_score(row: ClassRow) -> str:
+    """In a few words."""
     if row.status is RowStatus.MISSING:
         return "handed in nothing"
     if row.status is RowStatus.WAITING:

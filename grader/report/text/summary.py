@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from grader.findings.finding import Status
-from grader.report.model.result_model import CommentPart, Result
-from grader.report.text import explanation
-from grader.report.text.words import counted_points, number
+from grader.report.model.result_model import Result
+from grader.report.text import additions, explanation
 from grader.safe_text import clean, one_line
 
 
@@ -17,7 +14,10 @@ def summary(result: Result) -> str:
     Args:
         result: As far as the student may see it.
     """
-    blocks = ["\n".join(_score(result))]
+    head = f"{one_line(result.assignment.id)}: {explanation.score(result)}"
+    lines = [head, explanation.headline(result)]
+    lines += [f"  {additions.line(one)}" for one in result.adjustments]
+    blocks = ["\n".join(lines)]
     if result.submission.problem:
         blocks.append(f"It could not be read: {one_line(result.submission.problem)}")
     for check in (*result.of(Status.FAILED), *result.of(Status.ERROR)):
@@ -25,24 +25,8 @@ def summary(result: Result) -> str:
         rows = explanation.explain(check, result)
         lines += [f"  {row.name}: {row.text}" for row in rows if row.name != "printed"]
         blocks.append("\n".join(lines))
-    blocks += map(_comment, result.comments)
+    for comment in result.comments:
+        where = additions.place(comment)
+        who = f"{one_line(comment.by)}{f' ({where})' if where else ''}"
+        blocks.append(f"{who}:\n{clean(comment.text)}")
     return "\n\n".join(blocks) + "\n"
-
-
-def _score(result: Result) -> Iterator[str]:
-    whole = counted_points(result.final_max_score)
-    points = "not graded yet" if result.final_score is None else number(result.final_score)
-    yield f"{one_line(result.assignment.id)}: {points} of {whole}"
-    yield explanation.headline(result)
-    if result.adjustments:
-        yield f"  {number(result.score or 0.0)}: the checks"
-    for one in result.adjustments:
-        words = [one.title, *filter(None, (one.reason, one.by and f"by {one.by}"))]
-        given = "waits for a person" if one.points is None else f"{one.points:+.10g}"
-        yield f"  {given}: {one_line(', '.join(words))}"
-
-
-def _comment(comment: CommentPart) -> str:
-    place = f" at {comment.file}" if comment.file else ""
-    place += f":{comment.line}" if comment.file and comment.line else ""
-    return f"{one_line(f'{comment.by}{place}')}:\n{clean(comment.text)}"
