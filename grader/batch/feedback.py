@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from grader.batch.adjusting import ClassAdjustments
 from grader.batch.class_files import class_rows, standing
 from grader.batch.files import REPORT_FILE, STUDENT_FILE
 from grader.batch.ledger import Entry, Ledger
-from grader.batch.rendering import bring_up_to_date
+from grader.batch.rendering import NOT_UP_TO_DATE, bring_up_to_date
 from grader.report.files import folder_name, write_whole
 from grader.report.formats.gradebook import why_no_score
 from grader.report.formats.markdown import render_markdown
@@ -35,23 +36,22 @@ def class_feedback(out: Path) -> tuple[list[Feedback], list[str]]:
     A report is written again first where a person or a rule of the course added something.
     """
     ledger = Ledger(out)
-    before = [standing(ledger, entry) for entry in ledger.read().entries]
-    now = bring_up_to_date(before, ledger)
-    outdated = {
-        one.entry.key for one, old in zip(now, before, strict=True) if one.entry != old.entry
-    }
-    entries = {one.entry.key: one.entry for one in now}
+    # As after a batch, also reports are written that show checks which are released by now.
+    done = (replace(standing(ledger, one), fresh=True) for one in ledger.read().entries)
+    now = bring_up_to_date(done, ledger)
+    visible, entries = ClassAdjustments(ledger).visible, {one.entry.key: one.entry for one in now}
     found, problems = [], []
     for row in class_rows(now, ledger):
-        given = row.status in (RowStatus.GRADED, RowStatus.UNREADABLE) and row.id not in outdated
-        if row.result is None or not given:
-            why = one_line(row.note) if row.id in outdated else why_no_score(row)
-            problems.append(f"{one_line(row.id)}: {why}")
-            continue
-        folder = ledger.folder(row.id)
-        copy = folder / STUDENT_FILE
-        report = copy if copy.is_file() else folder / REPORT_FILE
-        found.append(Feedback(entries[row.id], for_student(row.result), report))
+        entry, why = entries[row.id], why_no_score(row)
+        if row.result is not None and row.status in (RowStatus.GRADED, RowStatus.UNREADABLE):
+            copy = for_student(row.result, visible)
+            file = REPORT_FILE if copy is row.result else STUDENT_FILE
+            report = ledger.folder(row.id) / file
+            if NOT_UP_TO_DATE not in entry.problem and report.is_file():
+                found.append(Feedback(entry, copy, report))
+                continue
+            why = entry.problem or f"{NOT_UP_TO_DATE}: `rosgrade report` writes it again"
+        problems.append(f"{one_line(row.id)}: {one_line(why)}")
     return found, problems
 
 

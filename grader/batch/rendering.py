@@ -22,6 +22,7 @@ from grader.report.model.result import read_result, result_json
 from grader.report.model.result_model import Result
 from grader.report.model.student import VISIBLE_ONLY
 
+NOT_UP_TO_DATE = "its report is not up to date"
 _load = cache(load_assignment)
 
 
@@ -48,7 +49,7 @@ def bring_up_to_date(
             try:
                 render_again(ledger.folder(entry.key), amended=adjust)
             except UsageError as error:
-                why = f"its report is not up to date: {error}"
+                why = f"{NOT_UP_TO_DATE}: {error}"
                 entry = replace(entry, problem="; ".join(filter(None, (entry.problem, why))))
         rows.append(replace(row, entry=entry))
     return rows
