@@ -157,11 +157,12 @@ def _of_batch(ledger: Ledger) -> tuple[Path, ...]:
 
 def read_class(out: Path) -> list[ClassRow]:
     """The rows of the class at a path; of a folder of single reports, a row for each."""
-    folders = find_reports(out)
     if (out / BATCH_FILE).is_file():
         ledger = Ledger(out)
+        # Refuses a batch without a grade.
+        _of_batch(ledger)
         adjust = ClassAdjustments(ledger)
         rows = (standing(ledger, entry) for entry in ledger.read().entries)
         return class_rows([adjust.row(row) for row in rows], ledger)
-    results = (for_class(read_result(folder / RESULT_FILE)) for folder in folders)
+    results = (for_class(read_result(folder / RESULT_FILE)) for folder in find_reports(out))
     return class_rows([Done(Entry(one.submission.id), one, fresh=False) for one in results])

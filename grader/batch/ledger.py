@@ -88,6 +88,7 @@ class Ledger:
     def __init__(self, out: Path) -> None:
         """Name the folder; nothing is made yet."""
         self.out = out
+        self._results: dict[str, tuple[tuple[int, ...], Result | None]] = {}
 
     @contextmanager
     def opened(self) -> Iterator[Ledger]:
@@ -166,8 +167,11 @@ class Ledger:
 
         It lacks plots, logs and figures: to write a result again, read :meth:`whole_result`.
         """
-        result = self.whole_result(key)
-        return for_class(result) if result is not None else None
+        try:
+            state = (self.folder(key) / RESULT_FILE).stat()
+        except OSError:
+            return None
+        return self._kept(key, (state.st_ino, state.st_mtime_ns, state.st_size))
 
     def whole_result(self, key: str) -> Result | None:
         """A row's result as it was written; None where there is none or it is damaged."""
@@ -178,6 +182,15 @@ class Ledger:
             return read_result(file)
         except RosgradeError:
             return None
+
+    def _kept(self, key: str, version: tuple[int, ...]) -> Result | None:
+        """The result of a file, read once for all that ask."""
+        known, result = self._results.get(key, ((), None))
+        if known != version:
+            whole = self.whole_result(key)
+            result = for_class(whole) if whole is not None else None
+            self._results[key] = version, result
+        return result
 
     def write(
         self,

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from grader.report.html.overview import render_overview
+from grader.report.html.overview import MOST_SHOWN, render_overview
 from tests.browser.test_report import violations
 from tests.report.classroom import classroom
 
@@ -131,3 +131,22 @@ def test_five_hundred_submissions_are_all_there_and_can_be_searched(look):
     found.page.get_by_label("Search").fill("student 499")
     assert shown(found.page).count() == 1
     assert found.complaints == []
+
+
+def test_of_a_very_large_class_the_first_are_shown_until_all_are_asked_for(look):
+    html = render_overview(classroom(MOST_SHOWN + 20))
+    page = look(html).page
+    assert shown(page).count() == MOST_SHOWN
+    said = page.locator("#shown")
+    assert said.text_content() == "520 submissions, the first 500 are shown"
+    page.get_by_label("Search").fill("student 519")
+    assert names(page) == ["student 519"]
+    page.get_by_label("Search").fill("")
+    for _ in ("ascending", "descending"):
+        page.locator("#table thead button").first.press("Enter")
+    assert names(page)[0] == "student 99" and shown(page).count() == MOST_SHOWN
+    page.get_by_role("button", name="Show all").click()
+    assert shown(page).count() == MOST_SHOWN + 20
+    assert said.text_content() == "520 submissions"
+    plain = look(html, java_script_enabled=False).page
+    assert plain.locator("#table tbody tr").last.is_visible()

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from grader.review.cluster import Cluster
 
 MOST_DISTURBED = 50
+MOST_SHOWN = 500
+"""Rows of the table until all are asked for."""
 MOST_CLUSTERS = 30
 MOST_NAMED = 20
 """Students that are named in one line."""
@@ -57,6 +59,7 @@ def render_overview(
         "overview.js",
         assignments=sorted({row.result.assignment.id for row in rows if row.result}),
         rows=rows,
+        most_shown=MOST_SHOWN,
         columns=columns,
         failed_most=sorted(failed, key=lambda column: -column.counts[Status.FAILED]),
         cells=[{check.id: check for check in row.judged} for row in rows],
