@@ -7,7 +7,6 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.spec.name import Id
-from grader.spec.quantity import Ratio
 from grader.spec.source import Model
 
 Initials = Annotated[str, Field(min_length=1, max_length=40, description="Who wrote it.")]
@@ -52,7 +51,7 @@ class Forgiven(Model):
 
     check: Id = Field(description="Id of the check that failed.")
     cause: str = Field(min_length=1, description="As the cluster names it.")
-    share: Ratio = Field(1.0, le=1.0, description="Share of the lost points to give back.")
+    share: float = Field(1.0, gt=0.0, le=1.0, description="Of the lost points, to give back.")
     reason: str = Field("", description="Why, for the student.")
     by: Initials
 

@@ -34,7 +34,10 @@ class _Dumper(yaml.SafeDumper):
 
 
 def _written(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
-    return dumper.represent_scalar(f"{_TAG}str", text, "|" if "\n" in text else None)
+    # Unquoted, the other line ends of Unicode would be read as line ends.
+    odd = not text.replace("\n", "").isprintable()
+    style = '"' if odd else "|" if "\n" in text else None
+    return dumper.represent_scalar(f"{_TAG}str", text, style)
 
 
 _Dumper.add_representer(str, _written)
