@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.mutant import CPP, LANGUAGES, reference_of
+from grader.batch.grading import RECORDINGS_FOLDER
 from grader.batch.ledger import Entry, Ledger
-from grader.errors import UsageError
+from grader.errors import RosgradeError, UsageError
+from grader.questions.rules import ask
+from grader.questions.work import Work
+from grader.recording.mcap_reader import read_recording
 from grader.report.files import write_whole
+from grader.report.html.page import render_page
 from grader.similarity.fingerprints import all_hashes, fingerprints
 from grader.similarity.page import MOST_PAIRS, render_similarity
 from grader.similarity.pairs import find_pairs
@@ -18,6 +25,7 @@ from grader.submission.kept_source import SOURCE_FOLDER, read_source
 
 INSTRUCTOR_FOLDER = "instructor"
 SIMILARITY_FILE = "similarity.html"
+QUESTIONS_FILE = "questions.html"
 
 
 def write_similarity(loaded: LoadedAssignment, ledger: Ledger) -> tuple[Path, int]:
@@ -40,8 +48,38 @@ def write_similarity(loaded: LoadedAssignment, ledger: Ledger) -> tuple[Path, in
     return _written(ledger, SIMILARITY_FILE, page), len(pairs)
 
 
+def write_questions(
+    loaded: LoadedAssignment, ledger: Ledger, on_read: Callable[[str], None] = lambda _: None
+) -> tuple[Path, int]:
+    """Write the page of questions for oral exams: its file, and for how many submissions."""
+    entries = [entry for entry in ledger.read().entries if entry.sha256]
+    lines = Counter(line for one in entries for line in _lines(_files(ledger, one.key)))
+    usual = frozenset(line for line, times in lines.items() if times > len(entries) / 3)
+    students = []
+    for entry in entries:
+        recordings = []
+        for file in sorted((ledger.folder(entry.key) / RECORDINGS_FOLDER).glob("*.mcap")):
+            # A damaged one is reported where it is judged.
+            with suppress(RosgradeError):
+                recordings.append(read_recording(file))
+        asked = ask(Work(recordings, _files(ledger, entry.key), usual))
+        students.append((entry.name or entry.key, asked))
+        on_read(entry.key)
+    page = render_page(
+        "questions.html.j2",
+        ("report.css", "instructor.css"),
+        title=loaded.assignment.title,
+        students=students,
+    )
+    return _written(ledger, QUESTIONS_FILE, page), len(students)
+
+
 def _files(ledger: Ledger, key: str) -> dict[str, str]:
     return read_source(ledger.folder(key) / SOURCE_FOLDER).files
+
+
+def _lines(files: Mapping[str, str]) -> set[str]:
+    return {line.strip() for text in files.values() for line in text.split("\n")}
 
 
 def _name(entry: Entry, entries: tuple[Entry, ...]) -> str:

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from grader.cli.options import Quiet
 from grader.cli.screen.console import say
+from grader.cli.screen.progress import Progress
 
 if TYPE_CHECKING:
     from grader.assignment.load import LoadedAssignment
@@ -32,6 +34,21 @@ def similar(out: Out, assignment: Named = None) -> None:
 
     file, found = write_similarity(*_class(out, assignment, "similar"))
     say(f"{counted(found, 'pair')} of submissions that are alike: {file}")
+
+
+def questions(out: Out, assignment: Named = None, quiet: Quiet = False) -> None:
+    """Write three questions for an oral exam of each student. Nothing is run.
+
+    They are made by rules from the recordings and the source. The page is for the instructor only.
+    """
+    from grader.batch.instructor import write_questions
+    from grader.findings.wording import counted
+
+    loaded, ledger = _class(out, assignment, "questions")
+    with Progress(quiet).shown() as progress:
+        progress.begin("reading", len(ledger.read().entries))
+        file, found = write_questions(loaded, ledger, progress.advance)
+    say(f"Questions about {counted(found, 'submission')}: {file}")
 
 
 def _class(out: Path, assignment: str | None, command: str) -> tuple[LoadedAssignment, Ledger]:

@@ -16,13 +16,9 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from functools import cache
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 from zlib import crc32
-
-if TYPE_CHECKING:
-    from pygments.lexer import Lexer
 
 RUN = 12
 WINDOW = 4
@@ -86,10 +82,11 @@ def _rows(files: Mapping[str, str]) -> Iterator[list[tuple[int, Gram]]]:
 
 def _tokens(text: str, language: str) -> Iterator[tuple[str, int]]:
     """Normal tokens, with their lines."""
+    from pygments.lexers import get_lexer_by_name
     from pygments.token import Comment, Name, Number, String
 
     line, before = 1, ""
-    for _, kind, value in _lexer(language).get_tokens_unprocessed(text):
+    for _, kind, value in get_lexer_by_name(language).get_tokens_unprocessed(text):
         token = value.strip()
         if kind in Name or kind in Number:
             token = "name" if kind in Name else "number"
@@ -100,10 +97,3 @@ def _tokens(text: str, language: str) -> Iterator[tuple[str, int]]:
             yield token, line
             before = token
         line += value.count("\n")
-
-
-@cache
-def _lexer(language: str) -> Lexer:
-    from pygments.lexers import get_lexer_by_name
-
-    return get_lexer_by_name(language)

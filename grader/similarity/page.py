@@ -11,10 +11,8 @@ from grader.similarity.pairs import Pair, shared_passages
 
 MOST_PAIRS = 100
 """Pairs that the page shows side by side; more are only counted."""
-Chunk = tuple[int | None, list[tuple[int, str]]]
-"""Lines with their numbers, and the number of the passage that they belong to, if any."""
-Side = tuple[str, dict[str, list[Chunk]]]
-"""A key, and its files with shared passages."""
+_Chunk = tuple[int | None, list[tuple[int, str]]]
+"""The number of a shared passage, or None, and lines with their numbers."""
 
 
 def render_similarity(
@@ -28,7 +26,7 @@ def render_similarity(
 
     Args:
         sources: Files by key.
-        names: What the students are called, by key, of all that were compared.
+        names: Of all that were compared, by key.
         left_out: Names of those whose source could not be compared.
     """
     return render_page(
@@ -42,7 +40,9 @@ def render_similarity(
     )
 
 
-def _sides(pair: Pair, sources: Mapping[str, Mapping[str, str]]) -> Iterator[Side]:
+def _sides(
+    pair: Pair, sources: Mapping[str, Mapping[str, str]]
+) -> Iterator[tuple[str, dict[str, list[_Chunk]]]]:
     first, second = sources[pair.first], sources[pair.second]
     marks = shared_passages(fingerprints(first), fingerprints(second), pair.shared)
     for key, marked in zip((pair.first, pair.second), marks, strict=True):
@@ -50,7 +50,7 @@ def _sides(pair: Pair, sources: Mapping[str, Mapping[str, str]]) -> Iterator[Sid
         yield key, {file: _chunks(file, sources[key][file], marked) for file in files}
 
 
-def _chunks(file: str, text: str, marks: Mapping[tuple[str, int], int]) -> list[Chunk]:
+def _chunks(file: str, text: str, marks: Mapping[tuple[str, int], int]) -> list[_Chunk]:
     lines = enumerate(text.rstrip("\n").split("\n"), 1)
     grouped = groupby(lines, key=lambda line: marks.get((file, line[0])))
     return [(number, list(group)) for number, group in grouped]

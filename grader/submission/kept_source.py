@@ -10,7 +10,6 @@ import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from grader.errors import GraderFault, machine_fault
 from grader.submission.intake.listing import list_files
 from grader.submission.intake.paths import shown
 
@@ -43,33 +42,23 @@ def keep_source(root: Path, folder: Path) -> None:
     Args:
         root: The submission; must not change meanwhile.
         folder: Made for them; what was there is replaced.
-
-    Raises:
-        GraderFault: This machine cannot hold the copy.
     """
-    files = sorted(list_files(root), key=lambda file: (file.size, os.fsencode(file.path)))
+    shutil.rmtree(folder, ignore_errors=True)
     room, count, left_out = MOST_BYTES, 0, list[str]()
-    try:
-        shutil.rmtree(folder, ignore_errors=True)
-        # The smallest first: a table of data must not take the place of a program.
-        for file in files:
-            path = os.fsencode(file.path)
-            fits = file.size <= min(room, LARGEST_BYTES) and len(path) <= _LONGEST_PATH
-            plain = fits and count < MOST_FILES and file.link is None
-            data = (root / file.path).read_bytes() if plain else b"\0"
-            if b"\0" in data:
-                left_out.append(shown(file.path))
-                continue
+    # The smallest first: a table of data must not take the place of a program.
+    for file in sorted(list_files(root), key=lambda one: (one.size, os.fsencode(one.path))):
+        fits = file.size <= min(room, LARGEST_BYTES) and count < MOST_FILES
+        plain = file.link is None and len(os.fsencode(file.path)) <= _LONGEST_PATH
+        data = (root / file.path).read_bytes() if fits and plain else b"\0"
+        if b"\0" in data:
+            left_out.append(shown(file.path))
+        else:
             _write(folder / file.path, data)
             room, count = room - len(data), count + 1
-        if left_out:
-            named = sorted(left_out)[:_MOST_NAMED]
-            if len(left_out) > _MOST_NAMED:
-                named.append(f"… and {len(left_out) - _MOST_NAMED} more")
-            _write(folder / _LEFT_OUT, "\n".join(named).encode())
-    except OSError as error:
-        fault = GraderFault(f"the source cannot be kept: {error.strerror or error}")
-        raise machine_fault(error, folder) or fault from error
+    if left_out:
+        more = len(left_out[_MOST_NAMED:])
+        named = [*sorted(left_out)[:_MOST_NAMED], *([f"… and {more} more"] if more else [])]
+        _write(folder / _LEFT_OUT, "\n".join(named).encode())
 
 
 def read_source(folder: Path) -> KeptSource:
