@@ -26,6 +26,7 @@ from grader.safe_text import one_line
 
 GRADES_FILE = "grades.csv"
 OVERVIEW_FILE = "index.html"
+INSTRUCTOR_FOLDER = "instructor"
 NO_RESULT = "it has no result; run the batch again"
 _MOST_TWINS = 5
 
@@ -114,13 +115,19 @@ def _report(done: Done, ledger: Ledger | None) -> str | None:
 
 def write_class(done: Sequence[Done], ledger: Ledger) -> Path:
     """Write the gradebook and the overview."""
+    write_whole(ledger.out / GRADES_FILE, grades_csv(class_rows(done, ledger)))
+    return write_overview(done, ledger)
+
+
+def write_overview(done: Sequence[Done], ledger: Ledger) -> Path:
+    """Write the overview of a class, with links to the pages for its instructor."""
     rows = class_rows(done, ledger)
-    write_whole(ledger.out / GRADES_FILE, grades_csv(rows))
     overview = ledger.out / OVERVIEW_FILE
     store = ReviewStore(ledger.out)
     found = clusters(rows, store.of_class().content)
     vanished = store.vanished({item.entry.review_key for item in done})
-    write_whole(overview, render_overview(rows, found, vanished))
+    pages = sorted(file.name for file in (ledger.out / INSTRUCTOR_FOLDER).glob("*.html"))
+    write_whole(overview, render_overview(rows, found, vanished, pages))
     return overview
 
 

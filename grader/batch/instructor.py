@@ -9,6 +9,7 @@ from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.mutant import CPP, LANGUAGES, reference_of
+from grader.batch.class_files import INSTRUCTOR_FOLDER, standing, write_overview
 from grader.batch.grading import RECORDINGS_FOLDER
 from grader.batch.ledger import Entry, Ledger
 from grader.errors import RosgradeError, UsageError
@@ -23,7 +24,6 @@ from grader.similarity.pairs import find_pairs
 from grader.starter import starter_files
 from grader.submission.kept_source import SOURCE_FOLDER, read_source
 
-INSTRUCTOR_FOLDER = "instructor"
 SIMILARITY_FILE = "similarity.html"
 QUESTIONS_FILE = "questions.html"
 
@@ -104,4 +104,5 @@ def _known(loaded: LoadedAssignment) -> set[int]:
 def _written(ledger: Ledger, name: str, page: str) -> Path:
     file = ledger.out / INSTRUCTOR_FOLDER / name
     write_whole(file, page)
+    write_overview([standing(ledger, entry) for entry in ledger.read().entries], ledger)
     return file

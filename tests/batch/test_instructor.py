@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.assignment.load import LoadedAssignment, load_assignment
-from grader.batch.instructor import write_similarity
+from grader.batch.instructor import write_questions, write_similarity
 from grader.batch.ledger import Entry, Ledger
 from grader.resources import assignments
 from grader.submission.kept_source import SOURCE_FOLDER, keep_source
@@ -73,3 +73,23 @@ def test_a_class_without_pairs_says_so(tmp_path: Path, loaded: LoadedAssignment)
     file, pairs = write_similarity(loaded, graded(tmp_path, {"ana": NODE, "ben": OTHER}))
     assert pairs == 0
     assert "No two submissions are alike beyond what is usual." in file.read_text(encoding="utf-8")
+
+
+def test_each_student_has_three_questions_and_a_damaged_recording_takes_none(
+    tmp_path: Path, loaded: LoadedAssignment
+) -> None:
+    ledger = graded(tmp_path, {"ana": NODE, "ben": OTHER}, Entry("emil", "Emil", sha256="x"))
+    recordings = ledger.folder("ana") / "recordings"
+    recordings.mkdir()
+    (recordings / "run.mcap").write_bytes(b"damaged")
+    read: list[str] = []
+    file, count = write_questions(loaded, ledger, read.append)
+    page = file.read_text(encoding="utf-8")
+    assert file == tmp_path / "out" / "instructor" / "questions.html" and count == 3
+    ana, _, rest = page.partition(">Ana<")[2].partition(">Ben<")
+    assert ana.count("<code>node.py:") == 3
+    assert "nothing to ask about" in rest.partition(">Emil<")[2]
+    assert "<script" not in page and "\u202e" not in page
+    assert read == ["ana", "ben", "emil"]
+    overview = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert 'href="instructor/questions.html"' in overview and "similarity.html" not in overview

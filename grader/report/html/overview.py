@@ -41,13 +41,17 @@ class Column:
 
 
 def render_overview(
-    rows: Sequence[ClassRow], clusters: Sequence[Cluster] = (), vanished: Sequence[str] = ()
+    rows: Sequence[ClassRow],
+    clusters: Sequence[Cluster] = (),
+    vanished: Sequence[str] = (),
+    pages: Sequence[str] = (),
 ) -> str:
     """Render the overview of a class; its links are relative to the folder that it lies in.
 
     Args:
         clusters: Failures with the same cause, the most frequent first.
         vanished: Students with a review who are not in the class any more.
+        pages: Files with pages for the instructor.
     """
     columns = _columns(rows)
     scores = [row.score for row in rows if row.score is not None]
@@ -78,6 +82,7 @@ def render_overview(
         clusters=[one for one in clusters if len(one.lost) > 1][:MOST_CLUSTERS],
         waiting=[row for row in rows if row.status is RowStatus.WAITING],
         vanished=vanished,
+        pages=pages,
         MOST_NAMED=MOST_NAMED,
     )
 
