@@ -15,7 +15,7 @@ from grader.batch.batch import Done
 from grader.batch.files import RESULT_FILE, write_report
 from grader.batch.ledger import Ledger
 from grader.batch.regrading import find, regrade, regrade_command, stored_assignment
-from grader.errors import UsageError
+from grader.errors import RosgradeError, UsageError
 from grader.grade import Grade
 from grader.report.files import write_whole
 from grader.report.model.result import read_result, result_json
@@ -48,7 +48,7 @@ def bring_up_to_date(
         ):
             try:
                 render_again(ledger.folder(entry.key), amended=adjust)
-            except UsageError as error:
+            except RosgradeError as error:
                 why = f"{NOT_UP_TO_DATE}: {error}"
                 entry = replace(entry, problem="; ".join(filter(None, (entry.problem, why))))
         rows.append(replace(row, entry=entry))

@@ -18,7 +18,7 @@ from grader.report.html.replay import Replay
 from grader.report.html.report import NO_REFERENCE, render_report
 from grader.report.model.facts import RunFacts
 from grader.report.model.result import make_result
-from grader.report.model.result_model import AttemptPart, Result
+from grader.report.model.result_model import AdjustmentPart, AttemptPart, CommentPart, Result
 from grader.report.text.terminal import print_grade
 from grader.submission.record import BuildRecord, SourceError, SubmissionRecord
 from tests.grade.sample import (
@@ -163,6 +163,19 @@ def attempts(*scores: float | None, **changes: Any) -> tuple[AttemptPart, ...]:
     )
 
 
+def reviewed(text: str, *, waits: bool = False) -> dict[str, Any]:
+    """What persons and a rule add to a result, each with this text."""
+    part, by = AdjustmentPart, {"by": text, "reason": text}
+    adjustments = (
+        part(kind="manual", title="README", points=1.5, max_points=2.0, item="readme", **by),
+        part(kind="forgiven", title=text, points=0.5, check="a", **by),
+        part(kind="late", title=text, points=-1.0, reason=text),
+    )
+    oral = part(kind="manual", title="Oral exam", points=None, max_points=3.0, item="oral")
+    comments = (CommentPart(text=text, by=text, file=text, line=3), CommentPart(text=text, by="AB"))
+    return {"adjustments": (*adjustments, *(oral,) * waits), "comments": comments}
+
+
 def lost_points() -> Sample:
     """A period that is too long; one check waits for it, one is not yet for students."""
     checks = [
@@ -267,4 +280,4 @@ def everywhere(text: str) -> Sample:
     )
     found = judged_runs(checks, {"listen": run}, submission, titles={"listen": text}, title=text)
     tries = attempts(1.0, 2.0, sha256=text, handed_in=text, changes=(text,))
-    return replace(found, facts=facts, added={"attempts": tries})
+    return replace(found, facts=facts, added={"attempts": tries, **reviewed(text)})

@@ -121,15 +121,13 @@ def _table(result: Result) -> str:
 
 
 def added(result: Result) -> Iterator[str]:
-    """What persons and the rules of the course add, a block for each kind."""
-    kinds = {
-        "In addition to the checks": map(additions.line, result.adjustments),
-        "Comments": map(additions.comment_line, result.comments),
-    }
-    for title, lines in kinds.items():
-        items = [f"- {literal(one)}" for one in lines]
-        if items:
-            yield "\n".join([f"**{title}**", "", *items, ""])
+    """What persons and the rules of the course add, as a block."""
+    lines = [
+        *(f"- **points:** {literal(additions.line(one))}" for one in result.adjustments),
+        *(f"- **comment:** {literal(additions.comment_line(one))}" for one in result.comments),
+    ]
+    if lines:
+        yield "\n".join(["**In addition to the checks**", "", *lines, ""])
 
 
 def notes(result: Result) -> Iterator[str]:
