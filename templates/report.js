@@ -280,4 +280,10 @@
     root.scrollIntoView({ block: "center" });
     player.slider.focus({ preventScroll: true });
   });
+
+  // Shown in the page of a review: its keys work here too.
+  if (parent !== window) addEventListener("keydown", (event) => {
+    if (event.key.length > 1 || event.ctrlKey || event.metaKey || event.altKey || event.target.matches("input")) return;
+    parent.postMessage({ key: event.key }, "*");
+  });
 })();

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
 from grader.batch.adjusting import ClassAdjustments
 from grader.batch.batch import Done
-from grader.batch.class_files import NO_RESULT, standing
+from grader.batch.class_files import GRADES_FILE, NO_RESULT, standing, write_class
 from grader.batch.files import RESULT_FILE, write_graded
 from grader.batch.ledger import Entry, Ledger, keep_earlier
 from grader.batch.regrading import compare, find, refuse_other, regrade
+from grader.batch.rendering import bring_up_to_date
 from grader.errors import RosgradeError
 from grader.grade.model import total
-from grader.report.model.facts import Clock
+from grader.report.model.facts import Clock, RunFacts
+from grader.report.model.result import make_result
 from grader.report.model.result_model import Result
 
 
@@ -30,9 +32,9 @@ class Regraded:
 
     @property
     def gained(self) -> float:
-        """Points gained, negative if lost; 0 unless both have all their points."""
+        """Points gained, negative if lost, as far as points are known; 0 unless both are graded."""
         before, after = (
-            one.final_score if one is not None else None for one in (self.before, self.done.result)
+            one.known_score if one is not None else None for one in (self.before, self.done.result)
         )
         return total((after, -before)) if before is not None and after is not None else 0.0
 
@@ -45,12 +47,13 @@ class Regraded:
 
 
 def regrade_class(
-    loaded: LoadedAssignment, ledger: Ledger, only: Path | None = None
+    loaded: LoadedAssignment, ledger: Ledger, only: Path | None = None, *, write: bool = True
 ) -> Iterator[Regraded]:
     """Judge the rows of a batch with the assignment as it is now.
 
     A result that changes is kept beside the new one, in ``earlier/``. With the folder of a row's
-    report, only that row is judged, and those with the same submission.
+    report, only that row is judged, and those with the same submission. With ``write=False``
+    nothing is written: a preview of who gains and who loses.
     """
     written = ledger.read()
     entries = written.entries
@@ -68,14 +71,21 @@ def regrade_class(
         elif (entry.same_as or entry.key) not in chosen:
             yield Regraded(standing(ledger, entry), before)
         elif before is not None and entry.sha256 in ("", before.submission.sha256):
-            yield _regrade(loaded, ledger, entry, before, adjust)
+            yield _regrade(loaded, ledger, entry, before, adjust, write=write)
         elif entry.sha256:
             yield _not_judged(entry, None, NO_RESULT)
         else:
             yield Regraded(Done(entry, None, fresh=False), None)
-    if only is None:
+    if only is None and write:
         version = (loaded.assignment.id, loaded.sha256, loaded.location)
         ledger.write(entries, *version, written.course)
+
+
+def write_regraded(rows: Sequence[Regraded], ledger: Ledger) -> Path:
+    """Write gradebook and overview after a regrade; a gradebook that changes is kept as earlier."""
+    if any(row.changes for row in rows):
+        keep_earlier(ledger.out / GRADES_FILE)
+    return write_class(bring_up_to_date((row.done for row in rows), ledger), ledger)
 
 
 def _regrade(
@@ -84,6 +94,8 @@ def _regrade(
     entry: Entry,
     before: Result,
     adjust: ClassAdjustments,
+    *,
+    write: bool,
 ) -> Regraded:
     folder = ledger.folder(entry.key)
     try:
@@ -92,6 +104,10 @@ def _regrade(
         return _not_judged(entry, before, str(error).partition("\n")[0])
     graded = regrade(loaded, found)
     changes = tuple(compare(before, graded.grade))
+    if not write:
+        facts = RunFacts(before.started, before.duration_s)
+        after = adjust(make_result(graded.grade, graded.recordings, facts))
+        return Regraded(Done(entry, after, fresh=True), adjust(before), changes)
     version = (before.assignment.sha256, before.assignment.location)
     if changes or version != (loaded.sha256, loaded.location):
         keep_earlier(folder / RESULT_FILE)

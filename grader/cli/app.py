@@ -26,6 +26,7 @@ from grader.cli import (
     regrade,
     replay,
     report,
+    review,
     selftest,
     sim,
     start,
@@ -76,6 +77,7 @@ app.command("watch")(watch.watch)
 app.command("batch", context_settings={"allow_extra_args": True})(batch.batch)
 app.command("regrade")(regrade.regrade)
 app.command("report")(report.report)
+app.command("review")(review.review)
 app.command("similar")(instructor.similar)
 app.command("questions")(instructor.questions)
 app.command("replay")(replay.replay)

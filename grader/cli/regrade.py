@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from grader.batch.ledger import Ledger
 
 NOT_GRADED = 3
+NOTHING_WRITTEN = "Nothing was written (--dry-run)."
 
 
 def regrade(
@@ -32,6 +33,9 @@ def regrade(
         str | None,
         typer.Argument(help="Id or folder; by default the one used for grading."),
     ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Show who would gain what, and write nothing.")
+    ] = False,
     quiet: Quiet = False,
 ) -> None:
     """Judge the recordings again with the current YAML. Nothing is run.
@@ -42,12 +46,12 @@ def regrade(
     from grader.batch.ledger import BATCH_FILE
 
     if (path / BATCH_FILE).is_file():
-        _class(path, assignment, quiet)
+        _class(path, assignment, quiet, write=not dry_run)
     else:
-        _one(path, assignment)
+        _one(path, assignment, write=not dry_run)
 
 
-def _one(path: Path, assignment: str | None) -> None:
+def _one(path: Path, assignment: str | None, *, write: bool) -> None:
     from grader.assignment.load import load_assignment
     from grader.batch.adjusting import ClassAdjustments
     from grader.batch.attempts import with_history
@@ -76,12 +80,15 @@ def _one(path: Path, assignment: str | None) -> None:
     if found.result is not None:
         for line in compare(found.result, graded.grade) or ["no check changed"]:
             say(line)
-        if batch is not None:
+        if not write:
+            say(NOTHING_WRITTEN)
+        elif batch is not None:
             _in_class(batch, loaded, found.folder)
         else:
             history = partial(with_history, found.folder)
             write_graded(graded, found.folder, clock, amended=history)
-        say(f"Report: {found.folder / REPORT_FILE}")
+        if write:
+            say(f"Report: {found.folder / REPORT_FILE}")
     grade = graded.grade
     raise typer.Exit(NOT_GRADED if not grade.graded else 0 if grade.full_points else 1)
 
@@ -103,19 +110,14 @@ def _in_class(batch: Ledger, loaded: LoadedAssignment, folder: Path) -> None:
 
 
 def _write(ledger: Ledger, rows: Sequence[Regraded]) -> None:
-    """Write the gradebook and the overview again; a gradebook that changes is kept as earlier."""
-    from grader.batch.class_files import GRADES_FILE, write_class
-    from grader.batch.ledger import keep_earlier
-    from grader.batch.rendering import bring_up_to_date
+    from grader.batch.class_files import GRADES_FILE
+    from grader.batch.class_regrading import write_regraded
 
-    if any(row.changes for row in rows):
-        keep_earlier(ledger.out / GRADES_FILE)
-    overview = write_class(bring_up_to_date((row.done for row in rows), ledger), ledger)
-    say(f"Overview: {overview}")
+    say(f"Overview: {write_regraded(rows, ledger)}")
     say(f"Grades: {ledger.out / GRADES_FILE}")
 
 
-def _class(path: Path, assignment: str | None, quiet: bool) -> None:
+def _class(path: Path, assignment: str | None, quiet: bool, *, write: bool) -> None:
     from grader.assignment.load import load_assignment
     from grader.batch.class_regrading import regrade_class
     from grader.batch.ledger import Ledger
@@ -132,14 +134,17 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
         say(f"Assignment: {loaded.file}")
         with Progress(quiet).shown() as progress:
             progress.begin("judging", len(written.entries))
-            for row in regrade_class(loaded, ledger):
+            for row in regrade_class(loaded, ledger, write=write):
                 rows.append(row)
                 progress.advance(row.done.entry.key)
         for row in rows:
             problem = [f"not judged again: {row.problem}"] if row.problem else []
             for change in (*row.changes, *problem):
                 say(f"{row.done.entry.key}: {change}")
-        _write(ledger, rows)
+        if write:
+            _write(ledger, rows)
+        else:
+            say(NOTHING_WRITTEN)
     gain = [row for row in rows if row.gained > 0]
     lose = [row for row in rows if row.gained < 0]
     judged = sum(row.done.fresh for row in rows)

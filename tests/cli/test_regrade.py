@@ -107,6 +107,17 @@ def test_a_regrade_of_one_submission_brings_the_whole_class_up_to_date(
     assert grades((out / "grades.csv").read_text())["ben"]["max_score"] == "4"
 
 
+@pytest.mark.parametrize("part", [".", "submissions/ana"])
+def test_a_dry_run_says_who_gains_what_and_writes_nothing(
+    rosgrade: Rosgrade, out: Path, lesson: Path, part: str
+) -> None:
+    with_more_points(lesson)
+    before = {file: file.read_bytes() for file in out.rglob("*.*") if file.is_file()}
+    ended = rosgrade("regrade", out / part, "--dry-run")
+    assert "Nothing was written (--dry-run)." in ended.stdout
+    assert {file: file.read_bytes() for file in out.rglob("*.*") if file.is_file()} == before
+
+
 def test_what_report_recommends_names_the_assignment_and_works(
     rosgrade: Rosgrade, out: Path, lesson: Path
 ) -> None:

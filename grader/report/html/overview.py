@@ -6,7 +6,7 @@ Everything is in the page as a plain table; its script only filters and sorts.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import fmean, median
 from typing import TYPE_CHECKING
@@ -22,6 +22,7 @@ from grader.safe_text import one_line
 if TYPE_CHECKING:
     from grader.review.cluster import Cluster
 
+NO_LINKS: Mapping[str, str] = {}
 MOST_DISTURBED = 50
 MOST_SHOWN = 500
 """Rows of the table until all are asked for."""
@@ -45,10 +46,14 @@ def render_overview(
     clusters: Sequence[Cluster] = (),
     vanished: Sequence[str] = (),
     pages: Sequence[str] = (),
+    link: Callable[[ClassRow], str] | None = None,
+    links: Mapping[str, str] = NO_LINKS,
 ) -> str:
     """Render the overview of a class; its links are relative to the folder that it lies in.
 
     Args:
+        link: Where a row leads; by default to its report.
+        links: Addresses of other pages by what they are called, for the overview of a review.
         clusters: Failures with the same cause, the most frequent first.
         vanished: Students with a review who are not in the class any more.
         pages: Files with pages for the instructor.
@@ -77,12 +82,13 @@ def render_overview(
         RowStatus=RowStatus,
         why=_why_ungraded,
         disturbed=_disturbed(rows),
-        link=_link,
+        link=link or _link,
+        pages=pages,
         rows_by_id={row.id: row for row in rows},
         clusters=[one for one in clusters if len(one.lost) > 1][:MOST_CLUSTERS],
         waiting=[row for row in rows if row.status is RowStatus.WAITING],
         vanished=vanished,
-        pages=pages,
+        links=links,
         MOST_NAMED=MOST_NAMED,
     )
 

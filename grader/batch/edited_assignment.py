@@ -1,0 +1,109 @@
+"""An assignment with one check changed, to try it on a class, to use it, and to go back.
+
+``OUT/assignment/<number>/`` holds each version that was used: the whole folder of the assignment,
+and in ``before.json`` the assignment that the class was graded with before.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+from grader.assignment.load import ASSIGNMENT_FILE, LoadedAssignment, load_assignment
+from grader.batch.ledger import Ledger
+from grader.batch.regrading import stored_assignment
+from grader.errors import AssignmentError, RosgradeError, UsageError, machine_fault
+from grader.report.files import write_whole
+from grader.report.model.result import read_json
+
+FOLDER = "assignment"
+_BEFORE = "before.json"
+_LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "rosgrade-report")
+
+
+def load_used(ledger: Ledger) -> LoadedAssignment:
+    """The assignment that a class is graded with."""
+    written = ledger.read()
+    out = str(ledger.out)
+    name = stored_assignment(ledger.out, written.assignment, written.location, "regrade", out)
+    return load_assignment(name)
+
+
+def check_lines(loaded: LoadedAssignment, check: str) -> tuple[int, str]:
+    """The number of the first line of a check in ``assignment.yaml``, and its lines."""
+    lines = loaded.file.read_text(encoding="utf-8").splitlines(keepends=True)
+    first, end = _span(loaded, check, lines)
+    return first + 1, "".join(lines[first:end])
+
+
+def with_check(loaded: LoadedAssignment, check: str, text: str, place: Path) -> LoadedAssignment:
+    """Copy an assignment, with other lines for one of its checks.
+
+    Args:
+        place: A folder for the copy; it is removed if the new lines are wrong.
+
+    Raises:
+        AssignmentError: They are wrong; with the lines of the whole file.
+    """
+    if loaded.file.name != ASSIGNMENT_FILE:
+        raise UsageError(f"{loaded.file}: only an assignment in a folder of its own can be edited")
+    lines = loaded.file.read_text(encoding="utf-8").splitlines(keepends=True)
+    first, end = _span(loaded, check, lines)
+    new = text.replace("\r\n", "\n").rstrip("\n") + "\n"
+    folder = place / loaded.assignment.id
+    try:
+        shutil.copytree(loaded.folder, folder, ignore=_LEFT_OUT)
+    except OSError as error:
+        refusal = UsageError(f"{folder}: {error.strerror or error}")
+        raise machine_fault(error, folder) or refusal from error
+    try:
+        write_whole(folder / ASSIGNMENT_FILE, "".join([*lines[:first], new, *lines[end:]]))
+        return load_assignment(folder)
+    except RosgradeError as error:
+        shutil.rmtree(place, ignore_errors=True)
+        if isinstance(error, AssignmentError) and error.file.is_relative_to(folder):
+            file = error.file.relative_to(folder)
+            raise AssignmentError(file, list(error.problems)) from error
+        raise
+
+
+def next_place(ledger: Ledger) -> Path:
+    """The folder for the next version that is used."""
+    there = [int(one.name) for one in (ledger.out / FOLDER).glob("[0-9]*") if one.name.isdecimal()]
+    return ledger.out / FOLDER / str(max(there, default=0) + 1)
+
+
+def remember(ledger: Ledger, place: Path) -> None:
+    """Write down beside a new version what the class is graded with until now."""
+    before = json.dumps({"location": ledger.read().location}) + "\n"
+    write_whole(place / _BEFORE, before)
+
+
+def load_before(ledger: Ledger) -> LoadedAssignment | None:
+    """The assignment before the one that the class is graded with; None if that is the first."""
+    written = ledger.read()
+    file = Path(written.location or "").parent / _BEFORE
+    if written.location is None or not file.is_file():
+        return None
+    location = read_json(file)["location"]
+    out = str(ledger.out)
+    return load_assignment(
+        stored_assignment(ledger.out, written.assignment, location, "regrade", out)
+    )
+
+
+def _span(loaded: LoadedAssignment, check: str, lines: list[str]) -> tuple[int, int]:
+    """Index of the first line of a check, and of the line after its last."""
+    source = loaded.source
+    assert source is not None
+    names = [one.get("id") for one in source.data["checks"]]
+    if check not in names:
+        raise UsageError(f"{loaded.file}: there is no check {check!r}")
+    own = ("checks", names.index(check))
+    first = source.lines[own] - 1
+    later = [line for place, line in source.lines.items() if place[:2] != own and line > first + 1]
+    end = min(later, default=len(lines) + 1) - 1
+    while lines[end - 1].strip() == "" or lines[end - 1].lstrip().startswith("#"):
+        end -= 1
+    return first, end

@@ -1,0 +1,60 @@
+"""``rosgrade review``: read a class in a browser, comment it, and give points."""
+
+from __future__ import annotations
+
+import subprocess
+import threading
+from getpass import getuser
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from grader.cli.screen.console import open_page, say
+
+
+def review(
+    out: Annotated[Path, typer.Argument(help="Folder of a batch.")],
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, metavar="N", help="Port; 0 means any free port.")
+    ] = 0,
+    open_browser: Annotated[bool, typer.Option("--open", help="Open it in a browser.")] = False,
+    by: Annotated[
+        str | None,
+        typer.Option(metavar="INITIALS", help="Who reviews; by default from git's user.name."),
+    ] = None,
+) -> None:
+    """Review a class in a browser, until Ctrl-C.
+
+    Reports with the source beside them, comments, points by a person, and failures with the same
+    cause. What is written lies in OUT/review/. Only this machine can open the page.
+    """
+    from grader.errors import UsageError
+    from grader.server.review import ReviewServer
+
+    initials = by or _initials()
+    try:
+        server = ReviewServer(out, initials, port)
+    except OSError as error:
+        raise UsageError(f"--port {port}: {error.strerror}") from error
+    say(f"Review of {out} by {initials}: {server.url}")
+    say("Ctrl-C ends")
+    if open_browser:
+        open_page(server.url)
+    try:
+        threading.Event().wait()
+    except KeyboardInterrupt:
+        say("\nWriting the reports that were changed.")
+        server.close()
+        say("No longer serving.")
+
+
+def _initials() -> str:
+    """Initials of the name that git knows, or the user's name."""
+    name = ""
+    try:
+        command = ["git", "config", "user.name"]
+        name = subprocess.run(command, capture_output=True, text=True, check=False).stdout
+    except OSError:
+        pass
+    return "".join(word[0] for word in name.split()) or getuser()

@@ -1,0 +1,31 @@
+"use strict";
+(() => {
+  const main = document.querySelector("main"), problem = document.querySelector("#problem");
+  const open = () => { const one = location.hash && document.getElementById(location.hash.slice(1)); if (one) { one.open = true; one.scrollIntoView(); } };
+  addEventListener("hashchange", open);
+  open();
+  problem.querySelector("button").addEventListener("click", () => location.reload());
+  main.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const form = event.target, cluster = form.closest(".cluster");
+    const typed = Object.fromEntries(new FormData(form));
+    if (typed.share) typed.share = Number(typed.share) / 100;
+    let said;
+    try {
+      const answer = await fetch("clusters", {
+        method: "POST", headers: { "Content-Type": "application/json" },
+        body: JSON.stringify({ do: form.dataset.do, version: main.dataset.version, check: cluster.dataset.check, cause: cluster.dataset.cause, ...typed }),
+      });
+      if (answer.ok) {
+        location.hash = cluster.id;
+        return location.reload();
+      }
+      said = await answer.text();
+    } catch {
+      said = "rosgrade review cannot be reached any more. Start it again.";
+    }
+    problem.querySelector("p").textContent = `${said}\nNothing was saved. What you typed stays in its box.`;
+    problem.hidden = false;
+    problem.scrollIntoView();
+  });
+})();
