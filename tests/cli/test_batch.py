@@ -62,7 +62,9 @@ def test_a_class_is_graded_and_no_student_is_forgotten(
     (course / "dee.zip").write_bytes(b"PK\x03\x04 not a zip")
     with zipfile.ZipFile(course / "eli\nüñ🤖.zip", "w") as file:
         file.writestr("readme.txt", "I did not manage")
-    (tmp_path / "roster.csv").write_text("login,name\nana,Ana\nben,Ben\ncai,=cmd()\nfay,Fay\n")
+    (tmp_path / "roster.csv").write_text(
+        "login,name,email\nana,Ana,ana@example.org\nben,Ben,\ncai,=cmd(),\nfay,Fay,\n"
+    )
     out = tmp_path / "out"
     ended = rosgrade(
         "batch", "timed_publisher", course, "--out", out, "--roster", tmp_path / "roster.csv",
@@ -70,6 +72,9 @@ def test_a_class_is_graded_and_no_student_is_forgotten(
     )  # fmt: skip
     assert ended.returncode == 0, ended.stderr
     assert "rosgrade: sandbox: none\n" in ended.stderr
+    written = json.loads((out / "batch.json").read_text())["rows"]
+    (ana,) = (row for row in written if row["key"] == "ana")
+    assert (ana["email"], ana["source"]) == ("ana@example.org", str(course / "ana"))
     rows = grades(out)
     assert rows["ana"]["score"] == "10"
     assert rows["ana"]["note"] == "the same submission as cai"

@@ -100,6 +100,23 @@ def test_a_submission_without_a_package_gets_no_points_and_a_reason(
     assert result(tmp_path)["score"] == 0
 
 
+def test_a_report_shows_the_attempts_before_it(rosgrade: Rosgrade, tmp_path: Path) -> None:
+    notes = tmp_path / "submission" / "notes.txt"
+    notes.parent.mkdir()
+    for text in ("first", "second", "second"):
+        notes.write_text(text)
+        rosgrade("check", "timed_publisher", notes.parent)
+    first, second = result(tmp_path)["attempts"]
+    assert (first["counts"], second["counts"]) == (False, True)
+    page = (tmp_path / "rosgrade-report" / "report.html").read_text(encoding="utf-8")
+    assert "the one before had 0 points" in page
+    assert rosgrade("regrade", "rosgrade-report").returncode == 1
+    assert [one["sha256"] for one in result(tmp_path)["attempts"]] == [
+        first["sha256"],
+        second["sha256"],
+    ]
+
+
 def test_a_crash_is_shown_with_the_student_s_file_and_line(
     rosgrade: Rosgrade, tmp_path: Path
 ) -> None:

@@ -36,14 +36,15 @@ EMAILS = {
     "eve": ("Eve", "eve@example.org, all@example.org"),
     "flo": ("Flo", "flo@example.org"),
     "hal": ("Hal", "hal@example.org"),
+    "ivy": ("Ivy", "ivy@example.org"),
 }
 README = AdjustmentPart(kind="manual", item="readme", title="README", points=None, max_points=2)
 
 
 @pytest.fixture
 def out(tmp_path: Path) -> Path:
-    """A class: Ana lost points and has a hidden check, others have no grade or no report."""
-    made = {"ana": lost_points, "dora": not_graded}
+    """A class: Ana and Ivy have a hidden check, Ivy no report without it."""
+    made = {"ana": lost_points, "dora": not_graded, "ivy": lost_points}
     store, entries = ReviewStore(tmp_path / "out"), []
     with Ledger(tmp_path / "out").opened() as ledger:
         for key, (name, email) in EMAILS.items():
@@ -120,6 +121,7 @@ def test_each_student_gets_a_message_with_the_report_and_who_gets_none_is_named(
         "flo: waits for a person (README)",
         "gil: handed in nothing",
         "hal: its report is not up to date",
+        "ivy: its report is not up to date",
         "cy: has no usable address: in the roster's column `email`",
         "eve: has no usable address: eve@example.org, all@example.org",
     ]

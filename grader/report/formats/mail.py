@@ -60,7 +60,10 @@ def _message(letter: Letter, sender: Address | None) -> EmailMessage:
     message["Subject"] = one_line(letter.subject)
     message.set_content(clean(letter.body))
     data = letter.report.read_bytes()
-    message.add_attachment(data, maintype="text", subtype="html", filename="report.html")
+    utf8 = {"charset": "utf-8"}
+    message.add_attachment(
+        data, maintype="text", subtype="html", filename="report.html", params=utf8
+    )
     return message
 
 
