@@ -11,8 +11,9 @@ from pathlib import Path
 from grader.batch.attempts import attempts_of, read_earlier
 from grader.batch.ledger import BATCH_FILE, Entry, Ledger
 from grader.course.attempts import Attempt, Ruled, ruled
-from grader.course.late import HandInTime, known_time
-from grader.course.load import Course, Rules, load_course, utc
+from grader.course.instant import utc
+from grader.course.late import HandInTime
+from grader.course.load import Course, load_course
 from grader.errors import UsageError
 from grader.report.model.result_model import AttemptPart, Result
 from grader.report.model.student import VISIBLE_ONLY
@@ -61,9 +62,10 @@ class ClassRules:
         if self.course is None or entry.attempt_of:
             return Ruled(len(attempts) - 1)
         rules = self.course.rules(self._written.assignment, entry.key)
-        tokens = rules.tokens.each if rules.tokens and _is_late(attempts, rules) else 0
-        if tokens:
-            tokens = max(0, tokens - sum(one.spent(entry.key) for one in self._before))
+        tokens = 0
+        if rules.tokens and any(each.time.is_late(rules) for each in attempts):
+            spent = sum(one.spent(entry.key) for one in self._before)
+            tokens = max(0, rules.tokens.each - spent)
         return ruled(attempts, rules, tokens)
 
     def spent(self, key: str) -> int:
@@ -142,11 +144,6 @@ def _load(course: str, out: Path, assignment: str) -> Course:
     # Refuse rules of other assignments at once.
     found.rules(assignment, "")
     return found
-
-
-def _is_late(attempts: list[Attempt], rules: Rules) -> bool:
-    times = [known_time(each.time, rules)[0] for each in attempts]
-    return any(time is not None and utc(time) > utc(rules.due) for time in times)
 
 
 def _time(entry: Entry, sha256: str, result: Result) -> HandInTime:

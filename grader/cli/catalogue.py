@@ -37,13 +37,13 @@ def validate(
     from grader.assignment.load import load_assignment
     from grader.assignment.mutant import LANGUAGES, load_mutants
     from grader.batch.type_support import missing_underlays
-    from grader.course.load import is_course, load_course
+    from grader.course.load import COURSE_FILE, load_course
     from grader.sandbox.python_tree import not_installed
 
     broken = 0
     for name in files:
         try:
-            if is_course(Path(name)):
+            if Path(name).name == COURSE_FILE:
                 rules = load_course(Path(name)).spec
                 count = counted(len(rules.assignments), "assignment")
                 typer.echo(f"{name}: rules of {count}: valid")

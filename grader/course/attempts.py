@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from grader.course.late import HandInTime, Lateness, known_time, lateness
-from grader.course.load import Rules, utc
+from grader.course.late import HandInTime, lateness
+from grader.course.load import Rules
 from grader.course.model import Attempts
 from grader.report.model.result_model import AdjustmentPart, Result
+
+_NOT_COMPARED = "attempts without a grade, or of another version of the assignment, do not count"
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,7 @@ class Ruled:
         counts: Index of the attempt that counts.
         lines: Of the report, for the result of the last attempt.
         notes: For the instructor.
+        tokens: Late tokens that the attempt takes.
     """
 
     counts: int
@@ -35,18 +38,15 @@ class Ruled:
     tokens: int = 0
 
 
-def ruled(
-    attempts: Sequence[Attempt],
-    rules: Rules,
-    tokens_left: int = 0,
-) -> Ruled:
+def ruled(attempts: Sequence[Attempt], rules: Rules, tokens_left: int = 0) -> Ruled:
     """Apply the rules to the attempts of a student, the last of which is the current one."""
     last, current = len(attempts) - 1, attempts[-1].result
     if current.score is None:
         return Ruled(last)
+    rule, most = rules.attempts or Attempts(), current.final_max_score
     scores = [each.result.known_score or 0.0 for each in attempts]
     late = [
-        lateness(each.time, rules, current.final_max_score, score, tokens_left)
+        lateness(each.time, rules, most, score, tokens_left)
         for each, score in zip(attempts, scores, strict=True)
     ]
     same = [
@@ -55,47 +55,28 @@ def ruled(
         if each.result.score is not None
         and each.result.assignment.sha256 == current.assignment.sha256
     ]
-    rule = rules.attempts or Attempts()
-    counts = _counted(rule, attempts, rules, late, scores, same)
-    lines, notes = [], [late[counts].note]
+    allowed = [at for at in same if rule.at_most is None or at < rule.at_most] or [last]
+    allowed = [at for at in allowed if not late[at].closed] or allowed
+    counts = allowed[-1]
+    if rule.counts == "best":
+        counts = max(allowed, key=lambda at: (scores[at] - late[at].points, at))
+    elif rule.counts == "last before the deadline":
+        in_time = [at for at in allowed if not attempts[at].time.is_late(rules)]
+        counts = (in_time or allowed)[-1]
+    lines = [late[counts].line]
     if counts != last:
-        lines.append(
-            AdjustmentPart(
-                kind="attempts",
-                title=f"Attempt {counts + 1} of {len(attempts)} counts ({rule.words})",
-                points=scores[counts] - scores[last],
-                reason=f"it has {scores[counts]:g} of {current.known_max_score:g} points, the last "
-                f"attempt has {scores[last]:g}",
-            )
+        line = AdjustmentPart(
+            kind="attempts",
+            title=f"Attempt {counts + 1} of {len(attempts)} counts ({rule.words})",
+            points=scores[counts] - scores[last],
+            reason=f"it has {scores[counts]:g} of {current.known_max_score:g} points, the last "
+            f"attempt has {scores[last]:g}",
         )
-    line = late[counts].line
-    if rules.attempts and len(same) < len(attempts):
-        notes.append(
-            "an attempt that is not graded, or graded with another version of the assignment, "
-            "does not count"
-        )
+        lines.insert(0, line)
+    notes = (late[counts].note, _NOT_COMPARED if rules.attempts and len(same) <= last else "")
     return Ruled(
         counts,
-        (*lines, line) if line else tuple(lines),
+        tuple(line for line in lines if line is not None),
         tuple(filter(None, notes)),
         late[counts].tokens,
     )
-
-
-def _counted(
-    rule: Attempts,
-    attempts: Sequence[Attempt],
-    rules: Rules,
-    late: Sequence[Lateness],
-    scores: Sequence[float],
-    same: Sequence[int],
-) -> int:
-    allowed = [at for at in same if rule.at_most is None or at < rule.at_most] or same[-1:]
-    allowed = [at for at in allowed if not late[at].closed] or allowed
-    if rule.counts == "best":
-        return max(allowed, key=lambda at: (scores[at] - late[at].points, at))
-    if rule.counts == "last before the deadline":
-        times = {at: known_time(attempts[at].time, rules)[0] for at in allowed}
-        in_time = [at for at, time in times.items() if not time or utc(time) <= utc(rules.due)]
-        allowed = in_time or allowed
-    return allowed[-1]

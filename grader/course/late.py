@@ -8,12 +8,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
-from grader.course.instant import later, read_time, shown_length, shown_time
-from grader.course.load import Rules, utc
+from grader.course.instant import later, read_time, shown_length, shown_time, utc
+from grader.course.load import Rules
 from grader.course.model import points_of
 from grader.report.model.result_model import AdjustmentPart
 
-_ADVICE = "a column `handed_in` of the roster, with times such as 2026-10-12T23:59+02:00, says it"
+_NOTHING = "nothing is deducted"
+_ADVICE = (
+    f"{_NOTHING}: a column `handed_in` of the roster, with times such as 2026-10-12T23:59+02:00, "
+    "says it"
+)
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,29 @@ class HandInTime:
     marked_late: bool = False
     graded: str = ""
 
+    def known(self, rules: Rules) -> tuple[datetime | None, str]:
+        """When it was, to the minute; or None and why that is not known for sure."""
+        if not self.at:
+            note = f"marked late, but not by how much, so {_ADVICE}" if self.marked_late else ""
+            return None, note
+        moment = read_time(self.at)
+        if moment.tzinfo is None:
+            return None, f"handed in {shown_time(moment)} by {self.source}, so {_ADVICE}"
+        # In the student's favour: a due time of 23:59 lasts until this minute ends.
+        moment = moment.astimezone(rules.due.tzinfo).replace(second=0, microsecond=0)
+        said = f"handed in {shown_time(moment)} by {self.source}"
+        if self.graded and utc(moment) > utc(read_time(self.graded)):
+            return None, f"{said}, but graded before that: a clock is wrong, so {_NOTHING}"
+        if self.marked_late and utc(moment) <= utc(rules.due_of_all):
+            text = f"marked late by the platform, but {said}, before the due time"
+            return None, f"{text}: {_NOTHING}"
+        return moment, ""
+
+    def is_late(self, rules: Rules) -> bool:
+        """Whether it is known to be later than the student's due time."""
+        moment, _ = self.known(rules)
+        return moment is not None and utc(moment) > utc(rules.due)
+
 
 @dataclass(frozen=True)
 class Lateness:
@@ -39,6 +66,7 @@ class Lateness:
 
     Attributes:
         points: Deducted, at least 0.
+        tokens: Late tokens that it takes.
         line: Of the report, or None where there is nothing to say.
         note: For the instructor, where nothing is deducted because the time is in doubt.
         closed: Whether it came after the assignment closed.
@@ -51,23 +79,6 @@ class Lateness:
     closed: bool = False
 
 
-def known_time(handed: HandInTime, rules: Rules) -> tuple[datetime | None, str]:
-    """When it was handed in, to the minute; or None and why that is not known for sure."""
-    if not handed.at:
-        text = "marked late, but not by how much, so nothing is deducted"
-        return None, f"{text}: {_ADVICE}" if handed.marked_late else ""
-    moment = read_time(handed.at)
-    if moment.tzinfo is None:
-        text = f"handed in {shown_time(moment)} by {handed.source}: nothing is deducted"
-        return None, f"{text}: {_ADVICE}"
-    # The student's favour: a due time of 23:59 lasts until this minute ends.
-    moment = moment.replace(second=0, microsecond=0).astimezone(rules.due.tzinfo)
-    said = f"handed in {shown_time(moment)} by {handed.source}"
-    if handed.graded and utc(moment) > utc(read_time(handed.graded)):
-        return None, f"{said}, but graded before that: a clock is wrong, so nothing is deducted"
-    return moment, ""
-
-
 def lateness(
     handed: HandInTime, rules: Rules, max_score: float, score: float, tokens_left: int = 0
 ) -> Lateness:
@@ -78,61 +89,41 @@ def lateness(
         score: Points before; no more is deducted.
         tokens_left: Late tokens that the student still has.
     """
-    moment, note = known_time(handed, rules)
-    if moment is None:
+    moment, note = handed.known(rules)
+    if moment is None or utc(moment) <= utc(rules.due):
         return Lateness(note=note)
-    if utc(moment) <= utc(rules.due):
-        if handed.marked_late and utc(moment) <= utc(rules.due_of_all):
-            text = f"marked late by the platform, but handed in {shown_time(moment)} by "
-            note = f"{text}{handed.source}, before the due time: nothing is deducted"
-        return Lateness(note=note)
-    by = utc(moment) - utc(rules.due)
-    reason = (
-        f"handed in {shown_time(moment)} by {handed.source}, {shown_length(by)} after the due "
-        f"time {shown_time(rules.due)}"
-    )
-    if rules.closes and utc(moment) > utc(rules.closes):
-        text = f"{reason}; the assignment closed at {shown_time(rules.closes)}"
-        line = AdjustmentPart(
-            kind="late", title="Handed in after the end", points=-score, reason=text
-        )
-        return Lateness(score, line=line, closed=True)
-    late = rules.late
-    if late is None or by <= timedelta(seconds=late.grace):
-        return Lateness()
-    due, used = rules.due, 0
-    if rules.tokens is not None:
-        worth = rules.tokens.worth
-        used = min(_begun(due, moment, worth), tokens_left)
-        due = later(due, used, worth)
-    grace = timedelta(seconds=late.grace)
-    count = _begun(due, moment, late.per) if utc(moment) - utc(due) > grace else 0
-    costs = count * points_of(late.deduct, max_score)
-    most = min(score, max_score if late.at_most is None else points_of(late.at_most, max_score))
-    points = max(0.0, min(costs, most))
-    if not (used or costs):
-        return Lateness()
-    units = f"{count} {late.per if count == 1 else f'{late.per}s'}"
-    share = f"{late.deduct} of {max_score:g} points"
-    if not isinstance(late.deduct, str):
-        share = f"{late.deduct:g} points"
-    limit = f", at most {late.at_most}" if late.at_most is not None else ""
-    rule = f"{units} × {share}{limit}"
-    spent = f"{used} late {'token' if used == 1 else 'tokens'} used" if used else ""
-    parts = [reason, spent, rule if count else ""]
+    by, late = utc(moment) - utc(rules.due), rules.late
+    closed = rules.closes is not None and utc(moment) > utc(rules.closes)
+    used, points, words = 0, score, f"the assignment closed at {shown_time(rules.closes or moment)}"
+    if not closed:
+        grace = timedelta(seconds=late.grace if late is not None else 0.0)
+        if late is None or by <= grace or not points_of(late.deduct, max_score):
+            return Lateness()
+        due = rules.due
+        if rules.tokens is not None:
+            used = min(_begun(due, moment, rules.tokens.worth), tokens_left)
+            due = later(due, used, rules.tokens.worth)
+        count = _begun(due, moment, late.per) if utc(moment) - utc(due) > grace else 0
+        most = max_score if late.at_most is None else points_of(late.at_most, max_score)
+        points = min(count * points_of(late.deduct, max_score), most, score)
+        spent = f"{used} late {'token' if used == 1 else 'tokens'} used" if used else ""
+        is_share = isinstance(late.deduct, str)
+        each = f"{late.deduct} of {max_score:g}" if is_share else f"{late.deduct:g}"
+        limit = f", at most {late.at_most}" if late.at_most is not None else ""
+        rule = f"{count} {late.per}{'s' * (count != 1)} × {each} points{limit}"
+        words = "; ".join(filter(None, (spent, rule if count else "")))
     line = AdjustmentPart(
         kind="late",
-        title=f"Late by {shown_length(by)}",
-        points=-points,
-        reason="; ".join(part for part in parts if part),
+        title="Handed in after the end" if closed else f"Late by {shown_length(by)}",
+        points=0.0 - points,
+        reason=f"handed in {shown_time(moment)} by {handed.source}, {shown_length(by)} after the "
+        f"due time {shown_time(rules.due)}; {words}",
     )
-    return Lateness(points, used, line)
+    return Lateness(points, used, line, closed=closed)
 
 
 def _begun(due: datetime, moment: datetime, per: str) -> int:
     """Days or hours that have begun between a due time and a later time; 0 if it is not later."""
-    if utc(moment) <= utc(due):
-        return 0
     unit = timedelta(days=1) if per == "day" else timedelta(hours=1)
     count = max(0, (utc(moment) - utc(due)) // unit - 1)
     while utc(later(due, count, per)) < utc(moment):

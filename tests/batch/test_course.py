@@ -191,7 +191,7 @@ def test_the_roster_says_when_and_goes_before_the_platform(course: Class) -> Non
     )
     assert lines(rows["90211"]) == [("late", -2)]
     assert lines(rows["90212"]) == lines(rows["90213"]) == []
-    assert "without a zone by the roster: nothing is deducted" in rows["90212"].note
+    assert "without a zone by the roster, so nothing is deducted: a column" in rows["90212"].note
     assert "when it was handed in is not known: 'yesterday' is not a date" in rows["90213"].note
 
 

@@ -81,8 +81,7 @@ def test_a_grade_of_another_version_is_not_compared() -> None:
     found = rule(BEST, attempt(9, 1, version="old"), attempt(5, 2), attempt(None, 3), attempt(4, 4))
     assert found.counts == 1
     assert found.notes == (
-        "an attempt that is not graded, or graded with another version of the assignment, does "
-        "not count",
+        "attempts without a grade, or of another version of the assignment, do not count",
     )
 
 

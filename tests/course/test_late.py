@@ -148,7 +148,7 @@ def test_nothing_is_deducted_on_a_time_that_is_not_known_for_sure() -> None:
         (HandInTime(marked_late=True), "marked late, but not by how much, so nothing is deducted"),
         (
             HandInTime("2026-03-04T12:00:00", "the name of the file"),
-            "handed in 2026-03-04 12:00 without a zone by the name of the file: nothing is",
+            "handed in 2026-03-04 12:00 without a zone by the name of the file, so nothing is",
         ),
         (
             HandInTime("2027-03-04T12:00:00Z", "git", graded="2026-03-05T08:00:00+01:00"),

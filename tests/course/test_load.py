@@ -72,7 +72,7 @@ def test_a_student_has_the_rules_of_the_assignment_and_the_own_extension(tmp_pat
             "course.yaml:7: assignments.timed_publisher."
             "due: '2026-10-12' is not a date with a time of day",
         ),
-        ("due: 2026-10-12 23:59", "due: 2026-13-12 23:59", "does not exist: month must be"),
+        ("due: 2026-10-12 23:59", "due: 2026-13-12 23:59", "is not a date with a time of day"),
         (
             "due: 2026-10-26 23:59",
             "due: 2026-10-25 02:30",
@@ -122,7 +122,6 @@ def test_a_student_has_the_rules_of_the_assignment_and_the_own_extension(tmp_pat
             "course.yaml:3: late.deduct: '110 %' is not a percentage",
         ),
         ("deduct: 10 %", "deduct: -1", "expected points (0.5) or a percentage of all points"),
-        ("at_most: 50 %", "at_most: 5 %", "late.at_most: is less than one day costs, 10 %"),
         ("counts: best", "counts: bst", "expected 'best', 'last' or 'last before the deadline'"),
         ("grace: 15 min", "grace: 15", "late.grace: 15 has no unit"),
     ],
