@@ -58,6 +58,8 @@ def regrade_class(
     written = ledger.read()
     entries = written.entries
     adjust = ClassAdjustments(ledger)
+    # What people wrote must be readable before anything is written.
+    adjust.vanished()
     refuse_other(ledger.out, written.assignment, loaded)
     chosen = {
         entry.same_as or entry.key

@@ -17,7 +17,7 @@ from grader.cli.formats import (
     JunitFamilyName,
     with_file_formats,
 )
-from grader.cli.screen.console import say
+from grader.cli.screen.console import print_warning, say
 
 
 @with_file_formats
@@ -55,6 +55,8 @@ def report(
         )
     ledger = Ledger(out) if (out / BATCH_FILE).is_file() else Ledger.around(folders[0])
     adjust = ClassAdjustments(ledger) if ledger is not None else None
+    for key in adjust.vanished() if adjust is not None else ():
+        print_warning(f"the review of {key} stays, but the class has no such student")
     for folder in folders:
         read = [folder / RESULT_FILE, folder / RECORDINGS_FOLDER, gradescope_metadata]
         refuse_inputs([folder / REPORT_FILE, *files.values()], read)

@@ -19,6 +19,10 @@ from grader.grade import grade
 from grader.recording.mcap_writer import write_recording
 from grader.recording.model import to_json
 from grader.report.model.facts import Clock
+from grader.report.model.result import read_result
+from grader.review.cause import cause
+from grader.review.model import ClassReview, Comment, Forgiven, ManualScore, StudentReview
+from grader.review.store import ReviewStore
 from grader.submission.prepare import Prepared
 from grader.submission.record import SubmissionRecord
 from tests.batch.test_grading import recording
@@ -269,3 +273,59 @@ def test_one_recording_is_judged_and_replayed_with_the_assignment_it_was_made_fo
             f"{file}: was graded with the assignment 'my_lesson'; name its folder: " in ended.stderr
         )
         assert f"`rosgrade {words} FOLDER`" in ended.stderr
+
+
+MANUAL = "manual:\n  - {id: readme, title: README, points: 2}\n"
+
+
+def test_what_a_person_wrote_reaches_every_file_and_survives_a_regrade(
+    rosgrade: Rosgrade, out: Path, lesson: Path
+) -> None:
+    (lesson / "assignment.yaml").write_text(YAML + MANUAL, encoding="utf-8")
+    assert rosgrade("regrade", out).returncode == 0
+    csv_file = out / "grades.csv"
+    assert grades(csv_file.read_text())["ana"]["status"] == "waits for a person"
+    store = ReviewStore(out)
+    review = StudentReview(
+        key="ana",
+        manual={"readme": ManualScore(points=1.5, by="AB")},
+        comments=(Comment(text="See REP-144", by="AB"),),
+    )
+    store.save(review, "")
+    (check, *_) = read_result(out / "submissions" / "ana" / "result.json").checks
+    forgiven = Forgiven(check=check.id, cause=cause(check), by="AB")
+    version = store.save(ClassReview(forgiven=(forgiven,)), "")
+    for command in ("report", "regrade"):
+        assert rosgrade(command, out).returncode == 0
+        found = grades(csv_file.read_text())
+        assert [found["ana"][one] for one in ("score", "max_score", "readme (2)", "forgiven")] == [
+            *("2.5", "4", "1.5", "1")
+        ]
+        assert found["cai"]["status"] == "waits for a person"
+        page = (out / "submissions" / "ana" / "report.html").read_text(encoding="utf-8")
+        assert "README: 1.5 of 2 points, by AB" in page and "See REP-144" in page
+    exported = out.parent / "export.csv"
+    assert rosgrade("export", "csv", out, "-o", exported).returncode == 0
+    assert exported.read_bytes() == csv_file.read_bytes()
+    store.undo(None, version)
+    assert rosgrade("report", out).returncode == 0
+    assert grades(csv_file.read_text())["ana"]["score"] == "1.5"
+    assert store.student("ana").content == review
+
+
+@pytest.mark.parametrize(
+    "arguments", [("report",), ("regrade",), ("export", "csv")], ids=lambda words: words[0]
+)
+def test_a_review_that_is_nonsense_is_one_message_and_stays(
+    rosgrade: Rosgrade, out: Path, arguments: tuple[str, ...]
+) -> None:
+    file = ReviewStore(out).file("ana")
+    file.parent.mkdir()
+    file.write_text("key: ana\ncomments: [nice]\n", encoding="utf-8")
+    page = (out / "submissions" / "ana" / "report.html").read_bytes()
+    ended = rosgrade(*arguments, out)
+    assert ended.returncode == 2
+    assert ended.stderr.count("error: ") == 1 and "Traceback" not in ended.stderr
+    assert f"{file}:2: comments[0]: " in ended.stderr
+    assert file.read_text(encoding="utf-8") == "key: ana\ncomments: [nice]\n"
+    assert (out / "submissions" / "ana" / "report.html").read_bytes() == page
