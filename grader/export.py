@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 import shutil
 import zipfile
@@ -61,11 +62,14 @@ def classroom50(loaded: LoadedAssignment, out: Path) -> Path:
     return folder
 
 
-def github(loaded: LoadedAssignment, out: Path, action: str) -> Path:
+def github(loaded: LoadedAssignment, out: Path, action: str, tag: str = "") -> Path:
     """Write the workflow that goes into a template repository.
 
     An assignment that is not one of rosgrade's own is copied beside it, without its solution and
     its hidden checks.
+
+    Args:
+        tag: Pattern of the tags that are graded; every push if empty.
     """
     if not _ACTION.fullmatch(action):
         raise UsageError(
@@ -79,7 +83,8 @@ def github(loaded: LoadedAssignment, out: Path, action: str) -> Path:
             write_whole(out / name / inside, content)
     text = _read_template("github-workflow.yml", name)
     file = out / ".github" / "workflows" / "rosgrade.yml"
-    write_whole(file, text.replace("@ACTION@", action))
+    tags = f"\n    tags: [{json.dumps(tag)}]" if tag else ""
+    write_whole(file, text.replace("@ACTION@", action).replace("@TAGS@", tags))
     return file
 
 

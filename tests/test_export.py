@@ -140,6 +140,47 @@ def test_every_action_runs_on_a_node_that_github_still_has():
     assert [(name, number) for name, number in used if int(number) < first[name]] == []
 
 
+def test_the_action_declares_every_output_that_grading_sets():
+    declared = yaml.safe_load((ROOT / "action.yml").read_text())["outputs"]
+    source = (ROOT / "grader/report/formats/github.py").read_text(encoding="utf-8")
+    keys = source.partition("values = {")[2].partition("}")[0]
+    assert set(re.findall(r'"([\w-]+)":', keys)) <= set(declared)
+
+
+def step(name):
+    steps = yaml.safe_load((ROOT / "action.yml").read_text())["runs"]["steps"]
+    return next(one["run"] for one in steps if one.get("id") == name)
+
+
+@pytest.mark.parametrize(
+    ("tag", "ref", "graded"),
+    [
+        ("", "refs/heads/main", True),
+        ("submit*", "refs/tags/submit-2", True),
+        ("submit*", "refs/tags/draft", False),
+        ("submit*", "refs/heads/submit", False),
+    ],
+)
+def test_the_action_grades_only_the_tags_that_are_wanted(tmp_path, tag, ref, graded):
+    outputs = tmp_path / "outputs"
+    given = {"TAG": tag, "GITHUB_REF": ref, "GITHUB_OUTPUT": str(outputs)}
+    subprocess.run(["bash", "-e", "-c", step("begin")], env={**os.environ, **given}, check=True)
+    assert ("grade=true" in outputs.read_text()) is graded
+
+
+def test_the_action_says_how_long_it_took(tmp_path):
+    given = {"BEGAN": "0", "GITHUB_OUTPUT": str(tmp_path / "outputs")}
+    # 90 s after BEGAN.
+    script = f"date() {{ echo 90; }}\n{step('end')}"
+    subprocess.run(["bash", "-e", "-c", script], env={**os.environ, **given}, check=True)
+    assert (tmp_path / "outputs").read_text() == "minutes=1.5\n"
+
+
+def test_a_workflow_can_wait_for_a_tag(loaded, tmp_path):
+    file = export.github(loaded, tmp_path, "my-course/rosgrade@v1", "submit*")
+    assert yaml.safe_load(file.read_text())[True]["push"] == {"tags": ["submit*"]}
+
+
 def test_no_input_of_the_action_reaches_a_shell_as_text():
     action = yaml.safe_load((ROOT / "action.yml").read_text())
     scripts = [step["run"] for step in action["runs"]["steps"] if "run" in step]

@@ -93,15 +93,6 @@ def find_assignment(name: str | Path) -> Path:
     )
 
 
-def refuse_swapped(name: str, submission: Path) -> None:
-    """Refuse a command that names the submission first, and then the assignment."""
-    known = list_assignments()
-    if name not in known and str(submission) in known and not submission.exists():
-        raise UsageError(
-            f"{submission} is an assignment. Give the assignment first: {submission} {name}"
-        )
-
-
 def load_assignment(
     name: str | Path, catalogue: Mapping[str, Check] = CATALOGUE
 ) -> LoadedAssignment:

@@ -18,8 +18,6 @@ from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check
 from grader.spec.source import Model
 
-_DRAFT = "https://json-schema.org/draft/2020-12/schema"
-
 
 def assignment_schema(catalogue: Mapping[str, Check] = CATALOGUE) -> dict[str, Any]:
     """The schema of ``assignment.yaml``, with the parameters of every check."""
@@ -48,13 +46,13 @@ def assignment_schema(catalogue: Mapping[str, Check] = CATALOGUE) -> dict[str, A
     entry["allOf"] = [
         _parameters_of(check, references[check.parameters]) for check in catalogue.values()
     ]
-    return {"$schema": _DRAFT, **references[Assignment], **schema}
+    return {**references[Assignment], **schema}
 
 
 def mutants_schema() -> dict[str, Any]:
     """The schema of ``mutants.yaml``."""
     references, schema = _schemas(MutantFile)
-    return {"$schema": _DRAFT, **references[MutantFile], **schema}
+    return {**references[MutantFile], **schema}
 
 
 def _schemas(*models: type[Model]) -> tuple[dict[type[Model], dict[str, Any]], dict[str, Any]]:

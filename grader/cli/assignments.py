@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.options import AssignmentName
+from grader.cli.options import AssignmentName, file_option
 from grader.cli.screen.console import output_console, say
 
 
@@ -35,7 +35,7 @@ def show(
     ] = False,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="File of the page; by default ID.html, here."),
+        file_option("--out", "-o", text="File of the page; by default ID.html, here."),
     ] = None,
 ) -> None:
     """Show the handout of an assignment, with its checks and points.

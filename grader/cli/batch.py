@@ -66,7 +66,7 @@ def batch(
     Writes a report for each submission, an overview (index.html) and grades.csv to OUT. Ends
     with 0 if every submission was graded, whatever the grades, and with 3 if one was not.
     """
-    from grader.assignment.load import load_assignment, refuse_swapped
+    from grader.assignment.load import load_assignment
     from grader.batch.adjusting import ClassAdjustments
     from grader.batch.batch import Batch
     from grader.batch.class_files import GRADES_FILE, write_class
@@ -84,7 +84,6 @@ def batch(
         # What a shell makes of `class/*`.
         count = 1 + len(context.args)
         raise UsageError(f"batch takes one folder, not {count} submissions: give their folder")
-    refuse_swapped(assignment, submissions)
     refuse_inputs([out], [*assignment_places(assignment), submissions, roster, course])
     check_folder(out)
     loaded = load_assignment(assignment)

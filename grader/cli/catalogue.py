@@ -90,7 +90,12 @@ def schema(
         Document.COURSE: course_schema,
         Document.RESULT: result_schema,
     }[document]
-    typer.echo(json.dumps(make(), indent=2))
+    head = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        # A name and no address: an editor takes the schema from a file.
+        "$id": f"urn:rosgrade:schema:{document.value}:1",
+    }
+    typer.echo(json.dumps({**head, **make()}, indent=2))
 
 
 def checks(

@@ -36,6 +36,7 @@ from grader.cli.options import (
     assignment_places,
     chosen_names,
     chosen_sandbox,
+    file_option,
 )
 from grader.cli.screen.console import open_page, output_console, say
 from grader.cli.screen.progress import Progress
@@ -50,10 +51,10 @@ def check(
     assignment: AssignmentName,
     submission: Annotated[
         Path, typer.Argument(help="The submission: a folder, a .zip or a .tar.gz.")
-    ],
+    ] = Path(),
     report: ReportFolder = Path("rosgrade-report"),
     json_file: Annotated[
-        Path | None, typer.Option("--json", help="Also write the result to this file.")
+        Path | None, file_option("--json", text="Also write the result to this file.")
     ] = None,
     scenario: Scenarios = None,
     only: Checks = None,
@@ -103,14 +104,13 @@ def check(
         runner.get_ready()
         try:
             # Imported while the cell gets ready.
-            from grader.assignment.load import load_assignment, refuse_swapped
+            from grader.assignment.load import load_assignment
             from grader.assignment.selection import select, visible_part
             from grader.batch.files import refuse_foreign
             from grader.batch.grading import RECORDINGS_FOLDER, Grading
             from grader.report.files import check_folder
             from grader.submission.intake.locate import check_path
 
-            refuse_swapped(assignment, submission)
             whole = chosen_names(load_assignment(assignment), chosen)
             shown = whole if hidden else visible_part(whole)
             loaded = select(shown, tuple(only or ()), tuple(scenario or ()))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.options import AssignmentName
+from grader.cli.options import AssignmentName, file_option
 from grader.cli.screen.console import print_error, print_warning, say
 
 if TYPE_CHECKING:
@@ -19,7 +19,15 @@ if TYPE_CHECKING:
 Folder = Annotated[Path, typer.Option("--out", help="Folder to write to.")]
 ClassFolder = Annotated[Path, typer.Argument(help="Folder of a batch.")]
 Results = Annotated[Path, typer.Argument(help="Folder with the reports of a class.")]
-File = Annotated[Path, typer.Option("--output", "-o", help="File to write.")]
+File = Annotated[Path, file_option("--output", "-o", text="File to write.")]
+
+Tag = Annotated[
+    str,
+    typer.Option(
+        metavar="PATTERN",
+        help="On GitHub, grade only pushes of such tags, as `submit*`; by default every push.",
+    ),
+]
 
 
 class Zero(str, Enum):
@@ -62,12 +70,13 @@ def github(
         typer.Option(help="Your course's copy of rosgrade: OWNER/REPOSITORY@REF."),
     ],
     out: Folder = Path(),
+    tag: Tag = "",
 ) -> None:
     """Write the workflow for the template repository of an assignment."""
     from grader import export
     from grader.assignment.load import load_assignment
 
-    say(f"Commit and push: {export.github(load_assignment(assignment), out, action)}")
+    say(f"Commit and push: {export.github(load_assignment(assignment), out, action, tag)}")
 
 
 @app.command()
@@ -87,14 +96,7 @@ def course(
     ],
     out: Annotated[Path, typer.Option("--out", help="A new folder, or an earlier kit.")],
     title: Annotated[str, typer.Option(help="Name of the course.")] = "ROS 2 assignments",
-    tag: Annotated[
-        str,
-        typer.Option(
-            metavar="PATTERN",
-            help="On GitHub, grade only when such a tag is pushed, as `submit*`; by default "
-            "every push.",
-        ),
-    ] = "",
+    tag: Tag = "",
 ) -> None:
     """Write a course kit: what you give to students.
 

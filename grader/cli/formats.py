@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
+from grader.cli.options import file_option
 from grader.report import formats
 from grader.report.formats.options import FormatOptions
 
@@ -86,7 +87,7 @@ def with_file_formats(command: Callable[..., None]) -> Callable[..., None]:
         command(**arguments, files={name: file for name, file in files.items() if file})
 
     options = {
-        name: Annotated[Path | None, typer.Option(f"--{name}", help=text)]
+        name: Annotated[Path | None, file_option(f"--{name}", text=text)]
         for name, text in file_formats().items()
     }
     hints = {**get_type_hints(command, include_extras=True), **options}

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from grader import resources
+from grader.cli.arguments import assignment_argument
 from grader.cli.screen.progress import Progress
 from grader.errors import UsageError
+from grader.report.files import STANDARD_OUTPUT
 from grader.sandbox.choice import Choice
 
 if TYPE_CHECKING:
     from grader.assignment.load import LoadedAssignment
     from grader.sandbox.sandbox import Sandbox
 
-AssignmentName = Annotated[str, typer.Argument(help="Id of the assignment, or its folder.")]
+AssignmentName = Annotated[
+    str, typer.Argument(help="Id of the assignment, or its folder.", callback=assignment_argument)
+]
 ReportFolder = Annotated[
     Path, typer.Option(help="Folder for report.html, result.json and the recordings.")
 ]
@@ -57,6 +62,17 @@ SandboxChoice = Annotated[
         "(an error if it does not work), none.",
     ),
 ]
+
+
+def file_option(*names: str, text: str) -> Any:
+    """An option with a file to write; for `-`, standard output, messages go to standard error."""
+
+    def read(file: Path | None) -> Path | None:
+        if file == STANDARD_OUTPUT:
+            sys.stdout = sys.stderr
+        return file
+
+    return typer.Option(*names, metavar="FILE", help=text, callback=read)
 
 
 def assignment_places(name: str) -> tuple[Path, Path]:

@@ -7,13 +7,19 @@ from typing import Annotated
 
 import typer
 
+from grader.cli.arguments import recording_argument
 from grader.cli.options import Quiet
 from grader.cli.screen.progress import Progress
 from grader.resources import cache_folder
 
 
 def replay(
-    recording: Annotated[Path, typer.Argument(help="A recording, such as recordings/run.mcap.")],
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            help="A recording, such as recordings/run.mcap.", callback=recording_argument
+        ),
+    ],
     submission: Annotated[Path, typer.Argument(help="Program to run: a folder or an archive.")],
     assignment: Annotated[
         str | None,

@@ -74,7 +74,7 @@ def watch(
     starts the run again. The files of the assignment are watched too.
     """
     from grader import ros
-    from grader.assignment.load import load_assignment, refuse_swapped
+    from grader.assignment.load import load_assignment
     from grader.assignment.selection import select, visible_part
     from grader.batch.files import refuse_foreign
     from grader.errors import UsageError
@@ -88,7 +88,6 @@ def watch(
         shown = whole if hidden else visible_part(whole)
         return select(shown, tuple(only or ()), tuple(scenario or ()))
 
-    refuse_swapped(assignment, submission)
     outputs = [report, report / "report.html"]
     refuse_inputs(outputs, [*assignment_places(assignment), submission])
     loaded = load()

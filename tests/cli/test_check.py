@@ -44,12 +44,12 @@ def statuses(folder: Path) -> dict[str, str]:
 
 
 def test_the_reference_gets_full_points_and_a_report(rosgrade: Rosgrade, tmp_path: Path) -> None:
-    ended = rosgrade("check", "timed_publisher", REFERENCE, "--json", tmp_path / "copy.json")
+    ended = rosgrade("check", "timed_publisher", REFERENCE, "--json", "-")
     assert ended.returncode == 0, ended.stdout + ended.stderr
-    assert "Score: 10 of 10 points" in ended.stdout
+    assert "Score: 10 of 10 points" in ended.stderr
     written = result(tmp_path)
     assert (written["score"], written["max_score"], written["graded"]) == (10, 10, True)
-    assert json.loads((tmp_path / "copy.json").read_text()) == written
+    assert json.loads(ended.stdout) == written
     assert "10" in (tmp_path / "rosgrade-report" / "report.html").read_text(encoding="utf-8")
 
     again = rosgrade("regrade", tmp_path / "rosgrade-report")

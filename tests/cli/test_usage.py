@@ -75,15 +75,78 @@ def test_the_submissions_of_a_class_are_named_by_their_folder(rosgrade: Rosgrade
     assert "batch takes one folder, not 2 submissions: give their folder" in told
 
 
-@pytest.mark.parametrize("command", ["check", "watch", "batch"])
-def test_a_submission_in_front_of_the_assignment_is_refused_with_the_right_order(
-    rosgrade: Rosgrade, tmp_path: Path, command: str
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("check", "mine", "timed_publisher"),
+        ("check", "mine"),
+        ("watch", "mine"),
+        ("start", "mine"),
+        ("batch", "mine", "--out", "results"),
+    ],
+)
+def test_a_submission_in_the_place_of_the_assignment_is_named_as_one(
+    rosgrade: Rosgrade, tmp_path: Path, arguments: tuple[str, ...]
+) -> None:
+    (tmp_path / "mine" / "src" / "bot").mkdir(parents=True)
+    (tmp_path / "mine" / "src" / "bot" / "package.xml").touch()
+    ended = rosgrade(*arguments)
+    assert ended.returncode == 2
+    assert "mine is a folder with the package bot, such as a submission; " in ended.stderr
+    assert "the first argument is an assignment, such as bot_controller\n" in ended.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "seen"),
+    [
+        ("mine.zip", "an archive"),
+        ("run.mcap", "a recording"),
+        ("results", "a folder with results"),
+        ("empty", "a folder without an assignment.yaml"),
+    ],
+)
+def test_what_stands_in_the_place_of_the_assignment_is_named(
+    rosgrade: Rosgrade, tmp_path: Path, name: str, seen: str
+) -> None:
+    for folder in ("results", "empty"):
+        (tmp_path / folder).mkdir()
+    for file in ("mine.zip", "run.mcap", "results/result.json"):
+        (tmp_path / file).touch()
+    ended = rosgrade("check", name)
+    assert ended.returncode == 2
+    assert f"{name} is {seen}; the first argument is an assignment" in ended.stderr
+
+
+def test_a_submission_in_the_place_of_a_recording_is_named(
+    rosgrade: Rosgrade, tmp_path: Path
 ) -> None:
     (tmp_path / "mine").mkdir()
-    more = ("--out", "results") if command == "batch" else ()
-    ended = rosgrade(command, "mine", "timed_publisher", *more)
+    ended = rosgrade("replay", "mine", "run.mcap")
     assert ended.returncode == 2
-    assert "Give the assignment first: timed_publisher mine" in ended.stderr
+    assert "; the first argument is a recording, such as recordings/run.mcap" in ended.stderr
+
+
+def test_an_own_assignment_and_a_folder_of_its_name_are_the_assignment(
+    rosgrade: Rosgrade, tmp_path: Path
+) -> None:
+    (tmp_path / "timed_publisher").mkdir()
+    for name in ("timed_publisher", lesson(tmp_path)):
+        assert rosgrade("show", name).returncode == 0
+
+
+def test_a_file_that_is_a_dash_is_standard_output_and_nothing_else_is_in_it(
+    rosgrade: Rosgrade,
+) -> None:
+    shown = rosgrade("show", "timed_publisher", "--html", "--out", "-")
+    assert shown.returncode == 0
+    assert shown.stdout.startswith("<!doctype html>") and shown.stdout.endswith("</html>")
+    assert shown.stderr == "Handout: -\n"
+
+
+def test_one_output_alone_goes_to_standard_output(rosgrade: Rosgrade) -> None:
+    ended = rosgrade("check", "timed_publisher", ".", "--json", "-", "--junit", "-")
+    assert ended.returncode == 2
+    assert "-: is given for two outputs" in ended.stderr
 
 
 def test_a_submission_that_does_not_exist_is_named(rosgrade: Rosgrade) -> None:
@@ -161,6 +224,10 @@ def test_the_schemas_are_json_schemas(rosgrade: Rosgrade, document: str) -> None
     import json
 
     schema = json.loads(rosgrade("schema", document).stdout)
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert schema["$id"] == f"urn:rosgrade:schema:{document}:1"
+    if document == "result":
+        assert schema["properties"]["schema"]["const"] == 1
     assert schema["$defs"]
 
 
