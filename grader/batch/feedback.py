@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,13 +11,17 @@ from grader.batch.class_files import class_rows, standing
 from grader.batch.files import REPORT_FILE, STUDENT_FILE
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.rendering import NOT_UP_TO_DATE, bring_up_to_date
+from grader.errors import RosgradeError
 from grader.report.files import folder_name, write_whole
 from grader.report.formats.gradebook import why_no_score
+from grader.report.formats.mail import Letter, address
 from grader.report.formats.markdown import render_markdown
 from grader.report.model.class_row import RowStatus
 from grader.report.model.result_model import Result
 from grader.report.model.student import for_student
+from grader.report.text.summary import summary
 from grader.safe_text import one_line
+from grader.submission.git import commit_folder
 
 FEEDBACK_FOLDER = "rosgrade-feedback"
 
@@ -55,14 +60,44 @@ def class_feedback(out: Path) -> tuple[list[Feedback], list[str]]:
     return found, problems
 
 
+def letters(found: Sequence[Feedback], subject: str) -> tuple[list[Letter], list[str]]:
+    """A message for each student who has an address, and who has none."""
+    messages, problems = [], []
+    for one in found:
+        # "Lopez, Ana" is Ana Lopez.
+        name = " ".join(reversed(one.entry.name.split(",", 1))).strip()
+        to = address(one.entry.email, name)
+        if to is None:
+            email = one_line(one.entry.email) or "in the roster's column `email`"
+            problems.append(f"{one_line(one.entry.key)}: has no usable address: {email}")
+            continue
+        hello = f"Hello {to.display_name}," if to.display_name else "Hello,"
+        text = f"{hello}\n\n{summary(one.result)}\nThe report is attached. Open it in a browser.\n"
+        title = subject or f"Your result: {one.result.assignment.id}"
+        messages.append(Letter(to, title, text, one.report))
+    return messages, problems
+
+
 def write_files(feedback: Feedback, place: Path) -> list[Path]:
     """Write the files for a student's repository into a folder of their own."""
     folder = place / folder_name(feedback.entry.key) / FEEDBACK_FOLDER
-    text = f"{render_markdown(feedback.result)}\nThe whole report: `report.html` in this folder.\n"
-    files: dict[str, str | bytes] = {
-        "README.md": text,
-        "report.html": feedback.report.read_bytes(),
-    }
-    for name, content in files.items():
-        write_whole(folder / name, content)
-    return [folder / name for name in files]
+    readme, report = folder / "README.md", folder / "report.html"
+    text = render_markdown(feedback.result)
+    write_whole(readme, f"{text}\nThe whole report: `{report.name}` in this folder.\n")
+    write_whole(report, feedback.report.read_bytes())
+    return [readme, report]
+
+
+def commit(
+    found: Sequence[Feedback], files: Sequence[Sequence[Path]], branch: str
+) -> tuple[int, list[str]]:
+    """Commit the files in the clones; how many commits there are, and who got none."""
+    commits, problems = 0, []
+    for one, written in zip(found, files, strict=True):
+        # A team has one clone.
+        if one.entry.review_key == one.entry.key:
+            try:
+                commits += commit_folder(Path(one.entry.source), branch, FEEDBACK_FOLDER, written)
+            except RosgradeError as error:
+                problems.append(f"{one_line(one.entry.key)}: {error}")
+    return commits, problems

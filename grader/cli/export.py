@@ -10,6 +10,7 @@ import typer
 
 from grader.cli.options import AssignmentName, file_option
 from grader.cli.screen.console import print_error, print_warning, say
+from grader.findings.wording import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -182,21 +183,22 @@ def _write_comments(file: Path, out: Path, scores: Mapping[str, tuple[str, str]]
     from grader.report.files import write_whole
     from grader.report.formats.canvas_comments import is_download, update_grades, upload_zip
 
-    found = [one for one in class_feedback(out)[0] if one.entry.key in scores]
+    given = [one for one in class_feedback(out)[0] if one.entry.key in scores]
+    problems = []
     if file.suffix == ".json":
-        results = {scores[one.entry.key][0]: one.result for one in found}
+        results = {scores[one.entry.key][0]: one.result for one in given}
         write_whole(file, update_grades(dict(scores.values()), results))
-        say(f"{file}: {len(found)} grades with comments for Canvas' API; nothing was sent")
-        return []
-    given = [one for one in found if is_download(Path(one.entry.source).name)]
-    comments = {Path(one.entry.source).name: (one.result, one.report.read_bytes()) for one in given}
-    write_whole(file, upload_zip(comments))
-    say(f'{file}: {len(comments)} comments for "Upload Submissions"')
-    return [
-        f"{one.entry.key}: no comment: Canvas takes one only for a zip downloaded from it"
-        for one in found
-        if one not in given
-    ]
+        where = "Canvas' API; nothing was sent"
+    else:
+        names = {one.entry.key: Path(one.entry.source).name for one in given}
+        why = "no comment: Canvas takes one only for a zip that was downloaded from it"
+        problems = [f"{key}: {why}" for key, name in names.items() if not is_download(name)]
+        given = [one for one in given if is_download(names[one.entry.key])]
+        texts = {names[one.entry.key]: (one.result, one.report.read_bytes()) for one in given}
+        write_whole(file, upload_zip(texts))
+        where = '"Upload Submissions"'
+    say(f"{file}: {counted(len(given), 'comment')} for {where}")
+    return problems
 
 
 @app.command()
@@ -209,14 +211,12 @@ def mail(
     """Write a message for each student, with the report. Nothing is sent.
 
     mail.mbox is for a mail program, mail.csv for mail merge. The addresses are those of the roster
-    that the class was graded with. Ends with 1 if a student gets no
-    message, and says who and why.
+    that the class was graded with. Ends with 1 if a student gets no message, and says who and why.
     """
-    from grader.batch.feedback import class_feedback
+    from grader.batch.feedback import class_feedback, letters
     from grader.errors import UsageError
     from grader.report.files import refuse_inputs, write_whole
-    from grader.report.formats.mail import Letter, address, mail_csv, write_mbox
-    from grader.report.text.summary import summary
+    from grader.report.formats.mail import address, mail_csv, write_mbox
 
     mbox, table = folder / "mail.mbox", folder / "mail.csv"
     refuse_inputs([mbox, table], _read_of(out))
@@ -224,23 +224,11 @@ def mail(
     if sender is not None and own is None:
         raise UsageError(f"--from {sender}: is no address; write NAME@HOST")
     found, problems = class_feedback(out)
-    letters = []
-    for one in found:
-        # "Lopez, Ana" is Ana Lopez.
-        name = " ".join(reversed(one.entry.name.split(",", 1))).strip()
-        to = address(one.entry.email, name)
-        if to is None:
-            email = one.entry.email or "in the roster's column `email`"
-            problems.append(f"{one.entry.key}: has no usable address: {email}")
-            continue
-        text = f"Hello {to.display_name},\n\n".replace(" ,", ",") + summary(one.result)
-        text += "\nThe report is attached. Open it in a browser.\n"
-        title = subject or f"Your result: {one.result.assignment.id}"
-        letters.append(Letter(to, title, text, one.report))
-    write_mbox(mbox, letters, own)
-    write_whole(table, mail_csv(letters))
-    say(f"{mbox}, {table}: {len(letters)} messages; nothing was sent")
-    _end(problems)
+    messages, without = letters(found, subject)
+    write_mbox(mbox, messages, own)
+    write_whole(table, mail_csv(messages))
+    say(f"{mbox}, {table}: {counted(len(messages), 'message')}; nothing was sent")
+    _end([*problems, *without])
 
 
 @app.command()
@@ -256,26 +244,17 @@ def feedback(
 
     Ends with 1 if a student gets none, and says who and why.
     """
-    from grader.batch.feedback import class_feedback, write_files
-    from grader.errors import RosgradeError
+    from grader.batch.feedback import class_feedback, commit, write_files
     from grader.report.files import refuse_part
-    from grader.submission.git import commit_folder
 
     refuse_part(folder, out / "submissions", f"the results in {out}")
     found, problems = class_feedback(out)
-    committed = 0
-    for one in found:
-        files = write_files(one, folder)
-        if branch is not None:
-            try:
-                committed += commit_folder(
-                    Path(one.entry.source), branch, files[0].parent.name, files
-                )
-            except RosgradeError as error:
-                problems.append(f"{one.entry.key}: {error}")
-    say(f"{folder}: files for {len(found)} students")
+    files = [write_files(one, folder) for one in found]
+    say(f"{folder}: files for {counted(len(found), 'student')}")
     if branch is not None:
-        say(f"{committed} clones have a new commit on {branch}; push them yourself")
+        committed, failed = commit(found, files, branch)
+        say(f"{counted(committed, 'new commit')} on {branch}; push them yourself")
+        problems += failed
     _end(problems)
 
 

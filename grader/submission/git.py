@@ -45,8 +45,9 @@ def commit_folder(clone: Path, branch: str, folder: str, files: Sequence[Path]) 
         GraderFault: It is no clone, or has a branch of that name that is not of this kind.
     """
     dotgit = clone / ".git"
-    # A file may lead to any other repository of this machine.
-    if dotgit.is_symlink() or not dotgit.is_dir() or (dotgit / "commondir").exists():
+    # A file or a link may lead to any other repository of this machine.
+    elsewhere = dotgit.is_symlink() or (dotgit / "commondir").exists()
+    if elsewhere or not (clone.is_absolute() and dotgit.is_dir()):
         raise GraderFault(f"{shown(str(clone))} is not a clone")
 
     with TemporaryDirectory(prefix="rosgrade-") as place:

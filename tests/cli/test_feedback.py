@@ -78,8 +78,8 @@ def out(tmp_path: Path) -> Path:
 
 
 def clone_of(place: Path, key: str) -> Path:
-    clone = place / "clones" / key
-    clone.mkdir(parents=True)
+    clone = place / "clones" / key if key else place
+    clone.mkdir(parents=True, exist_ok=True)
     git(clone, "init", "-q", "-b", "main")
     (clone / "node.py").write_text("print()\n")
     git(clone, "add", ".")
@@ -169,7 +169,7 @@ def test_the_files_for_a_repository_are_committed_beside_what_is_checked_out(
     command = ("export", "feedback", out, "--out", "files", "--branch", "feedback")
     before = git(clone, "status", "--porcelain"), git(clone, "rev-parse", "HEAD")
     ended = rosgrade(*command)
-    assert ended.returncode == 1 and "1 clones have a new commit on feedback" in ended.stdout
+    assert ended.returncode == 1 and "1 new commit on feedback" in ended.stdout
     assert "ben: has a branch feedback of its own" in ended.stderr
     assert f"{tmp_path}/clones/cy is not a clone" in ended.stderr
     assert (git(clone, "status", "--porcelain"), git(clone, "rev-parse", "HEAD")) == before
@@ -182,7 +182,7 @@ def test_the_files_for_a_repository_are_committed_beside_what_is_checked_out(
     assert git(clone, "show", "feedback:rosgrade-feedback/report.html") == "copy for ana"
     readme = (tmp_path / "files" / "ana" / "rosgrade-feedback" / "README.md").read_text()
     assert "It publishes every 300 ms" in readme and "ends after SIGINT" not in readme
-    assert "0 clones have a new commit" in rosgrade(*command).stdout
+    assert "0 new commits on feedback" in rosgrade(*command).stdout
 
 
 def test_a_repository_that_only_points_to_another_one_is_not_written(
@@ -195,6 +195,16 @@ def test_a_repository_that_only_points_to_another_one_is_not_written(
     (tmp_path / "clones" / "ben" / ".git").symlink_to(mine / ".git")
     rosgrade("export", "feedback", out, "--branch", "feedback")
     assert git(mine, "branch", "--list", "feedback") == ""
+
+
+def test_a_row_without_a_known_source_writes_to_no_repository(
+    rosgrade: Rosgrade, out: Path, tmp_path: Path
+) -> None:
+    here = clone_of(tmp_path, "")
+    ledger = Ledger(out)
+    ledger.write([replace(one, source="") for one in ledger.read().entries], "lesson", "f" * 64)
+    assert rosgrade("export", "feedback", out, "--branch", "feedback").returncode == 1
+    assert git(here, "branch", "--list", "feedback") == ""
 
 
 def canvas(place: Path) -> Path:
@@ -225,7 +235,7 @@ def test_comments_to_upload_are_called_as_canvas_called_the_downloads(
     entries["ana"] = replace(entries["ana"], source=f"/gone/{name}")
     ledger.write(entries.values(), "lesson", "f" * 64)
     ended = rosgrade("export", "canvas", out, "--canvas", canvas(tmp_path), "--comments", "c.zip")
-    assert "1 comments" in ended.stdout and "ben: no comment" in ended.stderr
+    assert "1 comment for" in ended.stdout and "ben: no comment" in ended.stderr
     with zipfile.ZipFile(tmp_path / "c.zip") as outer:
         assert outer.namelist() == [name]
         with zipfile.ZipFile(io.BytesIO(outer.read(name))) as inner:
