@@ -20,6 +20,7 @@ from grader.report.html.overview import render_overview
 from grader.report.model.class_result import for_class
 from grader.report.model.class_row import ClassRow
 from grader.report.model.result import read_result
+from grader.report.model.result_model import Result
 from grader.review.cluster import clusters
 from grader.review.store import ReviewStore
 from grader.safe_text import one_line
@@ -100,11 +101,15 @@ def class_rows(done: Sequence[Done], ledger: Ledger | None = None) -> list[Class
             report=_report(item, ledger),
             result=item.result,
             note=noted[item.entry.key],
-            late=item.entry.late,
+            late=item.entry.late or _is_late(item.result),
             missing=not (item.entry.sha256 or item.entry.fault),
         )
         for item in rows
     ]
+
+
+def _is_late(result: Result | None) -> bool:
+    return result is not None and any(one.kind == "late" for one in result.adjustments)
 
 
 def _report(done: Done, ledger: Ledger | None) -> str | None:

@@ -110,20 +110,19 @@ class ClassRules:
 
     def _attempts(self, entry: Entry, result: Result) -> list[Attempt]:
         """All attempts that are graded, the current one last."""
-        results = {}
-        if len(entry.history) > 1:
-            results = read_earlier(self._ledger.folder(entry.key))
-        found = {
-            sha: Attempt(one, _time(entry, sha, one))
-            for sha, one in results.items()
-            if sha in entry.history
-        }
+        beside = []
         for other in self._beside.get(entry.key, ()):
             graded = self._ledger.result(other.key)
             if graded is not None and graded.submission.sha256 == other.sha256:
-                found[other.sha256] = Attempt(graded, _time(other, other.sha256, graded))
-        found.pop(result.submission.sha256, None)
-        return [*found.values(), Attempt(result, _time(entry, entry.sha256, result))]
+                beside.append(Attempt(graded, _time(other, other.sha256, graded)))
+        current = Attempt(result, _time(entry, entry.sha256, result))
+        known = {each.result.submission.sha256 for each in (*beside, current)}
+        gone = entry.history.keys() - known
+        results = read_earlier(self._ledger.folder(entry.key)) if gone else {}
+        earlier = [
+            Attempt(one, _time(entry, sha, one)) for sha, one in results.items() if sha in gone
+        ]
+        return [*earlier, *beside, current]
 
 
 def course_of(out: Path, named: Path | None, assignment: str) -> Course | None:

@@ -24,10 +24,7 @@ _GIT_LIMIT_S = 20.0
 
 
 def timed(rows: Sequence[HandedIn], staging: Path) -> list[HandedIn]:
-    """Rows with their times, and a row for each earlier attempt.
-
-    The roster is asked first, then the platform, then the name of the file, then git.
-    """
+    """Rows with their times: the roster is asked first, then platform, name of the file, git."""
     found = []
     for row in rows:
         time, problem = row.time, ""
@@ -38,12 +35,18 @@ def timed(rows: Sequence[HandedIn], staging: Path) -> list[HandedIn]:
             problem = f"when it was handed in is not known: {error}"
         if row.path is not None and not time[0]:
             time = _of(row.path, staging)
-        whole = with_problem(row, problem) if problem else row
-        found.append(replace(whole, time=time))
+        found.append(replace(with_problem(row, problem) if problem else row, time=time))
+    return found
+
+
+def with_attempts(rows: Sequence[HandedIn], staging: Path) -> list[HandedIn]:
+    """Rows, and one for each earlier attempt, with its time."""
+    found = list(rows)
+    for row in rows:
         for number, path in enumerate(row.earlier, start=1):
-            attempt = replace(row, key=f"{row.key} (attempt {number})", path=path, late=False)
-            attempt = replace(attempt, earlier=(), attempt_of=row.key, time=_of(path, staging))
-            found.append(replace(attempt, problem="", fault=""))
+            key, time = f"{row.key} (attempt {number})", _of(path, staging)
+            attempt = HandedIn(key, path, row.name, columns=row.columns)
+            found.append(replace(attempt, time=time, attempt_of=row.key))
     return found
 
 

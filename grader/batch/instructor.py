@@ -31,7 +31,11 @@ QUESTIONS_FILE = "questions.html"
 def write_similarity(loaded: LoadedAssignment, ledger: Ledger) -> tuple[Path, int]:
     """Write the page of the submissions that are alike: its file, and how many pairs there are."""
     entries = ledger.read().entries
-    handed_in = {entry.key: entry for entry in entries if entry.sha256 and not entry.same_as}
+    handed_in = {
+        entry.key: entry
+        for entry in entries
+        if entry.sha256 and not (entry.same_as or entry.attempt_of)
+    }
     known = _known(loaded)
     found = {key: fingerprints(_files(ledger, key)) for key in handed_in}
     own = {key: prints.keys() - known for key, prints in found.items() if prints}
@@ -52,7 +56,7 @@ def write_questions(
     loaded: LoadedAssignment, ledger: Ledger, on_read: Callable[[str], None] = lambda _: None
 ) -> tuple[Path, int]:
     """Write the page of questions for oral exams: its file, and for how many submissions."""
-    entries = [entry for entry in ledger.read().entries if entry.sha256]
+    entries = [entry for entry in ledger.read().entries if entry.sha256 and not entry.attempt_of]
     lines = Counter(line for one in entries for line in _lines(_files(ledger, one.key)))
     usual = frozenset(line for line, times in lines.items() if times > len(entries) / 3)
     students = []

@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from grader.batch.groups import with_groups
-from grader.batch.hand_in_time import of_metadata, timed
+from grader.batch.hand_in_time import of_metadata, timed, with_attempts
 from grader.batch.handed_in import (
     FOREIGN,
     Entry,
@@ -69,7 +69,8 @@ def take_in(
 
 
 def _complete(rows: list[HandedIn], staging: Path, course: Course | None) -> list[HandedIn]:
-    return unique(timed(with_groups(unique(rows), course), staging))
+    own = with_groups(timed(unique(rows), staging), course)
+    return unique(with_attempts(own, staging))
 
 
 def take_in_roster(

@@ -250,6 +250,14 @@ def test_all_attempts_of_a_folder_are_graded_and_the_rule_says_which_counts(
     assert ("Attempt 1 of 3 counts (best)" in report) == (counts == "best")
 
 
+def test_the_same_handed_in_twice_is_two_attempts(course: Class) -> None:
+    course.rules(f"{COURSE}attempts: {{counts: best}}\n")
+    course.hand_in("ana/attempt-1_2026-10-11T10-00-00Z", "bot")
+    course.hand_in("ana/attempt-2_2026-10-13T10-00-00Z", "bot")
+    row = course.grade()["ana"]
+    assert lines(row) == [("attempts", 0)] and row.score == 8
+
+
 def test_canvas_resubmissions_side_by_side_are_attempts(course: Class) -> None:
     for number, name in ((31, "ws.zip"), (32, "ws-1.zip"), (40, "ws-2.zip")):
         course.hand_in(f"lopezana_90211_{number}_{name}", "bot", text=name)
@@ -286,15 +294,18 @@ def test_a_group_has_what_one_of_them_handed_in(course: Class, groups: str) -> N
     course.hand_in("ana", "bot")
     course.hand_in("cai", "bot", "extra")
     course.hand_in("dee", "extra")
-    rows = course.grade("login,team\nana,1\nben,1\ncai,2\ndee,2\neva,\n")
+    rows = course.grade(
+        "login,team,handed_in\nana,1,2026-10-13T10:00Z\nben,1,\ncai,2,\ndee,2,\neva,,\n"
+    )
     assert {key: row.score for key, row in rows.items()} == {
-        "ana": 8,
-        "ben": 8,
+        "ana": 7,
+        "ben": 7,
         "cai": 10,
         "dee": 2,
         "eva": None,
     }
     assert rows["ben"].note == rows["ana"].note == ""
+    assert lines(rows["ben"]) == lines(rows["ana"]) == [("late", -1)] and rows["ben"].late
     assert rows["dee"].note == "cai and dee of one group handed in different files"
     assert {one.key: one.team for one in Ledger(course.out).read().entries}["ben"] == "ana"
 
