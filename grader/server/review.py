@@ -1,15 +1,16 @@
-"""The pages of ``rosgrade review``, and what they may change."""
+"""The pages of ``rosgrade review``."""
 
 from __future__ import annotations
 
-import shutil
 import tempfile
-import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
+from markupsafe import Markup
 from pydantic import ValidationError
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -18,6 +19,7 @@ from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, R
 from starlette.routing import Route
 
 from grader.assignment.load import LoadedAssignment
+from grader.batch.class_files import INSTRUCTOR_FOLDER
 from grader.batch.edited_assignment import (
     check_lines,
     load_before,
@@ -25,28 +27,27 @@ from grader.batch.edited_assignment import (
     remember,
     with_check,
 )
-from grader.batch.ledger import Ledger
 from grader.errors import RosgradeError, UsageError
-from grader.review import edit
-from grader.review.cluster import Cluster, clusters
-from grader.review.model import Comment, Forgiven, StudentReview
+from grader.findings.finding import Status
+from grader.report.html.overview import render_overview
+from grader.report.html.page import environment, render_page
+from grader.report.html.source_code import code_lines
+from grader.report.model.class_row import ClassRow
+from grader.report.model.result_model import CheckPart
+from grader.review.cluster import Cluster
 from grader.review.store import ReviewConflict
+from grader.server.background import Background
+from grader.server.changes import change_cluster, change_student
 from grader.server.local import LocalServer
-from grader.server.refreshing import Refreshing
-from grader.server.regrading import Regrading
-from grader.server.review_pages import (
-    render_class,
-    render_clusters,
-    render_code,
-    render_panel,
-    render_regrading,
-    render_submission,
-)
 from grader.server.reviewed_class import ReviewedClass, ReviewedRow
 
+MOST_CLUSTERS = 60
+MOST_OF_BANK = 30
+AROUND = 4
+"""Lines of source that are shown before and after a place."""
 _SANDBOX = "sandbox allow-scripts allow-downloads allow-popups"
 _FRAMED = {"Content-Security-Policy": f"frame-ancestors 'self'; {_SANDBOX}"}
-Answering = Callable[[Request, Any], Response]
+_REPORTS = ("report.html", "student-report.html")
 
 
 class ReviewServer(LocalServer):
@@ -59,191 +60,216 @@ class ReviewServer(LocalServer):
             UsageError: There is no class in the folder.
             OSError: The port is taken.
         """
-        pages = _Pages(ReviewedClass(out, by))
+        self._class = ReviewedClass(out, by)
+        self._scratch = tempfile.TemporaryDirectory(prefix="rosgrade-review-")
         routes = [
-            Route("/", pages.overview),
-            Route("/clusters", pages.clusters),
-            Route("/clusters", _posted(pages.change_cluster), methods=["POST"]),
-            Route("/regrade", pages.regrading),
-            Route("/regrade", _posted(pages.regrade), methods=["POST"]),
-            Route("/s/{name}/", pages.submission),
-            Route("/s/{name}/source", pages.source),
-            Route("/s/{name}/review", _posted(pages.change), methods=["POST"]),
-            Route("/s/{name}/{file:path}", pages.report_file),
-            Route("/instructor/{file}", pages.instructor_file),
+            Route("/", self._overview),
+            Route("/clusters", self._clusters),
+            Route("/clusters", _posted(self._change_cluster), methods=["POST"]),
+            Route("/regrade", self._regrading),
+            Route("/regrade", _posted(self._regrade), methods=["POST"]),
+            Route("/s/{name}/", self._submission),
+            Route("/s/{name}/source", self._source),
+            Route("/s/{name}/review", _posted(self._change), methods=["POST"]),
+            Route("/s/{name}/{file:path}", self._report_file),
+            Route(f"/{INSTRUCTOR_FOLDER}/{{file}}", self._instructor_file),
         ]
         problems: dict[Any, Any] = {RosgradeError: _problem, ValidationError: _problem}
         super().__init__(Starlette(routes=routes, exception_handlers=problems), port)
-        self._refreshing = pages.refreshing
+        self._background = Background(self._class.ledger)
 
     def close(self) -> None:
         """Stop, when all that was changed is in the reports."""
         super().close()
-        self._refreshing.close()
+        self._background.close()
+        self._scratch.cleanup()
 
+    def _overview(self, _: Request) -> Response:
+        rows = self._class.rows()
+        names = {row.row.id: row.name for row in rows}
 
-def _problem(_: Request, error: Exception) -> Response:
-    if isinstance(error, ValidationError):
-        first = error.errors()[0]
-        text = f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
-        return PlainTextResponse(text, 422)
-    return PlainTextResponse(str(error), 409 if isinstance(error, ReviewConflict) else 422)
+        def link(row: ClassRow) -> str:
+            return f"s/{quote(names[row.id])}/"
 
+        links = {"Causes of failures": "clusters", "Regrade with a changed check": "regrade"}
+        first = next((row.row for row in rows if row.row.waits_for), None)
+        if first is not None:
+            links = {"Begin with the first that waits": f"{link(first)}?waiting", **links}
+        found = self._class.clusters()
+        vanished = self._class.store.vanished({row.entry.review_key for row in rows})
+        pages = sorted(one.name for one in (self._class.out / INSTRUCTOR_FOLDER).glob("*.html"))
+        shown = [row.row for row in rows]
+        return HTMLResponse(render_overview(shown, found, vanished, pages, link, links))
 
-def _posted(answer: Answering) -> Callable[[Request], Any]:
-    """An endpoint that reads what a page sent, and answers in a thread: files may be slow."""
-
-    async def endpoint(request: Request) -> Response:
-        try:
-            return await run_in_threadpool(answer, request, await request.json())
-        except (KeyError, TypeError, ValueError) as error:
-            if isinstance(error, ValidationError):
-                raise
-            return PlainTextResponse(f"This request makes no sense: {error!r}", 400)
-
-    return endpoint
-
-
-class _Pages:
-    def __init__(self, reviewed: ReviewedClass) -> None:
-        self._class = reviewed
-        writing = threading.Lock()
-        self._job = Regrading(reviewed.ledger, writing)
-        self.refreshing = Refreshing(Ledger(reviewed.out), writing)
-        self._on_write = self.refreshing.poke
-
-    def overview(self, _: Request) -> Response:
-        return HTMLResponse(render_class(self._class, self._clusters()))
-
-    def submission(self, request: Request) -> Response:
+    def _submission(self, request: Request) -> Response:
         row, rows = self._class.find(request.path_params["name"])
-        waiting = "waiting" in request.query_params
-        return HTMLResponse(render_submission(self._class, row, rows, only_waiting=waiting))
+        only_waiting, at = "waiting" in request.query_params, rows.index(row)
+        wanted = [bool(one.row.waits_for) or not only_waiting for one in rows]
+        return _page(
+            "review",
+            row=row,
+            number=at + 1,
+            count=len(rows),
+            before=next((rows[i] for i in reversed(range(at)) if wanted[i]), None),
+            after=next((rows[i] for i in range(at + 1, len(rows)) if wanted[i]), None),
+            only_waiting=only_waiting,
+            waiting=sum(bool(one.row.waits_for) for one in rows),
+            source=self._class.source(row),
+            link=lambda one: f"../{quote(one.name)}/",
+            panel=Markup(self._panel(row)),
+            problem=self._background.problem,
+        )
 
-    def source(self, request: Request) -> Response:
+    def _panel(self, row: ReviewedRow, saved: str = "") -> str:
+        adjustments = row.row.result.adjustments if row.row.result is not None else ()
+        try:
+            levels = {one.id: one.levels for one in self._class.loaded.assignment.manual}
+        except RosgradeError:
+            # The assignment is not there any more: any number of points can be given.
+            levels = {}
+        return _part(
+            "review_panel.html.j2",
+            row=row,
+            result=row.row.result,
+            items=[one for one in adjustments if one.kind == "manual" and one.item],
+            others=[one for one in adjustments if one.kind != "manual"],
+            levels=levels,
+            bank=self._class.store.of_class().content.bank[:MOST_OF_BANK],
+            findings=[check for check in row.row.judged if check.status is not Status.PASSED],
+            saved=saved,
+        )
+
+    def _source(self, request: Request) -> Response:
         row, _ = self._class.find(request.path_params["name"])
         path = request.query_params.get("file", "")
         text = self._class.source(row).files.get(path)
         if text is None:
             raise UsageError(f"{path}: was not kept")
-        return HTMLResponse(render_code(path, text))
+        return HTMLResponse(_part("review_code.html.j2", lines=code_lines(path, text)))
 
-    def report_file(self, request: Request) -> Response:
-        """The report, and what it links to; nothing else of the folder."""
+    def _change(self, request: Request, sent: Any) -> Response:
+        row, _ = self._class.find(request.path_params["name"])
+        change_student(self._class, row, sent)
+        self._background.refresh()
+        row, _ = self._class.find(row.name)
+        return HTMLResponse(self._panel(row, time.strftime("saved %H:%M:%S")))
+
+    def _report_file(self, request: Request) -> Response:
+        """The report, and the recordings that it links to; nothing else of the folder."""
         row, _ = self._class.find(request.path_params["name"])
         folder, name = self._class.ledger.folder(row.row.id), request.path_params["file"]
-        if name in ("report.html", "student-report.html") and (folder / name).is_file():
+        if name in _REPORTS and (folder / name).is_file():
             return FileResponse(folder / name, headers=_FRAMED)
         recordings = {f"recordings/{one.name}": one for one in folder.glob("recordings/*")}
         if name not in recordings:
             return PlainTextResponse("There is no such file.", 404)
         return FileResponse(recordings[name], filename=recordings[name].name)
 
-    def instructor_file(self, request: Request) -> Response:
-        there = {one.name: one for one in (self._class.out / "instructor").glob("*.html")}
+    def _instructor_file(self, request: Request) -> Response:
+        there = {one.name: one for one in (self._class.out / INSTRUCTOR_FOLDER).glob("*.html")}
         file = there.get(request.path_params["file"])
         if file is None:
             return PlainTextResponse("There is no such page.", 404)
         return FileResponse(file, headers=_FRAMED)
 
-    def change(self, request: Request, sent: Any) -> Response:
-        """Change the review of one student, and answer what the page shows beside the report."""
-        row, _ = self._class.find(request.path_params["name"])
-        if sent["do"] == "undo":
-            self._class.store.undo(row.key, sent["version"])
-        else:
-            review = self._class.store.student(row.key).content
-            self._class.store.save(self._changed(row, review, sent), sent["version"])
-            if sent["do"] == "comment" and sent.get("index") is None:
-                self._count(str(sent["text"]).strip())
-        self._on_write()
-        row, _ = self._class.find(row.name)
-        return HTMLResponse(render_panel(self._class, row, time.strftime("saved %H:%M:%S")))
+    def _clusters(self, _: Request) -> Response:
+        rows = {row.row.id: row for row in self._class.rows()}
+        found, saved = self._class.clusters(), self._class.store.of_class()
+        return _page(
+            "review_clusters",
+            clusters=found[:MOST_CLUSTERS],
+            left=len(found) - MOST_CLUSTERS,
+            examples=[list(self._examples(one, rows)) for one in found[:MOST_CLUSTERS]],
+            rows=rows,
+            version=saved.version,
+            link=lambda key: f"s/{quote(rows[key].name)}/",
+        )
 
-    def _changed(self, row: ReviewedRow, review: StudentReview, sent: Any) -> StudentReview:
-        by = self._class.by
-        if sent["do"] == "score":
-            adjustments = row.row.result.adjustments if row.row.result else ()
-            item = next((one for one in adjustments if one.item == sent["item"]), None)
-            if item is None:
-                raise UsageError(f"{sent['item']}: is no item of this assignment any more")
-            points = None if sent["points"] is None else float(sent["points"])
-            return edit.scored(review, item, points, by, str(sent.get("note", "")))
-        if sent["do"] == "comment":
-            text, index = str(sent["text"]).strip(), sent.get("index")
-            comment = Comment(text=text, by=by, file=sent.get("file"), line=sent.get("line"))
-            return edit.commented(review, comment, index)
-        if sent["do"] == "uncomment":
-            return edit.uncommented(review, int(sent["index"]))
-        return edit.noted(review, str(sent["notes"]))
+    def _examples(
+        self, cluster: Cluster, rows: dict[str, ReviewedRow]
+    ) -> Iterator[tuple[ReviewedRow, CheckPart, str, int, list[Markup]]]:
+        """Two students, each with the check, its place, and the lines around it from a number."""
+        for row in (rows[key] for key in cluster.keys[:2]):
+            check = next(one for one in row.row.judged if one.id == cluster.check)
+            place = next((one for one in check.evidence.places if one.line), None)
+            text = self._class.source(row).files.get(place.file) if place is not None else None
+            if place is None or place.line is None or text is None:
+                yield row, check, "", 1, []
+            else:
+                begin = max(0, place.line - 1 - AROUND)
+                code = code_lines(place.file, text)[begin : place.line + AROUND]
+                yield row, check, f"{place.file}:{place.line}", begin + 1, code
 
-    def _count(self, text: str) -> None:
-        saved = self._class.store.of_class()
-        self._class.store.save(edit.used(saved.content, text), saved.version)
+    def _change_cluster(self, _: Request, sent: Any) -> Response:
+        change_cluster(self._class, sent)
+        self._background.refresh()
+        return PlainTextResponse("saved")
 
-    def _clusters(self) -> tuple[Cluster, ...]:
-        rows = [row.row for row in self._class.rows()]
-        return clusters(rows, self._class.of_class())
-
-    def clusters(self, _: Request) -> Response:
-        return HTMLResponse(render_clusters(self._class, self._clusters()))
-
-    def change_cluster(self, _: Request, sent: Any) -> Response:
-        """Forgive a cause, take that back, or comment it for all who have it."""
-        named = (sent["check"], sent["cause"])
-        cluster = next((one for one in self._clusters() if (one.check, one.cause) == named), None)
-        if cluster is None:
-            raise UsageError("Nobody fails for this cause any more. Load the page again.")
-        store, by = self._class.store, self._class.by
-        if sent["do"] == "comment":
-            text = str(sent["text"]).strip()
-            for key in dict.fromkeys(r.key for r in self._class.rows() if r.row.id in cluster.keys):
-                saved = store.student(key)
-                if text not in (one.text for one in saved.content.comments):
-                    comment = Comment(text=text, by=by)
-                    store.save(edit.commented(saved.content, comment), saved.version)
-            self._count(text)
-        else:
-            now = None
-            if sent["do"] == "forgive":
-                share, reason = float(sent["share"]), str(sent["reason"])
-                now = Forgiven(check=named[0], cause=named[1], share=share, reason=reason, by=by)
-            store.save(edit.forgiven(store.of_class().content, *named, now), sent["version"])
-        self._on_write()
-        return PlainTextResponse(time.strftime("saved %H:%M:%S"))
-
-    def regrading(self, request: Request) -> Response:
-        check = request.query_params.get("check") or self._job.check
-        lines = check_lines(self._class.loaded, check) if check else (0, "")
+    def _regrading(self, request: Request) -> Response:
+        # A copy, so that all of the page shows one moment of it.
+        judging, loaded = replace(self._background.judging), self._class.loaded
+        check = request.query_params.get("check") or judging.check
+        first, text = check_lines(loaded, check) if check else (0, "")
         back = load_before(self._class.ledger)
-        return HTMLResponse(render_regrading(self._class, self._job, check, lines, back))
+        return _page(
+            "review_regrade",
+            check=check,
+            first=first,
+            text=text,
+            judging=judging,
+            changed=judging.changed,
+            back=back,
+            loaded=loaded,
+        )
 
-    def regrade(self, _: Request, sent: Any) -> Response:
+    def _regrade(self, _: Request, sent: Any) -> Response:
         """Begin to judge the class: ``preview``, ``apply`` or ``back``."""
-        ledger, check = self._class.ledger, str(sent.get("check", ""))
-
-        def changed(place: Path) -> LoadedAssignment:
-            return with_check(self._class.loaded, check, str(sent["text"]), place)
-
-        if sent["do"] == "preview":
-            scratch = Path(tempfile.mkdtemp(prefix="rosgrade-review-"))
-            loaded = changed(scratch)
-            self._job.start(
-                "Preview", check, lambda: loaded, write=False, then=lambda: shutil.rmtree(scratch)
-            )
-            return PlainTextResponse("judging")
-        if sent["do"] == "back":
-            before = load_before(ledger)
-            if before is None:
-                raise UsageError("There is no assignment to go back to.")
-            self._job.start("Back", check, lambda: before, write=True, then=self._regraded)
-            return PlainTextResponse("judging")
-        place = next_place(ledger)
-        new = changed(place)
-        remember(ledger, place)
-        self._job.start("Apply", check, lambda: new, write=True, then=self._regraded)
+        ledger, check, do = self._class.ledger, str(sent["check"]), sent["do"]
+        new: LoadedAssignment | None
+        if self._background.judging.running:
+            raise UsageError("The class is being judged. Wait until that has ended.")
+        if do == "preview":
+            place = Path(tempfile.mkdtemp(dir=self._scratch.name))
+            new = with_check(self._class.loaded, check, str(sent["text"]), place)
+        elif do == "apply":
+            place = next_place(ledger)
+            new = with_check(self._class.loaded, check, str(sent["text"]), place)
+            remember(ledger, place)
+        else:
+            new = load_before(ledger)
+        if new is None:
+            raise UsageError("There is no assignment to go back to.")
+        self._background.judge(do.capitalize(), check, new, write=do != "preview")
         return PlainTextResponse("judging")
 
-    def _regraded(self) -> None:
-        self._class.__dict__.pop("loaded", None)
-        self._on_write()
+
+def _page(name: str, **values: Any) -> Response:
+    policy = "; connect-src 'self'; frame-src 'self'"
+    styles = ("report.css", "review.css")
+    return HTMLResponse(render_page(f"{name}.html.j2", styles, f"{name}.js", policy, **values))
+
+
+def _part(template: str, **values: Any) -> str:
+    return environment().get_template(template).render(values)
+
+
+def _posted(answer: Callable[[Request, Any], Response]) -> Callable[[Request], Any]:
+    """An endpoint that reads what a page sent, and answers in a thread: files may be slow."""
+
+    async def endpoint(request: Request) -> Response:
+        try:
+            return await run_in_threadpool(answer, request, await request.json())
+        except ValidationError:
+            raise
+        except (KeyError, TypeError, ValueError) as error:
+            return PlainTextResponse(f"This request makes no sense: {error!r}", 400)
+
+    return endpoint
+
+
+def _problem(_: Request, error: Exception) -> Response:
+    text = str(error)
+    if isinstance(error, ValidationError):
+        first = error.errors()[0]
+        text = f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+    return PlainTextResponse(text, 409 if isinstance(error, ReviewConflict) else 422)

@@ -1,42 +1,35 @@
-"""A class as it is now: its results, with what is written in the review files."""
+"""A class as it is now: its results, with all that is written down about it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.model import Level
+from grader.batch.adjusting import ClassAdjustments
+from grader.batch.batch import Done
 from grader.batch.class_files import class_rows, standing
 from grader.batch.edited_assignment import load_used
-from grader.batch.ledger import Entry, Ledger
+from grader.batch.files import RESULT_FILE
+from grader.batch.ledger import BATCH_FILE, Entry, Ledger
 from grader.errors import RosgradeError, UsageError
 from grader.report.files import folder_name
 from grader.report.model.class_row import ClassRow
-from grader.report.model.result_model import AdjustmentPart, Result
-from grader.review.adjust import adjusted
-from grader.review.model import ClassReview, StudentReview
+from grader.report.model.result_model import AdjustmentPart
+from grader.review.cluster import Cluster, clusters
+from grader.review.model import StudentReview
 from grader.review.store import ReviewStore, Saved
 from grader.submission.kept_source import SOURCE_FOLDER, KeptSource, read_source
 
-BY_RULE = ("late", "attempts")
 
+@dataclass(frozen=True)
+class _Read:
+    """A row with its review, as they were in files of these versions."""
 
-class CachedLedger(Ledger):
-    """The folder of a batch, whose results are read again only when they change."""
-
-    def __init__(self, out: Path) -> None:
-        """Name the folder."""
-        super().__init__(out)
-        self._known: dict[str, tuple[object, Result | None]] = {}
-
-    def result(self, key: str) -> Result | None:
-        """A row's result, or None where there is none."""
-        version = _version(self.folder(key) / "result.json")
-        if key not in self._known or self._known[key][0] != version:
-            self._known[key] = (version, super().result(key))
-        return self._known[key][1]
+    versions: tuple[object, ...]
+    done: Done
+    saved: Saved[StudentReview]
+    problem: str
 
 
 @dataclass(frozen=True)
@@ -44,10 +37,9 @@ class ReviewedRow:
     """A row with its review; ``problem`` says why that cannot be read."""
 
     row: ClassRow
-    key: str
-    """Of the review: a team has one."""
+    entry: Entry
     saved: Saved[StudentReview]
-    problem: str = ""
+    problem: str
 
     @property
     def name(self) -> str:
@@ -55,45 +47,44 @@ class ReviewedRow:
         return folder_name(self.row.id)
 
 
-@dataclass
 class ReviewedClass:
-    """The class in a folder; ``by`` are the initials of who reviews."""
+    """The class in a folder; each file is read again only when it changes."""
 
-    out: Path
-    by: str
-    store: ReviewStore = field(init=False)
-    ledger: Ledger = field(init=False)
-    _reviews: dict[str, tuple[object, Saved[StudentReview]]] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """Open the folder."""
-        self.ledger, self.store = CachedLedger(self.out), ReviewStore(self.out)
+    def __init__(self, out: Path, by: str) -> None:
+        """Open the folder; ``by`` are the initials of who reviews."""
+        self.out, self.by = out, by
+        self.ledger, self.store = Ledger(out), ReviewStore(out)
+        self._known: dict[str, _Read] = {}
+        self._shared: tuple[object, ...] = ()
+        self._loaded: tuple[object, LoadedAssignment] | None = None
         self.ledger.read()
 
-    @cached_property
+    @property
     def loaded(self) -> LoadedAssignment:
-        """The assignment that the class was graded with; deleted from here when it changes."""
-        return load_used(self.ledger)
-
-    def levels(self) -> dict[str, tuple[Level, ...]]:
-        """The levels of each manual item; none where the assignment cannot be read any more."""
-        try:
-            return {one.id: one.levels for one in self.loaded.assignment.manual}
-        except RosgradeError:
-            return {}
-
-    def of_class(self) -> ClassReview:
-        """What is written about the whole class."""
-        return self.store.of_class().content
+        """The assignment that the class is graded with."""
+        version = _version(self.out / BATCH_FILE)
+        if self._loaded is None or self._loaded[0] != version:
+            self._loaded = version, load_used(self.ledger)
+        return self._loaded[1]
 
     def rows(self) -> list[ReviewedRow]:
         """All rows, sorted by key."""
-        entries = {entry.key: entry for entry in self.ledger.read().entries}
-        done = [standing(self.ledger, entry) for entry in entries.values()]
-        of_class = self.of_class()
-        return [
-            self._reviewed(row, entries[row.id], of_class) for row in class_rows(done, self.ledger)
-        ]
+        written = self.ledger.read()
+        course = (_version(self.out / written.course),) if written.course else ()
+        shared = (_version(self.out / BATCH_FILE), _version(self.store.file(None)), *course)
+        if shared != self._shared:
+            self._known, self._shared = {}, shared
+        adjust = None
+        for entry in written.entries:
+            result = self.ledger.folder(entry.key) / RESULT_FILE
+            versions = (_version(result), _version(self.store.file(entry.review_key)))
+            if entry.key not in self._known or self._known[entry.key].versions != versions:
+                adjust = adjust or ClassAdjustments(self.ledger)
+                self._known[entry.key] = self._read(entry, adjust, versions)
+        known = {entry.key: self._known[entry.key] for entry in written.entries}
+        rows = class_rows([one.done for one in known.values()], self.ledger)
+        found = ((row, known[row.id]) for row in rows)
+        return [ReviewedRow(row, one.done.entry, one.saved, one.problem) for row, one in found]
 
     def find(self, name: str) -> tuple[ReviewedRow, list[ReviewedRow]]:
         """A row by the name in its address, and all rows."""
@@ -103,38 +94,27 @@ class ReviewedClass:
                 return row, rows
         raise UsageError(f"{name}: is no submission of this class any more")
 
+    def clusters(self) -> tuple[Cluster, ...]:
+        """Failures with the same cause."""
+        return clusters([row.row for row in self.rows()], self.store.of_class().content)
+
     def source(self, row: ReviewedRow) -> KeptSource:
         """What was handed in, as far as it is text and was kept."""
         return read_source(self.ledger.folder(row.row.id) / SOURCE_FOLDER)
 
-    def _reviewed(self, row: ClassRow, entry: Entry, of_class: ClassReview) -> ReviewedRow:
-        key = entry.review_key
-        saved, problem = Saved(StudentReview(key=key), ""), ""
+    def _read(self, entry: Entry, adjust: ClassAdjustments, versions: tuple[object, ...]) -> _Read:
+        done = standing(self.ledger, entry)
         try:
-            saved = self._review(key)
-            if row.result is not None:
-                by_rule = [one for one in row.result.adjustments if one.kind in BY_RULE]
-                result = adjusted(row.result, saved.content, of_class, by_rule)
-                row = replace(row, result=result)
+            saved = self.store.student(entry.review_key)
+            return _Read(versions, adjust.row(done), saved, "")
         except RosgradeError as error:
-            problem = str(error)
-            note = "; ".join(filter(None, (problem.partition("\n")[0], row.note)))
-            row = replace(row, note=note, result=_waiting(row.result))
-        return ReviewedRow(row, key, saved, problem)
-
-    def _review(self, key: str) -> Saved[StudentReview]:
-        version = _version(self.store.file(key))
-        if key not in self._reviews or self._reviews[key][0] != version:
-            self._reviews[key] = (version, self.store.student(key))
-        return self._reviews[key][1]
-
-
-def _waiting(result: Result | None) -> Result | None:
-    """A result whose review cannot be read has no points yet."""
-    if result is None:
-        return None
-    unread = AdjustmentPart(kind="manual", title="The review cannot be read", points=None)
-    return result.model_copy(update={"adjustments": (unread,)})
+            # No points until it can be read: what a person gave must not seem to be taken away.
+            why = str(error)
+            unread = AdjustmentPart(kind="manual", title="a review that can be read", points=None)
+            result = done.result and done.result.model_copy(update={"adjustments": (unread,)})
+            entry = replace(entry, problem="; ".join(filter(None, (entry.problem, why))))
+            saved = Saved(StudentReview(key=entry.review_key), "")
+            return _Read(versions, replace(done, entry=entry, result=result), saved, why)
 
 
 def _version(file: Path) -> object:

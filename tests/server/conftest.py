@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import http.client
 import json
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from email.message import Message
+from pathlib import Path
 from urllib.parse import urlsplit
 
+import pytest
+
 from grader.server.local import LocalServer
+from grader.server.review import ReviewServer
+from tests.server.make_class import make_class
 
 
 @dataclass(frozen=True)
@@ -56,3 +62,20 @@ class Client:
             connection.request(method, path, body, cookie | headers)
             answer = connection.getresponse()
             return Answer(answer.status, answer.headers, answer.read())
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    return make_class(tmp_path)
+
+
+@pytest.fixture
+def review(out: Path) -> Iterator[ReviewServer]:
+    server = ReviewServer(out, "AK")
+    yield server
+    server.close()
+
+
+@pytest.fixture
+def client(review: ReviewServer) -> Client:
+    return Client(review).open()

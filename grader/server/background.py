@@ -1,0 +1,85 @@
+"""What a review does in the background, one thing at a time: write reports, judge the class."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+
+from grader.assignment.load import LoadedAssignment
+from grader.batch.class_files import standing, write_class
+from grader.batch.class_regrading import Regraded, regrade_class, write_regraded
+from grader.batch.ledger import Ledger
+from grader.batch.rendering import bring_up_to_date
+from grader.errors import RosgradeError
+
+
+@dataclass
+class Judging:
+    """A judging of the whole class: a preview, or a regrade that is written."""
+
+    title: str = ""
+    check: str = ""
+    total: int = 0
+    running: bool = False
+    rows: list[Regraded] = field(default_factory=list)
+    problem: str = ""
+
+    @property
+    def changed(self) -> list[Regraded]:
+        """The rows that are judged otherwise."""
+        return [row for row in self.rows if row.changes or row.problem]
+
+
+class Background:
+    """One thread for a class."""
+
+    def __init__(self, ledger: Ledger) -> None:
+        """Begin, with what was changed before."""
+        self.judging = Judging()
+        self.problem = ""
+        """Why reports and gradebook are not up to date; empty if they are, or soon will be."""
+        self._ledger = ledger
+        self._worker = ThreadPoolExecutor(1, "background")
+        self._next: Future[None] | None = None
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Write the reports, the gradebook and the overview again, as far as they changed."""
+        if self._next is not None:
+            # One that has not begun is as good as a new one.
+            self._next.cancel()
+        self._next = self._worker.submit(self._refresh)
+
+    def judge(self, title: str, check: str, loaded: LoadedAssignment, *, write: bool) -> None:
+        """Judge the class with an assignment; the page asks how far that is."""
+        total = len(self._ledger.read().entries)
+        self.judging = Judging(title, check, total, running=True)
+        self._worker.submit(self._judge, self.judging, loaded, write)
+
+    def close(self) -> None:
+        """End, when all that was begun is written."""
+        self._worker.shutdown()
+
+    def _refresh(self) -> None:
+        try:
+            with self._ledger.opened() as ledger:
+                rows = [standing(ledger, entry) for entry in ledger.read().entries]
+                write_class(bring_up_to_date(rows, ledger), ledger)
+            self.problem = ""
+        except RosgradeError as error:
+            self.problem = f"The reports are not up to date: {error}"
+
+    def _judge(self, judging: Judging, loaded: LoadedAssignment, write: bool) -> None:
+        try:
+            with self._ledger.opened() if write else nullcontext():
+                for row in regrade_class(loaded, self._ledger, write=write):
+                    judging.rows.append(row)
+                if write:
+                    write_regraded(judging.rows, self._ledger)
+        except RosgradeError as error:
+            judging.problem = str(error)
+        except Exception as error:
+            # A check of the assignment's own may raise anything; the server goes on.
+            judging.problem = f"{type(error).__name__}: {error}"
+        judging.running = False
