@@ -32,18 +32,27 @@ def attempts_of(
         counts: Index of the one that counts.
     """
     times = list(handed_in) or [result.started for result in results]
-    whole, copies = _parts(results, times, counts), list(map(for_student, results))
-    if all(copy is result for copy, result in zip(copies, results, strict=True)):
-        return whole
-    seen = _parts(copies, times, counts)
-    pairs = zip(whole, seen, strict=True)
-    return tuple(part.model_copy(update={"visible": copy}) for part, copy in pairs)
+    copies = [for_student(result) for result in results]
+    seen: Sequence[AttemptPart | None] = [None] * len(results)
+    if any(copy is not result for copy, result in zip(copies, results, strict=True)):
+        seen = attempts_of(copies, times, counts)
+    return tuple(
+        AttemptPart(
+            sha256=result.submission.sha256,
+            handed_in=times[index],
+            score=result.score,
+            max_score=result.max_score,
+            counts=index == counts % len(results),
+            changes=_changes(results[index - 1], result) if index else (),
+            visible=seen[index],
+        )
+        for index, result in enumerate(results)
+    )
 
 
 def read_earlier(folder: Path) -> dict[str, Result]:
     """Earlier results in the folder of a report by the submission's hash, oldest first."""
-    files = sorted((folder / EARLIER).glob(f"{RESULT_FILE.removesuffix('.json')}-*.json"))
-    return {one.submission.sha256: one for one in _read(files)}
+    return {one.submission.sha256: one for one in _read(_earlier(folder))}
 
 
 def with_history(folder: Path, result: Result) -> Result:
@@ -58,7 +67,7 @@ def with_history(folder: Path, result: Result) -> Result:
         if replaced.submission.sha256 != result.submission.sha256:
             slim = for_class(replaced).model_copy(update={"attempts": ()})
             keep_earlier(file, result_json(slim))
-    files = sorted((folder / EARLIER).glob(f"{file.stem}-*{file.suffix}"))
+    files = _earlier(folder)
     for old in files[:-MOST_KEPT]:
         old.unlink(missing_ok=True)
     alike = [one for one in _read(files[-MOST_KEPT:]) if _kind(one) == _kind(result)]
@@ -69,25 +78,6 @@ def with_history(folder: Path, result: Result) -> Result:
     ]
     attempts = attempts_of([*earlier, result]) if earlier else ()
     return result.model_copy(update={"attempts": attempts})
-
-
-def _parts(
-    results: Sequence[Result], handed_in: Sequence[str], counts: int
-) -> tuple[AttemptPart, ...]:
-    before = [None, *results[:-1]]
-    return tuple(
-        AttemptPart(
-            sha256=result.submission.sha256,
-            handed_in=time,
-            score=result.score,
-            max_score=result.max_score,
-            counts=index == counts % len(results),
-            changes=_changes(earlier, result) if earlier else (),
-        )
-        for index, (earlier, result, time) in enumerate(
-            zip(before, results, handed_in, strict=True)
-        )
-    )
 
 
 def _changes(before: Result, after: Result) -> tuple[str, ...]:
@@ -111,6 +101,10 @@ def _change(before: CheckPart, after: CheckPart) -> str:
 
 def _kind(result: Result) -> tuple[str, frozenset[str]]:
     return result.assignment.id, frozenset(check.id for check in result.checks)
+
+
+def _earlier(folder: Path) -> list[Path]:
+    return sorted((folder / EARLIER).glob("result-*.json"))
 
 
 def _read(files: Sequence[Path]) -> list[Result]:
