@@ -30,6 +30,7 @@ from grader.recording.model import to_json
 from grader.report.files import write_whole
 from grader.report.model.class_row import ClassRow
 from grader.report.model.facts import Clock
+from grader.report.model.student import for_student
 from grader.submission.intake.locate import opened
 from grader.submission.prepare import fingerprint
 from grader.submission.record import PackageRecord, SubmissionRecord
@@ -336,6 +337,19 @@ def test_hidden_checks_are_in_the_students_report_when_the_rules_release_them(
     (course.handed / "ana" / "notes.txt").write_text("again")
     course.grade(now=NOW.replace(day=13))
     assert not copy.exists()
+
+
+def test_of_an_attempt_that_counts_a_student_sees_only_the_points_of_visible_checks(
+    course: Class,
+) -> None:
+    course.rules(COURSE + "attempts: {counts: best}\n")
+    course.hand_in("ana/attempt-1", "bot")
+    course.hand_in("ana/attempt-2", "extra")
+    row = course.grade()["ana"]
+    assert lines(row) == [("attempts", 6)] and row.result is not None
+    copy = for_student(row.result)
+    assert (copy.score, copy.final_score, copy.max_score) == (2, 6, 8)
+    assert copy.adjustments[0].reason == ""
 
 
 def test_tokens_are_used_up_in_the_order_of_due_dates(course: Class) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from grader.assignment.model import Visibility
 from grader.grade.model import every_point_judged, first_to_fix, total
-from grader.report.model.result_model import CheckPart, Result, WithheldPart
+from grader.report.model.result_model import AdjustmentPart, CheckPart, Result, WithheldPart
 
 VISIBLE_ONLY = frozenset({Visibility.VISIBLE.value})
 
@@ -47,10 +47,21 @@ def for_student(result: Result, shown: frozenset[str] = VISIBLE_ONLY) -> Result:
             "attempts": tuple(one.visible for one in result.attempts if one.visible),
         }
     )
+    adjustments = (_as_visible(one, copy) for one in copy.adjustments)
+    copy = copy.model_copy(update={"adjustments": tuple(adjustments)})
     waits = [check.waits_for for check in visible]
     unpaid = [check.id for check in visible if not check.max_points]
     first = first_to_fix(copy.reasons, waits, unpaid)
     return copy.model_copy(update={"first_to_fix": first})
+
+
+def _as_visible(one: AdjustmentPart, copy: Result) -> AdjustmentPart:
+    """An adjustment for a student's copy: another attempt counts there by its visible points."""
+    counts = next((each.score for each in copy.attempts if each.counts), None)
+    if one.kind != "attempts":
+        return one
+    points = 0.0 if counts is None or copy.score is None else counts - copy.score
+    return one.model_copy(update={"points": points, "reason": ""})
 
 
 def _without_traceback(check: CheckPart) -> CheckPart:
