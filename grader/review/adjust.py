@@ -67,13 +67,8 @@ def _forgiven(result: Result, of_class: ClassReview) -> Iterator[AdjustmentPart]
             yield AdjustmentPart(
                 kind="forgiven",
                 title=check.title,
-                points=given_back(lost, found.share),
+                points=points_for(lost, found.share),
                 reason=found.reason,
                 by=found.by,
                 check=check.id,
             )
-
-
-def given_back(lost: float, share: float) -> float:
-    """Points that forgiving gives back, rounded as partial credit is."""
-    return points_for(lost, share)

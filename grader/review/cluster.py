@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from grader.findings.finding import Status
-from grader.grade.model import total
+from grader.grade.model import points_for, total
 from grader.report.model.class_row import ClassRow
 from grader.report.model.result_model import CheckPart
-from grader.review.adjust import given_back
 from grader.review.cause import cause
 from grader.review.model import ClassReview
 
@@ -40,18 +39,13 @@ class Cluster:
         return tuple(self.lost)
 
     @property
-    def example(self) -> str:
-        """A student to look at."""
-        return self.keys[0]
-
-    @property
     def at_stake(self) -> float:
         """Points that the class lost by it."""
         return total(self.lost.values())
 
     def gains(self, share: float = 1.0) -> dict[str, float]:
         """What each student gets back if it is forgiven."""
-        return {key: given_back(lost, share) for key, lost in self.lost.items()}
+        return {key: points_for(lost, share) for key, lost in self.lost.items()}
 
 
 def clusters(rows: Sequence[ClassRow], of_class: ClassReview = _NOTHING) -> tuple[Cluster, ...]:

@@ -21,9 +21,7 @@ from grader.review.model import ClassReview, StudentReview
 from grader.spec.document import write_yaml
 from grader.spec.source import Model, parse_source, read_source
 
-FOLDER = "review"
 CLASS_FILE = "class.yaml"
-_HISTORY = "history"
 R = TypeVar("R", bound=Model)
 
 
@@ -44,14 +42,15 @@ class ReviewStore:
 
     def __init__(self, out: Path) -> None:
         """Name the folder of the class."""
-        self.folder = out / FOLDER
+        self.folder = out / "review"
 
     def file(self, key: str | None) -> Path:
         """The file of a student's review; with None that of the class."""
-        name = folder_name(key) if key is not None else ""
+        if key is None:
+            return self.folder / CLASS_FILE
+        file = self.folder / f"{folder_name(key)}.yaml"
         # A student may be called like the file of the class; no other name has this sign in it.
-        name = f"{name}#.yaml" if f"{name}.yaml" == CLASS_FILE else f"{name}.yaml"
-        return self.folder / (CLASS_FILE if key is None else name)
+        return file.with_stem("class#") if file.name == CLASS_FILE else file
 
     def student(self, key: str) -> Saved[StudentReview]:
         """The review of a student, empty where nothing is written yet.
@@ -68,15 +67,11 @@ class ReviewStore:
         """What is written about the whole class; see :meth:`student`."""
         return _read(self.file(None), ClassReview, ClassReview())
 
-    def students(self) -> Iterator[StudentReview]:
-        """Every review of a student, in the order of the files."""
-        for file in sorted(self.folder.glob("*.yaml")):
-            if file.name != CLASS_FILE:
-                yield read_source(file).read(StudentReview)
-
     def vanished(self, keys: Collection[str]) -> tuple[str, ...]:
-        """Students with a review who are not among the rows of the class any more."""
-        return tuple(one.key for one in self.students() if one.key not in keys)
+        """Students with a review who are not in the class any more; reads every review."""
+        files = [file for file in sorted(self.folder.glob("*.yaml")) if file.name != CLASS_FILE]
+        reviews = [read_source(file).read(StudentReview) for file in files]
+        return tuple(one.key for one in reviews if one.key not in keys)
 
     def save(self, content: StudentReview | ClassReview, version: str) -> str:
         """Write a review, and keep what it replaces.
@@ -91,14 +86,13 @@ class ReviewStore:
             ReviewConflict: It has another version by now; nothing was written.
         """
         file = self.file(content.key if isinstance(content, StudentReview) else None)
-        data = content.model_dump(mode="json", exclude_defaults=True)
-        text = write_yaml(data)
+        text = write_yaml(content.model_dump(mode="json", exclude_defaults=True))
         # What cannot be read again must not replace what can.
         parse_source(text, file).read(type(content))
         with self._writing():
             before = self._unchanged(file, version)
-            kept = self._kept(file)
-            write_whole(self._history(file) / f"{len(kept):06}.yaml", before, durable=True)
+            folder, kept = self._history(file)
+            write_whole(folder / f"{len(kept):06}.yaml", before, durable=True)
             write_whole(file, text, durable=True)
         return _version(text.encode())
 
@@ -115,7 +109,7 @@ class ReviewStore:
         file = self.file(key)
         with self._writing():
             self._unchanged(file, version)
-            kept = self._kept(file)
+            _, kept = self._history(file)
             if not kept:
                 raise UsageError(f"{file}: there is nothing to undo")
             before = kept[-1].read_bytes()
@@ -136,11 +130,9 @@ class ReviewStore:
             )
         return before
 
-    def _history(self, file: Path) -> Path:
-        return self.folder / _HISTORY / file.stem
-
-    def _kept(self, file: Path) -> list[Path]:
-        return sorted(self._history(file).glob("*.yaml"))
+    def _history(self, file: Path) -> tuple[Path, list[Path]]:
+        folder = self.folder / "history" / file.stem
+        return folder, sorted(folder.glob("*.yaml"))
 
     @contextmanager
     def _writing(self) -> Iterator[None]:

@@ -12,7 +12,7 @@ from grader.recording.model import Recording
 from grader.report.html.replay import Replay, make_replay
 from tests.checks.builder import drive, endpoint, on_scan, output, reader
 from tests.grade.sample import Told, make_submission
-from tests.report.sample import PERIOD, Sample, at, attempts, judged_runs, make_run
+from tests.report.sample import PERIOD, Sample, at, attempts, judged_runs, make_run, reviewed
 
 WALL = "{segments: [[0.6, -0.6, 0.6, 0.6]], moving: [{circle: {radius: 0.1}, path: [{at: 0 s, \
 pose: [0, 0.5]}, {at: 5 s, pose: [0.4, 0.5]}]}]}"
@@ -87,7 +87,8 @@ def gallery() -> Sample:
     sample = judged_runs(
         checks, recordings, titles={"listen": "It publishes", "drive": "A wall is ahead"}
     )
-    return replace(sample, added={"attempts": attempts(1.0, None, 4.25)})
+    added = reviewed("`time.sleep` in the callback\n    keeps it busy", waits=True)
+    return replace(sample, added={"attempts": attempts(1.0, None, 4.25), **added})
 
 
 def reference() -> dict[str, Replay]:
