@@ -7,8 +7,11 @@ from dataclasses import replace
 import pytest
 
 from grader.report.html.overview import MOST_SHOWN, render_overview
+from grader.report.model.class_row import ClassRow
+from grader.review.cluster import clusters
 from tests.browser.test_report import violations
 from tests.report.classroom import classroom
+from tests.report.sample import full_points, reviewed
 
 FEW = 40
 pytestmark = pytest.mark.slow
@@ -21,8 +24,11 @@ def page_of_few():
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [390, 1280])
-def test_an_overview_is_accessible_quiet_and_fits(look, page_of_few, width, scheme):
-    found = look(page_of_few, width, color_scheme=scheme)
+def test_an_overview_is_accessible_quiet_and_fits(look, width, scheme):
+    waits = full_points().result.model_copy(update=reviewed("x", waits=True))
+    rows = [*classroom(FEW), ClassRow("zed", "", "zed/report.html", waits)]
+    page = render_overview(rows, clusters(rows), ("student who left",))
+    found = look(page, width, color_scheme=scheme)
     found.keep(f"overview-{width}-{scheme}", full_page=True)
     assert violations(found.page) == []
     assert found.complaints == [] and found.requests == []
