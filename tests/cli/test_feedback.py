@@ -211,7 +211,7 @@ def canvas(place: Path) -> Path:
     file = place / "gradebook.csv"
     file.write_text(
         "Student,ID,SIS Login ID,Section,lesson (7)\n    Points Possible,,,,6\n"
-        "Ana,90211,ana,S,\nBen,90212,ben,S,\n"
+        "Ana,90211,ana,S,\nBen,90212,ben,S,\nGil,90213,gil,S,\n"
     )
     return file
 
@@ -219,9 +219,11 @@ def canvas(place: Path) -> Path:
 def test_comments_for_the_api_of_canvas_go_to_canvas_number(
     rosgrade: Rosgrade, out: Path, tmp_path: Path
 ) -> None:
-    rosgrade("export", "canvas", out, "--canvas", canvas(tmp_path), "--comments", "c.json")
+    command = ("export", "canvas", out, "--canvas", canvas(tmp_path), "--comments", "c.json")
+    rosgrade(*command, "--zero", "missing")
     data = json.loads((tmp_path / "c.json").read_text())["grade_data"]
-    assert set(data) == {"90211", "90212"}
+    assert set(data) == {"90211", "90212", "90213"}
+    assert data["90213"] == {"posted_grade": "0"}
     assert data["90211"]["posted_grade"] == "4.52"
     assert "It publishes every 300 ms" in data["90211"]["text_comment"]
 

@@ -27,13 +27,11 @@ def update_grades(scores: Mapping[str, str], results: Mapping[str, Result]) -> s
 
     Args:
         scores: The grade as text, by Canvas' number.
-        results: What each student may see, by Canvas' number.
+        results: What students may see, by Canvas' number; who has none gets no comment.
     """
-    grades = {
-        number: {"posted_grade": score, "text_comment": summary(results[number])}
-        for number, score in scores.items()
-        if number in results
-    }
+    grades = {number: {"posted_grade": score} for number, score in scores.items()}
+    for number, result in results.items():
+        grades[number]["text_comment"] = summary(result)
     return json.dumps({"grade_data": grades}, indent=2, ensure_ascii=False) + "\n"
 
 
