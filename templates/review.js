@@ -93,14 +93,14 @@
   find("#write").addEventListener("submit", (event) => { event.preventDefault(); comment(); });
   notes.addEventListener("change", () => change({ do: "notes", notes: notes.value }));
 
-  const show = (name) => {
+  const show = (name, line) => {
     for (const tab of all("[role=tab]")) {
       const chosen = tab.id === `tab-${name}`;
       tab.setAttribute("aria-selected", chosen);
       tab.tabIndex = chosen ? 0 : -1;
       find(`#${tab.getAttribute("aria-controls")}`).hidden = !chosen;
     }
-    if (name === "source" && files && shownFile !== files.value) load(files.value);
+    if (name === "source" && files) load(files.value, line);
   };
   all("[role=tab]").forEach((tab) => {
     tab.addEventListener("click", () => show(tab.id.slice(4)));
@@ -120,7 +120,7 @@
       shownFile = files.value = path;
       annotate();
     }
-    markLine(find(`#L${line || 1}`, code), Boolean(line));
+    if (line || !find(".is-marked", code)) markLine(find(`#L${line || 1}`, code), Boolean(line));
   };
   const markLine = (row, focus) => {
     if (!row) return;
@@ -171,7 +171,7 @@
     else if (target.closest("#bank")) insert(target);
     else if (target.matches(".place")) {
       const at = target.dataset.file ? target.dataset : entry.dataset;
-      if (files && [...files.options].some((option) => option.value === at.file)) { files.value = at.file; show("source"); load(at.file, at.line); }
+      if (files && [...files.options].some((option) => option.value === at.file)) { files.value = at.file; show("source", at.line); }
     } else if (target.matches(".remove")) change({ do: "uncomment", index: Number(entry.dataset.index) });
     else if (target.matches(".edit")) {
       const { file, line, index } = entry.dataset;

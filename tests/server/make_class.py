@@ -42,7 +42,7 @@ NODE = "bot/node.py"
 CODE = '''\
 def spin():
     """Spin."""
-    print("\\u202espin")
+    print("\u202espin")
 
 
 def stop():
