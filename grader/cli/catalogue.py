@@ -81,13 +81,13 @@ def schema(
     """Print the JSON Schema of a file, for editors."""
     from grader.assignment.own_check import all_checks
     from grader.assignment.schema import assignment_schema, mutants_schema
-    from grader.course.model import course_schema
+    from grader.course.model import CourseFile
     from grader.report.model.result import result_schema
 
     make = {
         Document.ASSIGNMENT: lambda: assignment_schema(all_checks()),
         Document.MUTANTS: mutants_schema,
-        Document.COURSE: course_schema,
+        Document.COURSE: CourseFile.model_json_schema,
         Document.RESULT: result_schema,
     }[document]
     head = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
@@ -32,24 +32,16 @@ def _deduction(value: object) -> object:
     return value
 
 
-def course_schema() -> dict[str, Any]:
-    """The JSON Schema of ``course.yaml``, for editors."""
-    draft = "https://json-schema.org/draft/2020-12/schema"
-    return {"$schema": draft, **CourseFile.model_json_schema()}
-
-
 Time = Annotated[
     str,
     AfterValidator(_time),
     WithJsonSchema({"type": "string", "pattern": r"^\d{4}-\d\d-\d\d[T ]\d\d:\d\d"}),
 ]
 Zone = Annotated[str, AfterValidator(time_zone)]
-Percentage = WithJsonSchema({"type": "string", "pattern": quantity_pattern(Dimension.RATIO)})
-Deduction = Annotated[
-    float | Annotated[str, Percentage],
-    BeforeValidator(_deduction),
-]
+_Percentage = WithJsonSchema({"type": "string", "pattern": quantity_pattern(Dimension.RATIO)})
+Deduction = Annotated[float | Annotated[str, _Percentage], BeforeValidator(_deduction)]
 Login = Annotated[str, Field(min_length=1)]
+Unit = Literal["day", "hour"]
 
 
 def points_of(deduction: float | str, max_score: float) -> float:
@@ -62,27 +54,26 @@ def points_of(deduction: float | str, max_score: float) -> float:
 class Late(Model):
     """What lateness costs: so much for each day or hour that has begun."""
 
-    per: Annotated[Literal["day", "hour"], Field(description="Each day or hour that has begun.")]
-    deduct: Annotated[Deduction, Field(description="Points, or a percentage of all points.")]
-    grace: Annotated[DurationOrZero, Field(description="Lateness that costs nothing.")] = 0.0
-    at_most: Annotated[Deduction | None, Field(description="The most that is deducted.")] = None
+    per: Unit = Field(description="Each day or hour that has begun.")
+    deduct: Deduction = Field(description="Points, or a percentage of all points.")
+    grace: DurationOrZero = Field(0.0, description="Lateness that costs nothing.")
+    at_most: Deduction | None = Field(None, description="The most that is deducted.")
 
 
 class Tokens(Model):
     """Late tokens: each moves a due time of a student by a day or an hour."""
 
-    each: Annotated[int, Field(ge=1, description="Tokens of each student in the whole course.")]
-    worth: Annotated[Literal["day", "hour"], Field(description="What a token moves it by.")]
+    each: int = Field(ge=1, description="Tokens of each student in the whole course.")
+    worth: Unit = Field(description="What a token moves a due time by.")
 
 
 class Attempts(Model):
     """Which attempt counts, where a student handed in several times."""
 
-    counts: Annotated[
-        Literal["best", "last", "last before the deadline"],
-        Field(description="The attempt that counts; best after deductions."),
-    ] = "last"
-    at_most: Annotated[int | None, Field(ge=1, description="Later attempts do not count.")] = None
+    counts: Literal["best", "last", "last before the deadline"] = Field(
+        "last", description="The attempt that counts; best after deductions."
+    )
+    at_most: int | None = Field(None, ge=1, description="Later attempts do not count.")
 
     @property
     def words(self) -> str:
@@ -93,17 +84,12 @@ class Attempts(Model):
 class AssignmentRules(Model):
     """The rules of one assignment; ``late`` and ``attempts`` instead of those of the course."""
 
-    due: Annotated[Time, Field(description="Until the end of this minute it is in time.")]
-    closes: Annotated[Time | None, Field(description="Later ones count nothing.")] = None
-    published: Annotated[
-        Time | None, Field(description="From then on students see `after_published` checks.")
-    ] = None
+    due: Time = Field(description="Until the end of this minute it is in time.")
+    closes: Time | None = Field(None, description="Later ones count nothing.")
+    published: Time | None = Field(None, description="Shows `after_published` from then on.")
     late: Late | None = None
     attempts: Attempts | None = None
-    results: Annotated[
-        str | None,
-        Field(description="Folder of its batch, beside this file; late tokens are counted there."),
-    ] = None
+    results: str | None = Field(None, description="Folder of its batch, beside this file.")
 
 
 class Extension(Model):
@@ -112,23 +98,20 @@ class Extension(Model):
     student: Login
     assignment: Id
     due: Time | None = None
-    days: Annotated[int | None, Field(ge=1)] = None
-    reason: Annotated[str, Field(description="For you; no report shows it.")] = ""
+    days: int | None = Field(None, ge=1)
+    reason: str = Field("", description="For you; no report shows it.")
 
 
 class CourseFile(Model):
     """The whole of ``course.yaml``."""
 
     title: str
-    time_zone: Annotated[
-        Zone | None, Field(description="IANA name; times without an offset are in it.")
-    ] = None
+    time_zone: Zone | None = Field(None, description="IANA name, for times without an offset.")
     late: Late | None = None
     tokens: Tokens | None = None
     attempts: Attempts | None = None
-    assignments: Annotated[dict[Id, AssignmentRules], Field(min_length=1)]
-    groups: Annotated[
-        tuple[tuple[Login, ...], ...] | str | None,
-        Field(description="Who hands in together: lists of students, or a column of the roster."),
-    ] = None
+    assignments: dict[Id, AssignmentRules] = Field(min_length=1)
+    groups: tuple[tuple[Login, ...], ...] | str | None = Field(
+        None, description="Who hands in together: lists of students, or a column of the roster."
+    )
     extensions: tuple[Extension, ...] = ()

@@ -219,7 +219,26 @@ def test_the_lists_and_the_catalogue_are_printed(rosgrade: Rosgrade) -> None:
     assert "Did you mean 'timing.period'?" in ended.stderr
 
 
-@pytest.mark.parametrize("document", ["assignment", "mutants", "result"])
+def test_the_rules_of_a_course_are_checked_like_an_assignment(
+    rosgrade: Rosgrade, tmp_path: Path
+) -> None:
+    file = tmp_path / "course.yaml"
+    text = "title: Robotics\ntime_zone: UTC\nassignments: {qos: {due: 2026-10-12 23:59}}\n"
+    file.write_text(text)
+    assert rosgrade("validate", file).stdout == f"{file}: rules of 1 assignment: valid\n"
+    file.write_text(text + "grups: team\n")
+    ended = rosgrade("validate", file)
+    assert ended.returncode == 2
+    assert f"{file}:4: grups: unknown key 'grups'. Did you mean 'groups'?" in ended.stderr
+    (tmp_path / "class").mkdir()
+    place = ("--course", file, "--out", tmp_path / "out", "--sandbox", "none")
+    file.write_text(text)
+    ended = rosgrade("batch", "quaternion", tmp_path / "class", *place)
+    assert ended.returncode == 2
+    assert f"{file}: has no assignment 'quaternion'. There are: qos." in ended.stderr
+
+
+@pytest.mark.parametrize("document", ["assignment", "mutants", "course", "result"])
 def test_the_schemas_are_json_schemas(rosgrade: Rosgrade, document: str) -> None:
     import json
 

@@ -7,8 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from grader import resources
 from grader.course.load import Course, load_course
+from grader.course.model import CourseFile
 from grader.errors import AssignmentError, UsageError
+from grader.spec.document import parse_yaml
 
 WHOLE = """\
 title: Robotics 2026
@@ -174,3 +177,11 @@ def test_hidden_checks_are_shown_when_nobody_can_hand_in_any_more(
 ) -> None:
     moment = datetime.fromisoformat(now).replace(tzinfo=timezone.utc)
     assert course(tmp_path).visible("timed_publisher", moment) == shown
+
+
+def test_the_example_of_the_documentation_is_valid(tmp_path: Path) -> None:
+    text = (resources.root() / "docs" / "course.md").read_text(encoding="utf-8")
+    example = text.split("```yaml\n")[1].split("```")[0]
+    assert course(tmp_path, example).rules("qos", "CAI").due.isoformat().startswith("2026-10-28")
+    schema = CourseFile.model_json_schema()
+    assert set(parse_yaml(example, tmp_path)[0]) <= set(schema["properties"])
