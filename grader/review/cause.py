@@ -11,6 +11,7 @@ from grader.report.text.words import cut
 from grader.safe_text import one_line
 
 MOST_CHARACTERS = 300
+_MOST_READ = 1000
 _ANY = "…"
 # Whose names mean the same in every submission, besides those of the assignment.
 _PUBLIC = {*sys.stdlib_module_names, *dir(builtins), "rclpy", "rclcpp", "numpy"}
@@ -38,7 +39,8 @@ def cause(check: CheckPart) -> str:
         public = first in _PUBLIC or first.endswith(_ROS) or f"`{text}`" in check.expected
         return f"{mark}{text if public else _ANY}{mark}"
 
-    text = _FILE.sub(lambda file: file[1] if file[1] in _FILES else _ANY, one_line(check.observed))
+    text = cut(one_line(check.observed), _MOST_READ)
+    text = _FILE.sub(lambda file: file[1] if file[1] in _FILES else _ANY, text)
     text = _ONE.sub(_several, _NAMES.sub(name, text))
     return cut(_NUMBER.sub(_ANY, text), MOST_CHARACTERS)
 

@@ -226,6 +226,19 @@ def test_limits_of_the_build_and_libraries_are_reported_with_their_line(found: F
     )
 
 
+def test_manual_items_are_reported_with_their_line(found: Found) -> None:
+    line = GOOD.count("\n") + 1
+    item = "  - {id: readme, title: README, points: 2, levels: [{title: all, points: 2}]}\n"
+    assert found(f"{GOOD}manual:\n{item}") == []
+    assert found(f"{GOOD}manual:\n{item}{item}") == [
+        f"{line + 2}: manual[1].id: 'readme' stands twice (first in line {line + 1})"
+    ]
+    (more,) = found(f"{GOOD}manual:\n{item.replace('points: 2}', 'points: 3}')}")
+    assert more.startswith(f"{line + 1}: manual[0]: the level 'all' gives 3 points, more than ")
+    (nothing,) = found(f"{GOOD}manual:\n{item.replace('points: 2,', 'points: 0,')}")
+    assert nothing.startswith(f"{line + 1}: manual[0].points: ")
+
+
 def test_checks_of_a_run_need_a_scenario(found: Found) -> None:
     start, end = GOOD.index("scenarios:"), GOOD.index("checks:")
     assert found(GOOD[:start] + GOOD[end:]) == [

@@ -6,6 +6,7 @@ import re
 import pytest
 
 from grader.assignment.load import list_assignments, load_assignment
+from grader.assignment.model import Level, ManualItem
 from grader.errors import UsageError
 from grader.report.html.handout import make_handout, render_handout
 from tests.grade.sample import Told, make_loaded
@@ -44,6 +45,19 @@ def test_an_assignment_that_is_hidden_altogether_still_has_a_handout(tmp_path):
     page = Page(render_handout(handout(tmp_path, "# Title\n\nDo it.", CHECKS[2:3])))
     assert "Do it." in page.text
     assert "3 points in all: 0 points here, and 3 points for 1 more check at grading." in page.text
+
+
+def test_points_that_a_person_gives_are_listed_with_their_levels(tmp_path):
+    loaded = make_loaded(CHECKS[:1])
+    levels = (Level(title="thin", points=1.0), Level(title="complete", points=2.5))
+    item = ManualItem(id="readme", title="README", points=2.5, levels=levels)
+    assignment = loaded.assignment.model_copy(update={"manual": (item,)})
+    file = tmp_path / "assignment.yaml"
+    page = Page(
+        render_handout(make_handout(dataclasses.replace(loaded, assignment=assignment, file=file)))
+    )
+    assert "README (by a person: thin 1, complete 2.5) 2.5" in re.sub(r"\s+", " ", page.text)
+    assert "1 point in all. A person gives up to 2.5 points in addition." in page.text
 
 
 def test_markdown_is_rendered_below_one_heading(tmp_path):

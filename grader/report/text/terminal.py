@@ -161,8 +161,10 @@ def _conclude(console: Console, result: Result, before: Result | None = None) ->
         text = f"Not graded. {explanation.headline(result)}"
         console.print(Text(text, "bold magenta"))
         return
-    for line in map(additions.line, result.adjustments):
-        console.print(_hanging(console, "", line))
+    for one in result.adjustments:
+        # What waits stands beside the score.
+        if one.points is not None:
+            console.print(_hanging(console, "points", additions.line(one)))
     for line in map(additions.comment_line, result.comments):
         console.print(_hanging(console, "comment", line))
     text = f"Score: {explanation.score(result)}"
