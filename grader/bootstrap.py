@@ -211,7 +211,8 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
         _write_stamp(venv, wanted)
         if chosen.ros == "wheels":
             _add_ros2(venv, environ)
-    _say(f"ready: {VENV}/bin/rosgrade --help")
+    if not is_kit:
+        _say(f"ready: {VENV}/bin/rosgrade --help")
 
 
 def main(root: Optional[str] = None) -> int:

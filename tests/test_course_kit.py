@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from hatchling.builders.wheel import WheelBuilder
 
 from grader import resources
 from grader.assignment.load import list_assignments, load_assignment
@@ -282,3 +283,27 @@ def test_what_pip_installs_from_the_wheel_lists_starts_and_checks(
     selftest = rosgrade("selftest", "simple_publisher")
     assert selftest.returncode == 2
     assert "install rosgrade-solutions" in selftest.stderr
+
+
+def test_the_solutions_that_instructors_install_beside_it_are_found(tmp_path: Path) -> None:
+    site = tmp_path / "site"
+    for project in (ROOT, ROOT / "solutions"):
+        build = WheelBuilder(str(project)).build(directory=str(tmp_path), versions=["standard"])
+        with zipfile.ZipFile(next(build)) as wheel:
+            assert not [name for name in wheel.namelist() if (site / name).exists()]
+            wheel.extractall(site)
+    code = (
+        "from grader import resources; from grader.assignment.load import *\n"
+        "from grader.assignment.mutant import *\n"
+        "for name in list_assignments():\n"
+        "    loaded = load_assignment(name)\n"
+        "    for language in LANGUAGES:\n"
+        "        load_mutants(loaded.assignment, loaded.folder, language=language)\n"
+        "print(resources.root())\n"
+    )
+    environ = {**os.environ, "PYTHONPATH": str(site)}
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environ, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == f"{site / 'grader' / '_data'}\n"

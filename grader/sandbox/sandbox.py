@@ -148,7 +148,7 @@ class Sandbox:
         arguments = [*bubblewrap.namespaces(_CELL_UID), *bubblewrap.system(), "--tmpfs", "/tmp"]
         for place in MOUNT_POINTS:
             arguments += ["--dir", str(place)]
-        last = ["--tmpfs", str(_DATA)] if _DATA.is_dir() else []
+        last = ["--tmpfs", str(_seen_beside(_DATA))] if _DATA.is_dir() else []
         last += ["--remount-ro", "/", "--chdir", "/", *bubblewrap.variables(environment)]
         return bubblewrap.launch(arguments, binds, last, command)
 
@@ -239,6 +239,13 @@ def _beside(environment: Mapping[str, str]) -> dict[str, str]:
     sites = [str(ENVIRONMENT / path.relative_to(own)) for path in own.glob(_SITE)]
     paths = [path for path in (moved.get("PYTHONPATH"), *sites) if path]
     return {**environment, **moved, "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def _seen_beside(path: Path) -> Path:
+    """Where rosgrade's processes see a path of rosgrade, which may lie in its environment."""
+    own = Path(sys.prefix).resolve()
+    inside = _in_environment() and path.is_relative_to(own)
+    return ENVIRONMENT / path.relative_to(own) if inside else path
 
 
 def _is_within(path: Path, binds: Iterable[Bind]) -> bool:

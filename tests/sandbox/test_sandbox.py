@@ -12,7 +12,7 @@ import pytest
 
 from grader import ros
 from grader.errors import GraderFault
-from grader.sandbox import bubblewrap, trial
+from grader.sandbox import bubblewrap, sandbox, trial
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.choice import Choice
 from grader.sandbox.python_tree import check_installed, prune, student_prefix, unlisted
@@ -37,13 +37,24 @@ def test_rosgrade_s_code_is_covered_where_it_would_be_shown() -> None:
     assert str(code) not in hide([Bind(Path("/elsewhere"), code.parent)])
 
 
+def test_assignments_are_covered_where_rosgrade_is_installed_in_its_environment(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    data = Path(sys.prefix).resolve() / "lib"
+    monkeypatch.setattr(sandbox, "_DATA", data)
+    command = Sandbox(tmp_path).server_command(["true"], ros.find(), tmp_path, {})
+    covered = [command[at + 1] for at, text in enumerate(command) if text == "--tmpfs"]
+    assert str(sandbox.ENVIRONMENT / "lib") in covered
+    assert str(data) not in covered
+
+
 def test_auto_says_in_one_line_that_there_is_no_sandbox(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     missing = Trial("bwrap is not installed", "sudo apt install bubblewrap")
     monkeypatch.setattr(trial, "try_sandbox", lambda: missing)
-    sandbox, notice = choose(Choice.AUTO, tmp_path)
-    assert sandbox is None
+    chosen, notice = choose(Choice.AUTO, tmp_path)
+    assert chosen is None
     assert "no sandbox (bwrap is not installed)" in notice and "\n" not in notice
     with pytest.raises(GraderFault, match="no sandbox: bwrap is not installed; sudo apt install"):
         choose(Choice.BWRAP, tmp_path)
