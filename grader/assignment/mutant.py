@@ -254,7 +254,9 @@ def reference_of(assignment: str, folder: Path | None = None, language: Language
         if place.is_dir():
             return place
     listed = " or ".join(map(str, places))
-    advice = "" if resources.reference().is_dir() else "; install rosgrade-solutions"
+    is_own = folder is None or folder.is_relative_to(resources.root())
+    lacking = is_own and not resources.reference().is_dir()
+    advice = "; install rosgrade-solutions" if lacking else ""
     raise UsageError(f"the assignment {assignment!r} has no reference solution: {listed}{advice}")
 
 
