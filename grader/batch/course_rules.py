@@ -26,8 +26,8 @@ class ClassRules:
         """Read the rows, and the rules where the batch has some."""
         self._ledger, self._written = ledger, ledger.read()
         written = self._written
-        course = written.course
-        self.course = _load(course, ledger.out, written.assignment) if course else None
+        place = Path(written.course) if written.course is not None else None
+        self.course = _load(place, ledger.out, written.assignment) if place else None
         self._spent: dict[str, int] = {}
 
     def visible(self, now: datetime) -> frozenset[str]:
@@ -97,8 +97,7 @@ class ClassRules:
         if self.course is None:
             return []
         due = {
-            name: (utc(self.course.rules(name, "").due), name)
-            for name in self.course.spec.assignments
+            name: (utc(self.course.rules(name).due), name) for name in self.course.spec.assignments
         }
         return [
             ClassRules(Ledger(folder))
@@ -127,21 +126,23 @@ class ClassRules:
 
 def course_of(out: Path, named: Path | None, assignment: str) -> Course | None:
     """The rules for a batch: those that are named, else those that it was graded with before."""
-    course = str(named.resolve()) if named else None
-    if named is None and (out / BATCH_FILE).is_file():
-        course = Ledger(out).read().course
-    return _load(course, out, assignment) if course else None
+    try:
+        place = named or Ledger(out).read().course
+    except UsageError:
+        # There is no batch yet, or its file is damaged and is written again from the class.
+        return None
+    return _load(Path(place), out, assignment) if place is not None else None
 
 
-def _load(course: str, out: Path, assignment: str) -> Course:
-    if not Path(course).is_file():
+def _load(file: Path, out: Path, assignment: str) -> Course:
+    if not file.is_file():
         raise UsageError(
-            f"{course}: does not exist, and the rules of {out} lie there. Put it back, or name "
+            f"{file}: does not exist, and the rules of {out} lie there. Put it back, or name "
             "another place with `rosgrade batch ... --course FILE`"
         )
-    found = load_course(Path(course))
+    found = load_course(file)
     # Refuse rules of other assignments at once.
-    found.rules(assignment, "")
+    found.rules(assignment)
     return found
 
 

@@ -53,9 +53,8 @@ def with_attempts(rows: Sequence[HandedIn], staging: Path) -> list[HandedIn]:
 def of_metadata(about: Mapping[str, Any]) -> tuple[str, str]:
     """When Gradescope's metadata says that it was handed in."""
     created = about.get(":created_at")
-    if not isinstance(created, datetime):
-        return _NOT_KNOWN
-    return created.isoformat(timespec="seconds"), "Gradescope's metadata"
+    text = created.isoformat() if isinstance(created, datetime) else ""
+    return _valid(text, "Gradescope's metadata")
 
 
 def _of(path: Path, staging: Path) -> tuple[str, str]:
@@ -63,10 +62,7 @@ def _of(path: Path, staging: Path) -> tuple[str, str]:
     if match is None:
         return _of_commit(path, staging / "committed")
     day, hour, minute, second, offset = match.groups(default="")
-    try:
-        return _iso(f"{day}T{hour}:{minute}:{second or '00'}{offset}"), "the name of the file"
-    except ValueError:
-        return _NOT_KNOWN
+    return _valid(f"{day}T{hour}:{minute}:{second or '00'}{offset}", "the name of the file")
 
 
 def _of_commit(path: Path, ours: Path) -> tuple[str, str]:
@@ -86,14 +82,20 @@ def _of_commit(path: Path, ours: Path) -> tuple[str, str]:
         asked = ["--git-dir", str(git), "rev-parse", "--verify", "--end-of-options", "HEAD"]
         sha = run_git(asked, ours, _GIT_LIMIT_S).strip()
         commit = run_git(["--git-dir", str(ours), "cat-file", "commit", sha], ours, _GIT_LIMIT_S)
-        match = _COMMITTER.search(commit.partition("\n\n")[0])
-        if match is None:
-            return _NOT_KNOWN
-        moment = datetime.fromtimestamp(int(match[1]), datetime.strptime(match[2], "%z").tzinfo)
-    except (GraderFault, OSError, ValueError, OverflowError):
+        seconds, zone = _COMMITTER.findall(commit.partition("\n\n")[0])[0]
+        moment = datetime.fromtimestamp(int(seconds), datetime.strptime(zone, "%z").tzinfo)
+    except (GraderFault, OSError, ValueError, IndexError, OverflowError):
         # An empty repository, or one that is damaged.
         return _NOT_KNOWN
-    return moment.isoformat(), f"the committer date of git commit {sha[:7]}"
+    return _valid(moment.isoformat(), f"the committer date of git commit {sha[:7]}")
+
+
+def _valid(text: str, source: str) -> tuple[str, str]:
+    """A time with its source; nothing where there is no such time."""
+    try:
+        return _iso(text), source
+    except ValueError:
+        return _NOT_KNOWN
 
 
 def _iso(text: str) -> str:

@@ -107,7 +107,7 @@ def batch(
                 # Results within a submission would be a part of it.
                 refuse_part(out, row.path, f"the submission of {row.key}")
         with Ledger(out).opened() as ledger:
-            place = str(rules.file) if rules is not None else None
+            place = str(rules.file.resolve()) if rules is not None else None
             work = Batch(loaded, ledger, frozenset(retry or ()), place)
             progress.begin("reading", len(rows))
             entries, to_do = work.read(rows, progress.advance)

@@ -96,14 +96,14 @@ def lateness(
     closed = rules.closes is not None and utc(moment) > utc(rules.closes)
     used, points, words = 0, score, f"the assignment closed at {shown_time(rules.closes or moment)}"
     if not closed:
-        grace = timedelta(seconds=late.grace if late is not None else 0.0)
-        if late is None or by <= grace or not points_of(late.deduct, max_score):
+        if late is None or by.total_seconds() <= late.grace or late.is_free:
             return Lateness()
         due = rules.due
         if rules.tokens is not None:
             used = min(_begun(due, moment, rules.tokens.worth), tokens_left)
             due = later(due, used, rules.tokens.worth)
-        count = _begun(due, moment, late.per) if utc(moment) - utc(due) > grace else 0
+        is_free = (utc(moment) - utc(due)).total_seconds() <= late.grace
+        count = 0 if is_free else _begun(due, moment, late.per)
         most = max_score if late.at_most is None else points_of(late.at_most, max_score)
         points = min(count * points_of(late.deduct, max_score), most, score)
         spent = f"{used} late {'token' if used == 1 else 'tokens'} used" if used else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -9,7 +10,7 @@ from pathlib import Path
 
 from grader.assignment.model import Visibility
 from grader.course.instant import instant
-from grader.course.model import Attempts, CourseFile, Late, Tokens, points_of
+from grader.course.model import Attempts, CourseFile, Late, Tokens
 from grader.errors import AssignmentError, UsageError
 from grader.spec.document import Place
 from grader.spec.nearest_name import nearest_or_all
@@ -124,12 +125,14 @@ def _contradictions(course: Course) -> Mistakes:
         for key, text in (("closes", one.closes), ("published", one.published)):
             if text and course.instant(text) < rules.due:
                 yield ("assignments", name, key), f"is before the due time, {one.due}"
-        late, room = rules.late, (rules.closes or rules.due + timedelta(days=10**5)) - rules.due
-        never = late is not None and room <= timedelta(seconds=late.grace)
+        late, room_s = rules.late, math.inf
+        if rules.closes is not None:
+            room_s = (rules.closes - rules.due).total_seconds()
+        never = late is not None and room_s <= late.grace
         if one.late and never:
             text = "never applies: the assignment closes before it would deduct anything"
             yield ("assignments", name, "late"), text
-        costs = costs or (late is not None and points_of(late.deduct, 1.0) > 0 and not never)
+        costs = costs or (late is not None and not late.is_free and not never)
     if course.spec.tokens and not costs:
         yield ("tokens",), "never apply: no assignment has a late policy that deducts anything"
     for at, extension in enumerate(course.spec.extensions):

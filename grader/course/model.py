@@ -59,6 +59,11 @@ class Late(Model):
     grace: DurationOrZero = Field(0.0, description="Lateness that costs nothing.")
     at_most: Deduction | None = Field(None, description="The most that is deducted.")
 
+    @property
+    def is_free(self) -> bool:
+        """Whether lateness costs nothing."""
+        return points_of(self.deduct, 1.0) == 0.0
+
 
 class Tokens(Model):
     """Late tokens: each moves a due time of a student by a day or an hour."""
@@ -98,7 +103,7 @@ class Extension(Model):
     student: Login
     assignment: Id
     due: Time | None = None
-    days: int | None = Field(None, ge=1)
+    days: int | None = Field(None, ge=1, le=1000)
     reason: str = Field("", description="For you; no report shows it.")
 
 

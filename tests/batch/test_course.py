@@ -122,7 +122,9 @@ class Class:
         staging = self.folder / f"staging{len(list(self.folder.iterdir()))}"
         staging.mkdir()
         with Ledger(self.out).opened() as ledger:
-            batch = Batch(self.loaded, ledger, course=str(course.file) if course else None)
+            batch = Batch(
+                self.loaded, ledger, course=str(course.file.resolve()) if course else None
+            )
             _, to_do = batch.read(take_in(self.handed, staging, known, course=course))
             done: list[Done] = list(batch.grade(to_do, Reader(self.loaded)))
             write_class(bring_up_to_date(done, ledger, now), ledger)
@@ -372,6 +374,15 @@ def test_tokens_are_used_up_in_the_order_of_due_dates(course: Class) -> None:
     assert lines(row) == [("late", -1)]
     assert row.result is not None
     assert row.result.adjustments[0].reason.endswith("1 late token used; 1 day × 1 points")
+
+
+@pytest.mark.parametrize(
+    "name", ["ana_9999-12-31T23-59-59Z", "ana_0001-01-01T00-00-00+23:59", "ana_2026-02-30T10-00"]
+)
+def test_a_time_that_cannot_be_is_no_time(course: Class, name: str) -> None:
+    course.hand_in(name, "bot")
+    (row,) = course.grade().values()
+    assert (lines(row), row.score) == ([], 8)
 
 
 def test_rules_that_are_gone_are_one_message_and_change_nothing(course: Class) -> None:
