@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -24,23 +24,18 @@ from grader.similarity.pairs import find_pairs
 from grader.starter import starter_files
 from grader.submission.kept_source import SOURCE_FOLDER, read_source
 
-SIMILARITY_FILE = "similarity.html"
-QUESTIONS_FILE = "questions.html"
-
 
 def write_similarity(loaded: LoadedAssignment, ledger: Ledger) -> tuple[Path, int]:
     """Write the page of the submissions that are alike: its file, and how many pairs there are."""
-    entries = ledger.read().entries
-    handed_in = {
-        entry.key: entry
-        for entry in entries
-        if entry.sha256 and not (entry.same_as or entry.attempt_of)
-    }
+    same: dict[str, list[Entry]] = {}
+    for entry in _entries(ledger):
+        same.setdefault(entry.same_as or entry.key, []).append(entry)
+    names = {key: ", ".join(one.name or one.key for one in found) for key, found in same.items()}
     known = _known(loaded)
-    found = {key: fingerprints(_files(ledger, key)) for key in handed_in}
-    own = {key: prints.keys() - known for key, prints in found.items() if prints}
-    pairs = find_pairs(own, {key: one.team for key, one in handed_in.items() if one.team})
-    names = {key: _name(entry, entries) for key, entry in handed_in.items()}
+    own = {
+        key: prints.keys() - known for key in same if (prints := fingerprints(_files(ledger, key)))
+    }
+    pairs = find_pairs(own, {key: found[0].team for key, found in same.items() if found[0].team})
     shown = {key for pair in pairs[:MOST_PAIRS] for key in (pair.first, pair.second)}
     page = render_similarity(
         loaded.assignment.title,
@@ -49,15 +44,18 @@ def write_similarity(loaded: LoadedAssignment, ledger: Ledger) -> tuple[Path, in
         {key: names[key] for key in own},
         [name for key, name in names.items() if key not in own],
     )
-    return _written(ledger, SIMILARITY_FILE, page), len(pairs)
+    return _written(ledger, "similarity.html", page), len(pairs)
 
 
 def write_questions(
     loaded: LoadedAssignment, ledger: Ledger, on_read: Callable[[str], None] = lambda _: None
 ) -> tuple[Path, int]:
     """Write the page of questions for oral exams: its file, and for how many submissions."""
-    entries = [entry for entry in ledger.read().entries if entry.sha256 and not entry.attempt_of]
-    lines = Counter(line for one in entries for line in _lines(_files(ledger, one.key)))
+    entries = _entries(ledger)
+    lines: Counter[str] = Counter()
+    for entry in entries:
+        texts = _files(ledger, entry.key).values()
+        lines.update({line.strip() for text in texts for line in text.split("\n")})
     usual = frozenset(line for line, times in lines.items() if times > len(entries) / 3)
     students = []
     for entry in entries:
@@ -75,21 +73,16 @@ def write_questions(
         title=loaded.assignment.title,
         students=students,
     )
-    return _written(ledger, QUESTIONS_FILE, page), len(students)
+    return _written(ledger, "questions.html", page), len(students)
+
+
+def _entries(ledger: Ledger) -> list[Entry]:
+    """Rows with a submission, without earlier attempts."""
+    return [one for one in ledger.read().entries if one.sha256 and not one.attempt_of]
 
 
 def _files(ledger: Ledger, key: str) -> dict[str, str]:
     return read_source(ledger.folder(key) / SOURCE_FOLDER).files
-
-
-def _lines(files: Mapping[str, str]) -> set[str]:
-    return {line.strip() for text in files.values() for line in text.split("\n")}
-
-
-def _name(entry: Entry, entries: tuple[Entry, ...]) -> str:
-    """What a student is called, with those who handed in the same."""
-    same = [one.name or one.key for one in entries if one.same_as == entry.key]
-    return ", ".join([entry.name or entry.key, *same])
 
 
 def _known(loaded: LoadedAssignment) -> set[int]:

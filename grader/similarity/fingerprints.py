@@ -22,8 +22,9 @@ from zlib import crc32
 
 RUN = 12
 WINDOW = 4
+LONGEST_FILE = 64 * 1024
 MOST_CHARACTERS = 512 * 1024
-"""Of code that is read of one submission; no student writes so much by hand."""
+"""Of code that is read of one submission; no student writes so much by hand, or so long a file."""
 _CPP = (".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp", ".hxx")
 _LANGUAGES = {".py": "python", **dict.fromkeys(_CPP, "cpp")}
 _LEFT_OUT = frozenset(",{}")
@@ -66,7 +67,7 @@ def _rows(files: Mapping[str, str]) -> Iterator[list[tuple[int, Gram]]]:
     left = MOST_CHARACTERS
     for file, text in files.items():
         language = _LANGUAGES.get(PurePosixPath(file).suffix.lower())
-        if language is None or len(text) > left:
+        if language is None or len(text) > min(left, LONGEST_FILE):
             continue
         left -= len(text)
         tokens = list(_tokens(text, language))
@@ -85,8 +86,12 @@ def _tokens(text: str, language: str) -> Iterator[tuple[str, int]]:
     from pygments.lexers import get_lexer_by_name
     from pygments.token import Comment, Name, Number, String
 
-    line, before = 1, ""
-    for _, kind, value in get_lexer_by_name(language).get_tokens_unprocessed(text):
+    # Lexers take quadratic time for blank lines.
+    lines = [(number, line.strip()) for number, line in enumerate(text.split("\n"), 1)]
+    lines = [line for line in lines if line[1]]
+    code = "\n".join(line for _, line in lines)
+    at, before = 0, ""
+    for _, kind, value in get_lexer_by_name(language).get_tokens_unprocessed(code):
         token = value.strip()
         if kind in Name or kind in Number:
             token = "name" if kind in Name else "number"
@@ -94,6 +99,6 @@ def _tokens(text: str, language: str) -> Iterator[tuple[str, int]]:
             # A string comes in pieces.
             token = "string" if kind is not String.Doc and before != "string" else ""
         if token and kind not in Comment and token not in _LEFT_OUT:
-            yield token, line
+            yield token, lines[at][0]
             before = token
-        line += value.count("\n")
+        at += value.count("\n")
