@@ -42,13 +42,14 @@ def clean(text: str) -> str:
 
 
 def visible(text: str) -> str:
-    r"""Show every character that acts on a screen, escape sequences too; lines stay as they are.
+    """Show each character that acts on a screen by its code point, such as ``<U+001B>``.
 
-    Other than :func:`clean` it drops nothing: for who reads source code.
+    Other than by :func:`clean` nothing is dropped, and lines stay as they are: for source code.
     """
     if text.isascii() and text.isprintable():
         return text
-    return _UNSAFE.sub(_shown, re.sub("[\u2028\u2029]", _shown, text))
+    pattern = f"{_UNSAFE.pattern}|[\u2028\u2029]"
+    return re.sub(pattern, lambda found: f"<U+{ord(found[0]):04X}>", text)
 
 
 def one_line(text: str) -> str:

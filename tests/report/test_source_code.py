@@ -25,9 +25,9 @@ def test_code_is_coloured_by_its_language() -> None:
 
 def test_what_would_act_on_a_screen_is_shown_and_nothing_is_dropped() -> None:
     html = shown("x = '\u202eevil\u202c \x1b[31mred\x00\u200b \u2028'")
-    for sign in ("202E", "202C", "200B", "2028"):
+    for sign in ("202E", "202C", "200B", "2028", "001B", "0000"):
         assert f"<mark>U+{sign}</mark>" in html
-    assert "␛[31mred␀" in html
+    assert "</mark>[31mred<mark>" in html
     assert not set(html) & set("\u202e\u202c\x1b\x00\u200b\u2028")
 
 

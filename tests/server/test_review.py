@@ -233,7 +233,7 @@ def test_a_mistake_in_the_changed_check_is_named_with_its_line(
 
 def test_source_acts_on_no_browser(client: Client) -> None:
     text = client.get(f"{page(ODD)}source?file={NODE}").text
-    assert "&lt;b&gt;␛[31m&lt;/b&gt;" in text and "\x1b" not in text
+    assert "&lt;b&gt;<mark>U+001B</mark>[31m&lt;/b&gt;" in text and "\x1b" not in text
     for key in STUDENTS:
         assert "<b>eli" not in client.get(page(key)).text
 
