@@ -11,7 +11,6 @@ from pathlib import Path
 from grader.batch.attempts import attempts_of, read_earlier
 from grader.batch.ledger import BATCH_FILE, Entry, Ledger
 from grader.course.attempts import Attempt, Ruled, ruled
-from grader.course.instant import utc
 from grader.course.late import HandInTime
 from grader.course.load import Course, load_course
 from grader.errors import UsageError
@@ -93,19 +92,14 @@ class ClassRules:
 
     @cached_property
     def _before(self) -> list[ClassRules]:
-        """The classes of assignments that were due before this one."""
-        if self.course is None:
-            return []
-        due = {
-            name: (utc(self.course.rules(name).due), name) for name in self.course.spec.assignments
-        }
-        return [
-            ClassRules(Ledger(folder))
-            for name, one in self.course.spec.assignments.items()
-            if one.results and due[name] < due[self._written.assignment]
-            for folder in [self.course.file.parent / one.results]
-            if (folder / BATCH_FILE).is_file()
-        ]
+        """The classes of assignments that were due before this one, as far as they are known."""
+        found: list[ClassRules] = []
+        for folder in self.course.results_before(self._written.assignment) if self.course else ():
+            if (folder / BATCH_FILE).is_file():
+                one = ClassRules(Ledger(folder))
+                one._before = list(found)
+                found.append(one)
+        return found
 
     def _attempts(self, entry: Entry, result: Result) -> list[Attempt]:
         """All attempts that are graded, the current one last."""

@@ -9,7 +9,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from grader.assignment.model import Visibility
-from grader.course.instant import instant
+from grader.course.instant import instant, utc
 from grader.course.model import Attempts, CourseFile, Late, Tokens
 from grader.errors import AssignmentError, UsageError
 from grader.spec.document import Place
@@ -63,6 +63,12 @@ class Course:
             tokens=self.spec.tokens,
             attempts=one.attempts or self.spec.attempts,
         )
+
+    def results_before(self, assignment: str) -> list[Path]:
+        """Folders of the batches of assignments that are due before another, in this order."""
+        names = sorted(self.spec.assignments, key=lambda one: (utc(self.rules(one).due), one))
+        results = (self.spec.assignments[one].results for one in names[: names.index(assignment)])
+        return [self.file.parent / folder for folder in results if folder is not None]
 
     def visible(self, assignment: str, now: datetime) -> frozenset[str]:
         """Which checks students may see at a time, by their visibility.
