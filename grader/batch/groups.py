@@ -30,8 +30,8 @@ def with_groups(rows: Sequence[HandedIn], course: Course | None) -> list[HandedI
 def _shared(handed: HandedIn, row: HandedIn) -> HandedIn:
     """The row of a member who has what another one handed in."""
     parts = [part for part in row.problem.split("; ") if not part.startswith("handed in nothing")]
-    shared = replace(handed, key=row.key, name=row.name, columns=row.columns)
-    return replace(shared, problem="; ".join(parts))
+    shared = replace(row, path=handed.path, fault=handed.fault, problem="; ".join(parts))
+    return replace(shared, late=handed.late, time=handed.time, earlier=handed.earlier)
 
 
 def strangers(rows: Sequence[HandedIn], course: Course) -> Iterator[str]:

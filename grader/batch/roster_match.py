@@ -139,7 +139,8 @@ def _missing(student: Student) -> HandedIn:
     if student.submission:
         why += f": {shown(student.submission)} is not among the submissions"
     row = HandedIn(student.key, None, student.name, problem=student.problem)
-    return with_problem(replace(row, columns=student.columns), why)
+    row = replace(row, columns=student.columns, email=student.email)
+    return with_problem(row, why)
 
 
 def unique(rows: list[HandedIn]) -> list[HandedIn]:

@@ -298,7 +298,8 @@ def test_a_group_has_what_one_of_them_handed_in(course: Class, groups: str) -> N
     course.hand_in("cai", "bot", "extra")
     course.hand_in("dee", "extra")
     rows = course.grade(
-        "login,team,handed_in\nana,1,2026-10-13T10:00Z\nben,1,\ncai,2,\ndee,2,\neva,,\n"
+        "login,team,handed_in,email\nana,1,2026-10-13T10:00Z,ana@x.edu\nben,1,,ben@x.edu\n"
+        "cai,2,,\ndee,2,,\neva,,,\n"
     )
     assert {key: row.score for key, row in rows.items()} == {
         "ana": 7,
@@ -310,7 +311,8 @@ def test_a_group_has_what_one_of_them_handed_in(course: Class, groups: str) -> N
     assert rows["ben"].note == rows["ana"].note == ""
     assert lines(rows["ben"]) == lines(rows["ana"]) == [("late", -1)] and rows["ben"].late
     assert rows["dee"].note == "cai and dee of one group handed in different files"
-    assert {one.key: one.team for one in Ledger(course.out).read().entries}["ben"] == "ana"
+    (ben,) = (one for one in Ledger(course.out).read().entries if one.key == "ben")
+    assert (ben.team, ben.email) == ("ana", "ben@x.edu")
 
 
 def test_a_group_of_a_column_that_the_roster_lacks_is_an_error(course: Class) -> None:
