@@ -10,9 +10,9 @@ from itertools import combinations, pairwise
 from grader.similarity.fingerprints import RUN, WINDOW, Fingerprints, Gram
 
 THRESHOLD = 0.4
-"""Least share of the smaller submission's fingerprints. Measured with the right solutions of
-rosgrade's nine assignments: renamed, reordered and reformatted copies have 0.56 and more, different
-solutions at most 0.25 unless they share lines word for word."""
+"""Least share of the smaller submission's fingerprints. Of 119 right solutions of rosgrade's own
+assignments, 115 are found again when renamed, reordered and reformatted; different solutions are
+pairs only where they share whole lines or differ in texts alone; others have at most 0.25."""
 FEWEST = 8
 """Least number of shared fingerprints: what is left of a short exercise is alike by chance."""
 _COMMON_SHARE = 0.25
