@@ -127,7 +127,8 @@ def grades_csv(rows: Sequence[ClassRow], zero: Collection[RowStatus] = ()) -> st
 def _column_of(one: AdjustmentPart) -> tuple[str, str]:
     """The key and the title of the column of an adjustment."""
     if one.kind != "manual":
-        return one.kind, one.kind
+        # The column `late` says yes or no.
+        return one.kind, f"{one.kind} points"
     return f"manual {one.item}", f"{one.item} ({number(one.max_points)})"
 
 
