@@ -298,9 +298,8 @@ def test_what_a_person_wrote_reaches_every_file_and_survives_a_regrade(
     for command in ("report", "regrade"):
         assert rosgrade(command, out).returncode == 0
         found = grades(csv_file.read_text())
-        assert [found["ana"][one] for one in ("score", "max_score", "readme (2)", "forgiven")] == [
-            *("2.5", "4", "1.5", "1")
-        ]
+        columns = ("score", "max_score", "readme (2)", "forgiven points")
+        assert [found["ana"][one] for one in columns] == ["2.5", "4", "1.5", "1"]
         assert found["cai"]["status"] == "waits for a person"
         page = (out / "submissions" / "ana" / "report.html").read_text(encoding="utf-8")
         assert "README: 1.5 of 2 points, by AB" in page and "See REP-144" in page
