@@ -1,9 +1,9 @@
 """Fingerprints of source code that stay the same when names, formatting and comments change.
 
 A program becomes a row of tokens in which every name is the same token, and so is every number and
-every string; comments, docstrings, white space, commas and braces are left out. Of the hashes of
-all runs of ``RUN`` tokens, winnowing keeps the smallest of each ``WINDOW`` neighbours, so two
-programs that share ``RUN + WINDOW - 1`` tokens in a row share a fingerprint for certain.
+every string; imports, comments, docstrings, white space, commas and braces are left out. Of the
+hashes of all runs of ``RUN`` tokens, winnowing keeps the smallest of each ``WINDOW`` neighbours, so
+two programs that share ``RUN + WINDOW - 1`` tokens in a row share a fingerprint for certain.
 
 Schleimer, Wilkerson and Aiken, "Winnowing: Local Algorithms for Document Fingerprinting",
 SIGMOD 2003, https://theory.stanford.edu/~aiken/publications/papers/sigmod03.pdf
@@ -28,6 +28,7 @@ MOST_CHARACTERS = 512 * 1024
 _CPP = (".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp", ".hxx")
 _LANGUAGES = {".py": "python", **dict.fromkeys(_CPP, "cpp")}
 _LEFT_OUT = frozenset(",{}")
+_IMPORTS = ("import ", "from ", "using ")
 
 
 class Gram(NamedTuple):
@@ -86,9 +87,9 @@ def _tokens(text: str, language: str) -> Iterator[tuple[str, int]]:
     from pygments.lexers import get_lexer_by_name
     from pygments.token import Comment, Name, Number, String
 
-    # Lexers take quadratic time for blank lines.
+    # Lexers take quadratic time for blank lines; imports are alike in all programs.
     lines = [(number, line.strip()) for number, line in enumerate(text.split("\n"), 1)]
-    lines = [line for line in lines if line[1]]
+    lines = [one for one in lines if one[1] and not one[1].startswith(_IMPORTS)]
     code = "\n".join(line for _, line in lines)
     at, before = 0, ""
     for _, kind, value in get_lexer_by_name(language).get_tokens_unprocessed(code):
