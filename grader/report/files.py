@@ -71,8 +71,9 @@ def write_whole(file: Path, content: str | bytes, *, durable: bool = False) -> N
                     stream.flush()
                     os.fsync(stream.fileno())
             draft.replace(file)
-            if durable:
-                sync(file.parent)
+            # The folder may be new too.
+            for folder in file.absolute().parents[:2] if durable else ():
+                sync(folder)
         finally:
             draft.unlink(missing_ok=True)
     except OSError as error:

@@ -150,8 +150,11 @@ class ReviewStore:
 def _read(file: Path, model: type[R], empty: R) -> Saved[R]:
     if not file.exists():
         return Saved(empty, "")
-    # The version first: of a file that changes meanwhile it is the old one, which no write takes.
-    version = _version(file.read_bytes())
+    try:
+        # Before the content: of a file that changes meanwhile it is too old, so no write takes it.
+        version = _version(file.read_bytes())
+    except OSError as error:
+        raise UsageError(f"{file}: cannot be read: {error.strerror}") from error
     return Saved(read_source(file).read(model), version)
 
 
