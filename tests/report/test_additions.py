@@ -85,12 +85,20 @@ def test_grades_csv_has_columns_for_items_and_adjustments():
         ClassRow("cai", missing=True),
     ]
     ana, ben, cai = csv.DictReader(io.StringIO(grades_csv(rows)))
-    columns = ("status", "score", "max_score", "readme (2)", "forgiven", "late", "oral (3)")
+    columns = (
+        "status",
+        "score",
+        "max_score",
+        "readme (2)",
+        "forgiven points",
+        "late points",
+        "oral (3)",
+    )
     assert [ana[one] for one in columns] == ["graded", "4", "5", "1.5", "0.5", "-1", ""]
     assert [ben[one] for one in columns] == [
         *("waits for a person", "", "8", "1.5", "0.5", "-1", ""),
     ]
-    assert cai["readme (2)"] == cai["late"] == ""
+    assert cai["readme (2)"] == cai["late points"] == cai["late"] == ""
 
 
 def test_canvas_gets_no_score_while_a_person_has_to_give_points():
