@@ -1,6 +1,12 @@
 "use strict";
 (() => {
   const main = document.querySelector("main"), problem = document.querySelector("#problem");
+  main.addEventListener("toggle", async (event) => {
+    const cluster = event.target, place = cluster.querySelector(".examples");
+    if (!cluster.open || place.hasChildNodes()) return;
+    const answer = await fetch(`clusters/example?check=${cluster.dataset.example}`);
+    if (answer.ok) place.innerHTML = await answer.text();
+  }, true);
   const open = () => { const one = location.hash && document.getElementById(location.hash.slice(1)); if (one) { one.open = true; one.scrollIntoView(); } };
   addEventListener("hashchange", open);
   open();

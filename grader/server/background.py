@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from grader.assignment.load import LoadedAssignment
 from grader.batch.class_files import standing, write_class
 from grader.batch.class_regrading import Regraded, regrade_class, write_regraded
-from grader.batch.ledger import Ledger
 from grader.batch.rendering import bring_up_to_date
 from grader.errors import RosgradeError
+from grader.server.reviewed_class import ReviewedClass
 
 
 @dataclass
@@ -34,14 +34,15 @@ class Judging:
 class Background:
     """One thread for a class."""
 
-    def __init__(self, ledger: Ledger) -> None:
-        """Begin, with what was changed before."""
+    def __init__(self, reviewed: ReviewedClass) -> None:
+        """Begin: read the class, and write what was changed before."""
         self.judging = Judging()
         self.problem = ""
         """Why reports and gradebook are not up to date; empty if they are, or soon will be."""
-        self._ledger = ledger
+        self._ledger = reviewed.ledger
         self._worker = ThreadPoolExecutor(1, "background")
         self._next: Future[None] | None = None
+        self._worker.submit(reviewed.rows)
         self.refresh()
 
     def refresh(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,8 +33,6 @@ from grader.report.html.overview import render_overview
 from grader.report.html.page import environment, render_page
 from grader.report.html.source_code import code_lines
 from grader.report.model.class_row import ClassRow
-from grader.report.model.result_model import CheckPart
-from grader.review.cluster import Cluster
 from grader.review.store import ReviewConflict
 from grader.server.background import Background
 from grader.server.changes import change_cluster, change_student
@@ -66,6 +64,7 @@ class ReviewServer(LocalServer):
             Route("/", self._overview),
             Route("/clusters", self._clusters),
             Route("/clusters", _posted(self._change_cluster), methods=["POST"]),
+            Route("/clusters/example", self._example),
             Route("/regrade", self._regrading),
             Route("/regrade", _posted(self._regrade), methods=["POST"]),
             Route("/s/{name}/", self._submission),
@@ -76,7 +75,7 @@ class ReviewServer(LocalServer):
         ]
         problems: dict[Any, Any] = {RosgradeError: _problem, ValidationError: _problem}
         super().__init__(Starlette(routes=routes, exception_handlers=problems), port)
-        self._background = Background(self._class.ledger)
+        self._background = Background(self._class)
 
     def close(self) -> None:
         """Stop, when all that was changed is in the reports."""
@@ -127,6 +126,7 @@ class ReviewServer(LocalServer):
         except RosgradeError:
             # The assignment is not there any more: any number of points can be given.
             levels = {}
+        whole = self._class.ledger.whole_result(row.row.id)
         return _part(
             "review_panel.html.j2",
             row=row,
@@ -136,6 +136,7 @@ class ReviewServer(LocalServer):
             levels=levels,
             bank=self._class.store.of_class().content.bank[:MOST_OF_BANK],
             findings=[check for check in row.row.judged if check.status is not Status.PASSED],
+            places={one.id: one.evidence.places for one in (whole.checks if whole else ())},
             saved=saved,
         )
 
@@ -173,32 +174,31 @@ class ReviewServer(LocalServer):
         return FileResponse(file, headers=_FRAMED)
 
     def _clusters(self, _: Request) -> Response:
-        rows = {row.row.id: row for row in self._class.rows()}
-        found, saved = self._class.clusters(), self._class.store.of_class()
+        found = self._class.clusters()
         return _page(
             "review_clusters",
             clusters=found[:MOST_CLUSTERS],
             left=len(found) - MOST_CLUSTERS,
-            examples=[list(self._examples(one, rows)) for one in found[:MOST_CLUSTERS]],
-            rows=rows,
-            version=saved.version,
-            link=lambda key: f"s/{quote(rows[key].name)}/",
+            rows={row.row.id: row for row in self._class.rows()},
+            version=self._class.store.of_class().version,
+            quote=quote,
         )
 
-    def _examples(
-        self, cluster: Cluster, rows: dict[str, ReviewedRow]
-    ) -> Iterator[tuple[ReviewedRow, CheckPart, str, int, list[Markup]]]:
-        """Two students, each with the check, its place, and the lines around it from a number."""
-        for row in (rows[key] for key in cluster.keys[:2]):
-            check = next(one for one in row.row.judged if one.id == cluster.check)
-            place = next((one for one in check.evidence.places if one.line), None)
+    def _example(self, request: Request) -> Response:
+        """Two students of a cluster, each with the check, and the lines of source around it."""
+        check, examples = request.query_params.get("check", ""), []
+        for name in request.query_params.getlist("name")[:2]:
+            row, _ = self._class.find(name)
+            result = self._class.ledger.whole_result(row.row.id)
+            checks = {one.id: one for one in (result.checks if result else ())}
+            if (found := checks.get(check)) is None:
+                continue
+            place = next((one for one in found.evidence.places if one.line), None)
             text = self._class.source(row).files.get(place.file) if place is not None else None
-            if place is None or place.line is None or text is None:
-                yield row, check, "", 1, []
-            else:
-                begin = max(0, place.line - 1 - AROUND)
-                code = code_lines(place.file, text)[begin : place.line + AROUND]
-                yield row, check, f"{place.file}:{place.line}", begin + 1, code
+            first = max(0, ((place and place.line) or 1) - 1 - AROUND)
+            code = code_lines(place.file, text)[first:] if place and text is not None else []
+            examples.append((row, found, place, first + 1, code[: 2 * AROUND + 1]))
+        return HTMLResponse(_part("review_example.html.j2", examples=examples))
 
     def _change_cluster(self, _: Request, sent: Any) -> Response:
         change_cluster(self._class, sent)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -54,6 +55,7 @@ class ReviewedClass:
         """Open the folder; ``by`` are the initials of who reviews."""
         self.out, self.by = out, by
         self.ledger, self.store = Ledger(out), ReviewStore(out)
+        self._reading = threading.Lock()
         self._known: dict[str, _Read] = {}
         self._shared: tuple[object, ...] = ()
         self._loaded: tuple[object, LoadedAssignment] | None = None
@@ -69,6 +71,11 @@ class ReviewedClass:
 
     def rows(self) -> list[ReviewedRow]:
         """All rows, sorted by key."""
+        # Else who asks while the class is read would read all of it once more.
+        with self._reading:
+            return self._rows()
+
+    def _rows(self) -> list[ReviewedRow]:
         written = self.ledger.read()
         course = (_version(self.out / written.course),) if written.course else ()
         shared = (_version(self.out / BATCH_FILE), _version(self.store.file(None)), *course)

@@ -159,7 +159,10 @@ def test_a_cause_is_one_line_with_its_students_and_an_example_of_two(client: Cli
     text = client.get("/clusters").text
     line = text[text.index('data-check="docs"') :]
     assert "3 students" in line
-    assert line.count("bot/node.py:6") >= 2
+    found = re.search(r'data-example="([^"]+)"', line)
+    assert found
+    example = client.get(f"/clusters/example?check={html.unescape(found[1])}").text
+    assert example.count("stop</span>():") == 2 and "cai" in example
     assert "To forgive it gives 12 points back" in line
 
 

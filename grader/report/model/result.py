@@ -78,7 +78,7 @@ def read_result(file: Path) -> Result:
             f"not {SCHEMA}"
         )
     try:
-        return Result.model_validate(data)
+        return Result.model_validate(model.normalized(data), context=model.NORMALIZED)
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(step) for step in first["loc"])

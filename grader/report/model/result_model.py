@@ -8,7 +8,14 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, computed_field, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    computed_field,
+    model_validator,
+)
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
@@ -20,7 +27,11 @@ from grader.submission.record import BuildRecord
 SCHEMA: Literal[1] = 1
 
 
-def _normal(value: Any) -> Any:
+NORMALIZED = "normalized"
+"""Context of a validation of data that :func:`normalized` has gone through as a whole."""
+
+
+def normalized(value: Any) -> Any:
     """A value whose JSON gives the same value again: rounded, and encodable in UTF-8."""
     if isinstance(value, float):
         # Nine significant digits: microseconds in a run of minutes, and no noise behind.
@@ -28,11 +39,11 @@ def _normal(value: Any) -> Any:
     if isinstance(value, str) and not isinstance(value, Enum):
         return encodable(value)
     if isinstance(value, tuple | list):
-        return tuple(map(_normal, value))
+        return tuple(map(normalized, value))
     if isinstance(value, dict):
-        return {_normal(name): _normal(item) for name, item in value.items()}
+        return {normalized(name): normalized(item) for name, item in value.items()}
     if is_dataclass(value):
-        return {one.name: _normal(getattr(value, one.name)) for one in fields(value)}
+        return {one.name: normalized(getattr(value, one.name)) for one in fields(value)}
     return value
 
 
@@ -60,8 +71,9 @@ class _Part(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _normal(cls, data: Any) -> Any:
-        return _normal(data)
+    def _normal(cls, data: Any, info: ValidationInfo) -> Any:
+        # Else each part of a part would be gone through once for every part around it.
+        return data if info.context == NORMALIZED else normalized(data)
 
 
 class Identity(_Part):
