@@ -216,7 +216,9 @@ def test_a_kit_is_renewed_and_other_files_beside_it_stay(kit: Path, tmp_path: Pa
     (out / "work").mkdir()
     (out / "assignments" / "old").mkdir()
     (out / "rosgrade-0.0.1-py3-none-any.whl").touch()
-    write_kit([load_assignment("timed_publisher")], out, "Course")
+    command = [sys.executable, "-m", "grader", "export", "course", "timed_publisher"]
+    told = subprocess.run([*command, "--out", str(out)], cwd=ROOT, capture_output=True, check=True)
+    assert told.stdout.decode().endswith(f"{out}\n")
     assert (out / "work").is_dir()
     assert [one.name for one in (out / "assignments").iterdir()] == ["timed_publisher"]
     assert len(list(out.glob("*.whl"))) == 1

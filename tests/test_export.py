@@ -130,7 +130,10 @@ def test_the_workflow_gives_the_action_only_inputs_that_it_has(loaded, tmp_path)
 def test_every_action_runs_on_a_node_that_github_still_has():
     # The first versions on Node 24; GitHub took Node 20 from its runners in September 2026.
     first = {"checkout": 5, "setup-python": 6, "cache": 5, "upload-artifact": 6}
-    files = ("action.yml", ".github/workflows/test.yml", "templates/export/github-workflow.yml")
+    files = (
+        *("action.yml", ".github/workflows/test.yml", "templates/export/github-workflow.yml"),
+        "templates/course/workflow.yml.j2",
+    )
     used = [
         found
         for file in files
