@@ -38,7 +38,7 @@ def test_the_visible_part_has_nothing_of_the_rest_but_number_and_points(tmp_path
     part = visible_part(whole)
     assert [bound.spec.id for bound in part.checks] == ["alive"]
     assert [spec.id for spec in part.assignment.checks] == ["alive"]
-    assert part.withheld == Withheld(2, 3.5)
+    assert part.withheld == Withheld(checks=2, points=3.5)
     assert part.sha256 == whole.sha256
 
 
