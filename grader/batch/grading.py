@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Collection, Mapping
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -38,6 +38,10 @@ MOST_RUNS = 3
 """Runs of a scenario before it is given up as disturbed."""
 _LONGEST_WORDS = 300
 
+OnRecorded = Callable[[SubmissionRecord, Mapping[str, Recording]], None]
+"""Called with what is known of a submission: when it is read, when it is built (``build`` is there
+then), and with its recordings so far after each of them."""
+
 
 @dataclass(frozen=True)
 class Graded:
@@ -62,12 +66,16 @@ class Grading:
         cache: Path,
         *,
         seed: int | None = None,
+        first: Collection[str] = (),
+        on_recorded: OnRecorded = lambda _record, _recordings: None,
     ) -> None:
-        """Set up."""
+        """Set up; the scenarios that are ``first`` are started before the others."""
         self._loaded = loaded
         self._runner = runner
         self._cache = cache
         self._seed = seed
+        self._first = first
+        self._on_recorded = on_recorded
         self._libraries = (*loaded.assignment.libraries, *([LIBRARY] if _tested(loaded) else ()))
         check_installed(self._libraries)
         self._build_limits = _build_limits(loaded.assignment.build_limits)
@@ -100,6 +108,7 @@ class Grading:
         outside = tuple(sorted({**self._loaded.given, **given}.items()))
 
         def tested(record: SubmissionRecord) -> frozenset[str]:
+            self._on_recorded(record, {})
             return _tested(named(self._loaded, replace(record, given=outside))[0])
 
         # A build takes a CPU or more; too many would only slow down each other.
@@ -148,6 +157,7 @@ class Grading:
         support = self._type_support
         if loaded is not self._loaded:
             support = TypeSupport(loaded, self._runner.ros, self._cache)
+        self._on_recorded(prepared.record, {})
         can_run = prepared.install is not None and unnamed is None
         again = [scenario.id for scenario in self._scenarios] if can_run else []
         alone: list[str] = []
@@ -155,8 +165,9 @@ class Grading:
         first = 1
         for attempt in range(1, MOST_RUNS + 1):
             run = partial(self._run, loaded, support, prepared, folder, remaps)
-            self._run_all(run, again, recordings, faults, alone=False)
-            self._run_all(run, alone, recordings, faults, alone=True)
+            told = partial(self._on_recorded, prepared.record, recordings)
+            self._run_all(run, again, recordings, faults, told, alone=False)
+            self._run_all(run, alone, recordings, faults, told, alone=True)
             runs.update((name, runs.get(name, 0) + 1) for name in (*again, *alone))
             result = grade(self._loaded, prepared.record, recordings, faults)
             run_so_far = loaded.assignment.scenarios
@@ -194,6 +205,7 @@ class Grading:
         names: list[str],
         recordings: dict[str, Recording],
         faults: dict[str, str],
+        told: Callable[[], None],
         *,
         alone: bool,
     ) -> None:
@@ -201,18 +213,23 @@ class Grading:
             return
         with ThreadPoolExecutor(max_workers=1 if alone else len(names)) as pool:
             try:
-                futures = {name: pool.submit(run, name, alone) for name in names}
-                for name, future in futures.items():
+                ordered = sorted(names, key=lambda name: name not in self._first)
+                futures = {pool.submit(run, name, alone): name for name in ordered}
+                for future in as_completed(futures):
+                    name = futures[future]
                     faults.pop(name, None)
                     try:
                         recordings[name] = future.result()
                     except GraderFault as fault:
                         faults[name] = str(fault)
+                    told()
             except BaseException as error:
                 # An interrupt ends all that runs; a bug of rosgrade costs no other run.
                 if not isinstance(error, Exception):
                     self._runner.close()
                 raise
+        # As they lie in their folder, whichever ended first.
+        recordings.update({name: recordings.pop(name) for name in sorted(recordings)})
 
     def _run(
         self,

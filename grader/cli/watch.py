@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -29,19 +29,22 @@ from grader.cli.options import (
 from grader.cli.screen.console import open_page, output_console, print_error, say
 from grader.cli.screen.progress import Progress
 from grader.resources import cache_folder
+from grader.safe_text import one_line
 from grader.sandbox.choice import Choice
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from rich.console import Console
 
     from grader.assignment.load import LoadedAssignment
     from grader.batch.grading import Graded, Grading
     from grader.errors import RosgradeError
+    from grader.recording.model import Recording
     from grader.report.model.result_model import Result
     from grader.run.runner import Runner
     from grader.server.watch import ReportPage
+    from grader.submission.record import SourceError, SubmissionRecord
 
 
 def watch(
@@ -70,8 +73,9 @@ def watch(
 ) -> None:
     """Grade now, and again after every save, until Ctrl-C.
 
-    Shows what changed since the last grade. The report page updates itself. A save during a run
-    starts the run again. The files of the assignment are watched too.
+    Runs first what failed last, and shows at once how it ends now. Shows what changed since the
+    last grade. The report page updates itself. A save during a run starts the run again. The files
+    of the assignment are watched too.
     """
     from grader import ros
     from grader.assignment.load import load_assignment
@@ -94,21 +98,21 @@ def watch(
     check_path(submission)
     check_folder(report)
     refuse_foreign(report, keep=False)
-    progress = Progress(quiet, verbose)
-    runner = Runner(
-        ros.find(),
-        progress=progress.narrate,
-        sandbox=chosen_sandbox(sandbox, progress),
-        verbose=verbose,
-    )
-    work = _Work(loaded, load, submission, report, seed, progress, runner)
     with ExitStack() as stack:
-        stack.callback(work.close)
         try:
             page = ReportPage(report / "report.html", port)
         except OSError as error:
             raise UsageError(f"--port {port}: {error.strerror}") from error
         stack.callback(page.close)
+        progress = Progress(quiet, verbose, page.show_phase)
+        runner = Runner(
+            ros.find(),
+            progress=progress.narrate,
+            sandbox=chosen_sandbox(sandbox, progress),
+            verbose=verbose,
+        )
+        work = _Work(loaded, load, submission, report, seed, progress, runner, page)
+        stack.callback(work.close)
         console = output_console()
         say(f"Report page: {page.url}")
         if open_report:
@@ -130,20 +134,32 @@ class _Work:
     seed: int | None
     progress: Progress
     runner: Runner
+    page: ReportPage
     grading: Grading | None = None
     problem: RosgradeError | None = None
+    before: Result | None = None
+    told: set[str] = field(default_factory=set)
 
     def begin(self) -> None:
         from grader.batch.grading import Grading
         from grader.errors import RosgradeError
+        from grader.report.text.last_save import failed_scenarios
 
         self.runner.get_ready()
+        self.told.clear()
         try:
             self.loaded, self.problem = self.load(), None
         except RosgradeError as error:
             # Shown as the end of the grading: the student corrects it and saves again.
             self.problem = error
-        self.grading = Grading(self.loaded, self.runner, cache_folder(), seed=self.seed)
+        self.grading = Grading(
+            self.loaded,
+            self.runner,
+            cache_folder(),
+            seed=self.seed,
+            first=failed_scenarios(self.before) if self.before is not None else (),
+            on_recorded=self.tell_early,
+        )
 
     def grade(self) -> Graded:
         from grader.batch.grading import RECORDINGS_FOLDER
@@ -159,6 +175,32 @@ class _Work:
             on_output=partial(self.progress.output, "build"),
         )
 
+    def tell_early(self, record: SubmissionRecord, recordings: Mapping[str, Recording]) -> None:
+        """Tell what is certain already: lines that Python cannot read, and what failed last."""
+        from grader.grade.early import judge_early
+        from grader.report.text.last_save import early_line
+
+        known: list[str] = []
+        if record.build is None:
+            errors = (error for package in record.packages for error in package.syntax_errors)
+            known += (f"{error}{self._line(error)}" for error in errors)
+        elif self.before is not None and len(recordings) < len(self.loaded.assignment.scenarios):
+            judged = judge_early(self.loaded, record, recordings, self.before.reasons)
+            known += map(early_line, judged)
+        for text in known:
+            if text not in self.told:
+                self.told.add(text)
+                self.progress.tell(text)
+                self.page.tell(text)
+
+    def _line(self, error: SourceError) -> str:
+        """The line of a file that an error is in, where it is there to be read."""
+        try:
+            lines = (self.submission / error.file).read_text("utf-8", "replace").splitlines()
+            return f": {one_line(lines[(error.line or 0) - 1])}" if error.line else ""
+        except (OSError, IndexError):
+            return ""
+
     def cancel(self) -> None:
         assert self.grading is not None
         self.runner = self.grading.cancel()
@@ -173,9 +215,10 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
     from grader.batch.watching import Ended, Step, Watching
     from grader.report.model.facts import Clock
     from grader.report.text.explanation import score
+    from grader.report.text.last_save import what_changed
     from grader.report.text.terminal import print_changes, print_grade
 
-    before: Result | None = None
+    scores: list[float | None] = []
     clock = Clock()
     with ExitStack() as shown:
         watching = Watching(work.submission, work.report, work, work.loaded.folder)
@@ -183,7 +226,14 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
             title = work.loaded.assignment.title
             if event is Step.BEGAN:
                 clock = Clock()
-                page.show("grading the saved files", f"… {title}")
+                page.show(
+                    text="grading the saved files",
+                    title=f"… {title}",
+                    is_old=True,
+                    phases={},
+                    early=(),
+                    changed="",
+                )
                 shown.enter_context(work.progress.shown())
                 continue
             shown.close()
@@ -192,20 +242,27 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
                 continue
             if event.graded is None:
                 print_error(str(event.problem))
-                page.show(f"not graded: {event.problem}", f"! {title}")
+                page.show(text=f"not graded: {event.problem}", title=f"! {title}", is_old=False)
             else:
                 history = partial(with_history, work.report)
                 result = write_graded(event.graded, work.report, clock, amended=history)
                 console.rule(f"{time.strftime('%H:%M:%S')}, after {clock.elapsed_s:.1f} s")
-                if before is None:
+                scores.append(result.known_score)
+                changed = ""
+                if work.before is None:
                     print_grade(console, title, result)
                 else:
-                    print_changes(console, before, result)
-                before = result
+                    changed = what_changed(work.before, result)
+                    print_changes(console, work.before, result, scores)
+                work.before = result
                 points = score(result)
                 page.show(
-                    f"{points}, graded at {time.strftime('%H:%M:%S')}",
-                    f"{points}: {title}",
+                    text=f"{points}, graded at {time.strftime('%H:%M:%S')}",
+                    title=f"{points}: {title}",
+                    is_old=False,
+                    changed=changed,
+                    scores=tuple(scores),
+                    most=result.known_max_score,
                     is_new=True,
                 )
                 work.runner.get_ready()

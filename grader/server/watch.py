@@ -6,8 +6,11 @@ shown in a frame of an outer page, which asks this server for changes and reload
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+import threading
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from starlette.applications import Starlette
 from starlette.requests import Request
@@ -21,11 +24,27 @@ _NOT_YET = "The first report comes soon."
 
 @dataclass(frozen=True)
 class PageState:
-    """What the page shows around the report."""
+    """What the page shows around the report.
+
+    Attributes:
+        version: Of the report.
+        is_old: A grading runs, so the report is that of an earlier save.
+        phases: What is done now, by scenario; of the whole under an empty name.
+        early: What is known already, while the rest runs.
+        changed: By the last save, in one line.
+        scores: Since watching began; None where there was no grade.
+        most: Points that can be had.
+    """
 
     version: int = 0
     title: str = "rosgrade watch"
     text: str = "grading"
+    is_old: bool = False
+    phases: Mapping[str, str] = field(default_factory=dict)
+    early: tuple[str, ...] = ()
+    changed: str = ""
+    scores: tuple[float | None, ...] = ()
+    most: float = 0.0
 
 
 class ReportPage(LocalServer):
@@ -35,6 +54,7 @@ class ReportPage(LocalServer):
         """Begin to serve a report that need not be there yet; port 0 takes a free one."""
         self.state = PageState()
         self._report = report
+        self._lock = threading.RLock()
         routes = [
             Route("/", self._outer_page),
             Route("/report.html", self._read_report),
@@ -42,9 +62,21 @@ class ReportPage(LocalServer):
         ]
         super().__init__(Starlette(routes=routes), port)
 
-    def show(self, text: str, title: str, *, is_new: bool = False) -> None:
-        """Show a text and a title on every open page."""
-        self.state = PageState(self.state.version + is_new, title, text)
+    def show(self, *, is_new: bool = False, **changes: Any) -> None:
+        """Change what every open page shows around the report, which may be a new one."""
+        with self._lock:
+            self.state = replace(self.state, version=self.state.version + is_new, **changes)
+
+    def show_phase(self, scenario: str, text: str) -> None:
+        """Show what a scenario does now; the first takes the place of what was done before."""
+        with self._lock:
+            others = {name: one for name, one in self.state.phases.items() if name and scenario}
+            self.show(phases={**others, scenario: text})
+
+    def tell(self, text: str) -> None:
+        """Show something that is known already."""
+        with self._lock:
+            self.show(early=(*self.state.early, text))
 
     def _outer_page(self, _: Request) -> Response:
         from grader.report.html.page import render_page

@@ -10,6 +10,8 @@ import gc
 import shutil
 import weakref
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -157,6 +159,39 @@ def test_a_disturbed_run_is_repeated_alone(grade: Grade) -> None:
     assert graded.grade.full_points
     assert runner.alone == [False, True]
     assert graded.runs == {"run": 2}
+
+
+def test_what_failed_last_runs_first_and_is_told_while_the_others_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one_by_one = partial(ThreadPoolExecutor, 1)
+    monkeypatch.setattr(grading_module, "ThreadPoolExecutor", lambda max_workers: one_by_one())
+    folder = tmp_path / "lesson"
+    folder.mkdir()
+    run = YAML[YAML.index("  - id: run") : YAML.index("checks:")]
+    more = "".join(run.replace("id: run", f"id: {name}") for name in ("far", "near"))
+    (folder / "assignment.yaml").write_text(YAML.replace(run, run + more), encoding="utf-8")
+    runs = [dataclasses.replace(recording(), scenario=name) for name in ("far", "near", "run")]
+    runner = ScriptedRunner(runs[1], runs[2], runs[0])
+    told: list[list[str]] = []
+    grading = Grading(
+        load_assignment(folder),
+        runner,
+        tmp_path / "cache",
+        first={"near"},
+        on_recorded=lambda record, recordings: told.append(list(recordings)),
+    )
+    prepared = Prepared(record=SUBMISSION, install=tmp_path / "install")
+    graded = grading.grade_prepared(prepared, tmp_path / "recordings")
+    assert [one.id for one in runner.scenarios] == ["near", "run", "far"]
+    assert [set(names) for names in told] == [
+        set(),
+        {"near"},
+        {"near", "run"},
+        {"near", "run", "far"},
+    ]
+    assert list(graded.recordings) == ["far", "near", "run"]
+    assert graded.grade.full_points
 
 
 NAMED = (

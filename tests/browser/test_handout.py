@@ -9,8 +9,8 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, expect
 
 from grader.assignment.load import load_assignment
-from grader.cli.screen.page import ReportPage
 from grader.report.html.handout import make_handout, render_handout
+from grader.server.watch import ReportPage
 from tests.report.sample import full_points, lost_points
 
 pytestmark = pytest.mark.slow
@@ -49,10 +49,26 @@ def test_the_page_of_a_watched_submission_follows_by_itself(
         expect(frame.locator(".score .value")).to_have_text("3.02")
         expect(page.get_by_role("status")).to_have_text("grading")
         write(full_points())
-        served.show("3 of 3 points", "3 of 3 points: Publish", is_new=True)
+        served.show(text="3 of 3 points", title="3 of 3 points: Publish", is_new=True)
         expect(frame.locator(".score .value")).to_have_text("3")
         expect(page.get_by_role("status")).to_have_text("3 of 3 points")
         expect(page).to_have_title("3 of 3 points: Publish")
+        old = "document.querySelector('main').classList.contains('is-old')"
+        served.show(text="grading the saved files", is_old=True)
+        served.show_phase("listen", "recording")
+        served.tell("period passes now")
+        expect(page.locator("#phases li")).to_have_text(["listen: recording"])
+        expect(page.locator("#early li")).to_have_text(["period passes now"])
+        assert page.evaluate(old)
+        assert Axe().run(page).response["violations"] == []
+        changed = "period: failed → passed, +2"
+        served.show(is_old=False, changed=changed, scores=(1.0, None, 3.0), most=3.0)
+        expect(page.get_by_text(f"Since your last save: {changed}")).to_be_visible()
+        expect(page.get_by_role("img")).to_have_attribute(
+            "aria-label", "Scores since watching began, of 3 points: 1, not graded, 3"
+        )
+        assert not page.evaluate(old) and not page.locator("#phases").is_visible()
+        assert Axe().run(page).response["violations"] == []
         assert complaints == []
     finally:
         served.close()

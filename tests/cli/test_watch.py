@@ -65,12 +65,23 @@ def test_a_save_is_graded_again_and_ctrl_c_leaves_nothing(tmp_path: Path) -> Non
         lost = POINTS["period"]
         assert f"✗ failed  was passed  A message comes every 300 ms  0 / {lost:g}" in told
         assert f"Score: {10 - lost:g} of 10 points, before 10" in told
+        assert f"Since your last save: period: passed → failed, −{lost:g}   █" in told
         browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
         browser.open(url).close()
         with browser.open(f"{url.partition('?')[0]}report.html") as served:
             assert served.read() == (tmp_path / "rosgrade-report" / "report.html").read_bytes()
 
-        node.write_text(node.read_text().replace("PERIOD_S = 0.4", "PERIOD_S = 2.5"))
+        right = node.read_text()
+        line = right[: right.index("PERIOD_S = 0.4")].count("\n") + 1
+        node.write_text(right.replace("PERIOD_S = 0.4", "PERIOD_S = = 0.4"))
+        told = read_until(watch.stdout, "Ctrl-C ends")
+        # Before colcon is asked.
+        error = f"bot_publisher.py:{line}: SyntaxError: invalid syntax: PERIOD_S = = 0.4\n"
+        assert told.index(error) < told.index("looking for an earlier build")
+
+        node.write_text(right.replace("PERIOD_S = 0.4", "PERIOD_S = 2.5"))
+        # What failed last is told as soon as it is known.
+        read_until(watch.stdout, "rosgrade: builds passes now")
         read_until(watch.stdout, "run: recording")
         watch.send_signal(signal.SIGINT)
         told, _ = watch.communicate(timeout=60)

@@ -156,6 +156,7 @@ OTHER = Finding.failed("a node /bot_publisher", "a node /bot", "Look at super().
 LATE = Finding.failed("on time", "late", "Use a timer.", credit=0.5)
 VERY_LATE = Finding.failed("on time", "very late", "Use a timer.", credit=0.25)
 LOST = """\
+Since your last save: period: passed → skipped, −3; node: passed → failed, −2
 ✗ failed   was passed  The node is there  0 / 2
 – skipped  was passed  It is on time      0 / 3
 
@@ -169,13 +170,14 @@ Fix this first: The node is there. 1 other check waits for it.
 Score: 1 of 6 points, before 6
 """
 WON = """\
+Since your last save: period: skipped → passed, +3; node: failed → passed, +2
 ✓ passed  was failed   The node is there  2 / 2
 ✓ passed  was skipped  It is on time      3 / 3
 
 Score: 6 of 6 points, before 1
 """
 SAME = """\
-No check changed.
+Since your last save: no check changed
 
 ✗ failed  The node is there
   expected  a node /bot_publisher
@@ -197,9 +199,9 @@ def graded(node=PASS, period=PASS, only=3):
     return judged(checks[:only]).result
 
 
-def changes(before, after, width=80):
+def changes(before, after, width=80, scores=()):
     stream = io.StringIO()
-    print_changes(Console(file=stream, width=width, highlight=False), before, after)
+    print_changes(Console(file=stream, width=width, highlight=False), before, after, scores)
     return "\n".join(line.rstrip() for line in stream.getvalue().split("\n"))
 
 
@@ -218,8 +220,13 @@ def test_what_a_student_reads_after_a_save(before, after, text, width):
 
 def test_points_alone_are_a_change():
     text = changes(graded(period=LATE), graded(period=VERY_LATE))
-    assert text.startswith("✗ failed  was failed  It is on time  0.75 / 3\n")
+    assert "✗ failed  was failed  It is on time  0.75 / 3\n" in text
     assert text.endswith("Score: 3.75 of 6 points, before 4.5\n")
+
+
+def test_the_scores_of_the_evening_stand_behind_what_changed():
+    text = changes(graded(FAIL), graded(FAIL), scores=(0, 3, 6))
+    assert text.startswith("Since your last save: no check changed   ▁▅█\n")
 
 
 def test_a_check_that_was_not_judged_before_is_new():

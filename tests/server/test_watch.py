@@ -39,11 +39,23 @@ def test_the_page_around_it_may_only_talk_to_this_server(client: Client) -> None
 
 
 def test_every_new_grade_is_shown(page: ReportPage, client: Client) -> None:
-    page.show("8.5 of 10 points", "a < b", is_new=True)
-    state = {"version": 1, "text": "8.5 of 10 points", "title": "a < b"}
-    assert client.get("/state").json == state
-    page.show("grading the saved files", "…")
-    assert client.get("/state").json["version"] == 1
+    page.show(text="8.5 of 10 points", title="a < b", is_new=True)
+    state = client.get("/state").json
+    assert (state["version"], state["text"], state["title"]) == (1, "8.5 of 10 points", "a < b")
+    page.show(text="grading the saved files", is_old=True)
+    state = client.get("/state").json
+    assert (state["version"], state["is_old"]) == (1, True)
+
+
+def test_what_it_does_and_what_is_known_already_is_shown(page: ReportPage, client: Client) -> None:
+    page.show_phase("", "building bot_publisher")
+    assert client.get("/state").json["phases"] == {"": "building bot_publisher"}
+    page.show_phase("run", "recording")
+    page.show_phase("stop", "recorded")
+    page.tell("period passes now")
+    state = client.get("/state").json
+    assert state["phases"] == {"run": "recording", "stop": "recorded"}
+    assert state["early"] == ["period passes now"]
 
 
 def test_the_end_ends_the_server(tmp_path: Path) -> None:

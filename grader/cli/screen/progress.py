@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -33,8 +33,18 @@ _PLAIN = frozenset({"launching", "matched", "recorded"})
 class Progress:
     """Shows on standard error what a command does."""
 
-    def __init__(self, quiet: bool = False, verbose: bool = False) -> None:
-        """Set up; nothing is shown yet."""
+    def __init__(
+        self,
+        quiet: bool = False,
+        verbose: bool = False,
+        on_phase: Callable[[str, str], None] = lambda _scenario, _text: None,
+    ) -> None:
+        """Set up; nothing is shown yet.
+
+        Args:
+            on_phase: Called with what a scenario does, or the whole where there is none.
+        """
+        self._on_phase = on_phase
         self._quiet = quiet
         self._verbose = verbose
         self._bars: Bars | None = None
@@ -60,6 +70,7 @@ class Progress:
 
     def say(self, text: str) -> None:
         """Say in a few words what happens now, besides the scenarios."""
+        self._on_phase("", text)
         if self._quiet or text == self._said:
             return
         self._said = text
@@ -76,6 +87,11 @@ class Progress:
             self._bars.console.print(Text(f"rosgrade: {text}"))
         else:
             _print(text)
+
+    def tell(self, text: str) -> None:
+        """Print a line that stays, unless nothing is to be shown."""
+        if not self._quiet:
+            self.note(text)
 
     def begin(self, work: str, total: int, already: int = 0) -> None:
         """Begin to count a piece of work."""
@@ -106,7 +122,9 @@ class Progress:
             self.output(f"{scenario} {event['process']}", event["text"])
         elif kind in _DOING:
             messages = counted(event.get("messages", 0), "message")
-            text = f"{scenario}: {_DOING[kind].format_map({**event, 'counted': messages})}"
+            phase = _DOING[kind].format_map({**event, "counted": messages})
+            self._on_phase(scenario, phase)
+            text = f"{scenario}: {phase}"
             if self._bars is not None:
                 self._show(scenario, text, completed=int(kind == "recorded"), total=1)
             elif kind in _PLAIN and not self._quiet:

@@ -6,6 +6,8 @@ cleaned and wrapped in a :class:`rich.text.Text`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table
@@ -13,7 +15,7 @@ from rich.text import Text
 
 from grader.findings.finding import Status
 from grader.report.model.result_model import CheckPart, Result
-from grader.report.text import additions, explanation
+from grader.report.text import additions, explanation, last_save
 from grader.report.text.words import STATUS, number
 from grader.safe_text import clean, one_line
 
@@ -49,12 +51,21 @@ def print_grade(console: Console, title: str, result: Result) -> None:
     _conclude(console, result)
 
 
-def print_changes(console: Console, before: Result, after: Result) -> None:
+def print_changes(
+    console: Console, before: Result, after: Result, scores: Sequence[float | None] = ()
+) -> None:
     """Print which checks ended differently than in an earlier grade, and what to fix now.
 
     Args:
         console: Where to; its width, colours and encoding are respected.
+        scores: Since watching began; None where there was no grade.
     """
+    changed = last_save.what_changed(before, after)
+    if console.options.ascii_only:
+        changed = changed.replace("→", "->").replace("−", "-")
+    elif len(scores) > 1:
+        changed += f"   {last_save.bars(scores, after.known_max_score)}"
+    console.print(Text.assemble(("Since your last save: ", "bold"), _line(console, changed)))
     known = {check.id: check for check in before.checks}
     table = _grid(overflowing=2, right=3)
     for check in after.checks:
@@ -70,7 +81,8 @@ def print_changes(console: Console, before: Result, after: Result) -> None:
             Text(_line(console, check.title)),
             Text(explanation.points(check), "bold"),
         )
-    console.print(table if table.row_count else "No check changed.")
+    if table.row_count:
+        console.print(table)
     first = [check for check in after.checks if check.id == after.first_to_fix]
     for check in first or after.of(Status.ERROR)[:1]:
         _explain(console, after, check)
