@@ -50,11 +50,6 @@ def attempts_of(
     )
 
 
-def read_earlier(folder: Path) -> dict[str, Result]:
-    """Earlier results in the folder of a report by the submission's hash, oldest first."""
-    return {one.submission.sha256: one for one in _read(_earlier(folder))}
-
-
 def with_history(folder: Path, result: Result) -> Result:
     """A new result with the attempts that were graded in the folder of its report.
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import shutil
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
@@ -95,8 +96,6 @@ class Batch:
             )
             if row.path is not None:
                 entry = self._identified(replace(entry, source=str(row.path.resolve())), row.path)
-                before = earlier[row.key].history if row.key in earlier else {}
-                entry = replace(entry, history={**before, entry.sha256: row.time})
                 distinct = entry.sha256 in ("", NO_FILES)
                 same = (entry.sha256, str(self._given[row.key]))
                 original = row.key if distinct else first.setdefault(same, row.key)
@@ -106,6 +105,7 @@ class Batch:
                 elif not entry.fault:
                     paths[row.key] = row.path
             self._entries[row.key] = entry
+        self._keep_attempts(earlier)
         to_do = {key: path for key, path in paths.items() if not self._is_done(key)}
         self._refuse_changed(set(paths) - set(to_do))
         self._write()
@@ -251,6 +251,30 @@ class Batch:
         files = {scenario: recordings / file.name for scenario, file in found.files.items()}
         write_graded(replace(graded, files=files), partial, Clock())
         self.ledger.put(twin.key, partial)
+
+    def _keep_attempts(self, earlier: Mapping[str, Entry]) -> None:
+        """Keep the grades of students who handed in again, each as a row of its own."""
+        for key, old in earlier.items():
+            if old.attempt_of in self._entries:
+                self._entries.setdefault(key, old)
+        for key, old in earlier.items():
+            entry = self._entries.get(key)
+            if entry is None or old.attempt_of or entry.sha256 in ("", old.sha256):
+                continue
+            known = {one.sha256 for one in self._entries.values() if one.attempt_of == key}
+            result = self.ledger.result(key)
+            if result is None or old.sha256 in known or result.submission.sha256 != old.sha256:
+                continue
+            names = (f"{key} (attempt {number})" for number in count(1))
+            name = next(name for name in names if name not in self._entries)
+            kept = replace(old, key=name, attempt_of=key, same_as="", problem="")
+            try:
+                self._copy(key, kept)
+                self._entries[name] = kept
+            except RosgradeError as error:
+                why = f"an earlier attempt could not be kept: {error}".partition("\n")[0]
+                problem = "; ".join(filter(None, (entry.problem, why)))
+                self._entries[key] = replace(entry, problem=problem)
 
     def _write(self) -> None:
         loaded = self.loaded

@@ -8,7 +8,7 @@ from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 
-from grader.batch.attempts import attempts_of, read_earlier
+from grader.batch.attempts import attempts_of
 from grader.batch.ledger import BATCH_FILE, Entry, Ledger
 from grader.course.attempts import Attempt, Ruled, ruled
 from grader.course.late import HandInTime
@@ -82,8 +82,8 @@ class ClassRules:
         return {entry.key: entry for entry in self._written.entries}
 
     @cached_property
-    def _beside(self) -> dict[str, list[Entry]]:
-        """Earlier attempts that were handed in beside the row's own."""
+    def _earlier(self) -> dict[str, list[Entry]]:
+        """The earlier attempts of each row."""
         found: dict[str, list[Entry]] = {}
         for entry in self._written.entries:
             if entry.attempt_of:
@@ -103,19 +103,17 @@ class ClassRules:
 
     def _attempts(self, entry: Entry, result: Result) -> list[Attempt]:
         """All attempts that are graded, the current one last."""
-        beside = []
-        for other in self._beside.get(entry.key, ()):
-            graded = self._ledger.result(other.key)
-            if graded is not None and graded.submission.sha256 == other.sha256:
-                beside.append(Attempt(graded, _time(other, other.sha256, graded)))
-        current = Attempt(result, _time(entry, entry.sha256, result))
-        known = {each.result.submission.sha256 for each in (*beside, current)}
-        gone = entry.history.keys() - known
-        results = read_earlier(self._ledger.folder(entry.key)) if gone else {}
-        earlier = [
-            Attempt(one, _time(entry, sha, one)) for sha, one in results.items() if sha in gone
+        graded = ((one, self._ledger.result(one.key)) for one in self._earlier.get(entry.key, ()))
+        same = [
+            (one, other) for one, other in graded if other and other.submission.sha256 == one.sha256
         ]
-        return [*earlier, *beside, current]
+        return [
+            Attempt(
+                found,
+                HandInTime(one.handed_in, one.handed_in_from, one.late, found.started),
+            )
+            for one, found in (*same, (entry, result))
+        ]
 
 
 def course_of(out: Path, named: Path | None, assignment: str) -> Course | None:
@@ -138,9 +136,3 @@ def _load(file: Path, out: Path, assignment: str) -> Course:
     # Refuse rules of other assignments at once.
     found.rules(assignment)
     return found
-
-
-def _time(entry: Entry, sha256: str, result: Result) -> HandInTime:
-    at, source = entry.history.get(sha256, (entry.handed_in, entry.handed_in_from))
-    late = entry.late and sha256 == entry.sha256
-    return HandInTime(at, source, late, result.started)

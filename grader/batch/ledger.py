@@ -9,9 +9,9 @@ from __future__ import annotations
 import fcntl
 import json
 import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -47,8 +47,7 @@ class Entry:
         source: Path of what was handed in, as it lay when it was read; may be gone by now.
         handed_in: ISO 8601, without an offset where its source has none; or empty.
         handed_in_from: What tells it, such as ``Gradescope's metadata``.
-        attempt_of: Key of the student's row, where this is an earlier attempt beside it.
-        history: Of each submission of the row so far, by its hash: handed_in and handed_in_from.
+        attempt_of: Key of the student's row, where this is an earlier attempt.
     """
 
     key: str
@@ -64,7 +63,6 @@ class Entry:
     handed_in: str = ""
     handed_in_from: str = ""
     attempt_of: str = ""
-    history: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     @property
     def review_key(self) -> str:

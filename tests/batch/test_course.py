@@ -17,6 +17,7 @@ import pytest
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.batch import Batch, Done
 from grader.batch.class_files import read_class, standing, write_class
+from grader.batch.class_regrading import regrade_class
 from grader.batch.course_rules import course_of
 from grader.batch.files import REPORT_FILE, RESULT_FILE, STUDENT_FILE, write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
@@ -287,9 +288,17 @@ def test_a_week_later_the_better_grade_of_the_same_folder_counts(course: Class) 
     assert row.score == 8 and lines(row) == [("attempts", 8)]
     assert row.result is not None and row.result.score == 0
     assert [one.handed_in[:10] for one in row.result.attempts] == ["2026-10-11", "2026-10-13"]
+    # An attempt is judged again with the others, so it still counts.
+    yaml = course.folder / "lesson" / "assignment.yaml"
+    yaml.write_text(YAML.replace("points: 6", "points: 7"))
+    ledger = Ledger(course.out)
+    with ledger.opened():
+        again = [one.done for one in regrade_class(load_assignment(yaml.parent), ledger)]
+        bring_up_to_date(again, ledger)
+    (changed,) = read_class(course.out)
+    assert changed.score == 9 and lines(changed) == [("attempts", 9)]
     # What is applied again is the same.
     written = {file: file.stat().st_mtime_ns for file in course.out.rglob(RESULT_FILE)}
-    ledger = Ledger(course.out)
     bring_up_to_date([standing(ledger, entry) for entry in ledger.read().entries], ledger)
     assert {file: file.stat().st_mtime_ns for file in course.out.rglob(RESULT_FILE)} == written
 
