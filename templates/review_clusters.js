@@ -20,7 +20,7 @@
     try {
       const answer = await fetch("clusters", {
         method: "POST", headers: { "Content-Type": "application/json" },
-        body: JSON.stringify({ do: form.dataset.do, version: main.dataset.version, check: cluster.dataset.check, cause: cluster.dataset.cause, ...typed }),
+        body: JSON.stringify({ do: form.dataset.do, was: Number(cluster.dataset.was), check: cluster.dataset.check, cause: cluster.dataset.cause, ...typed }),
       });
       if (answer.ok) {
         location.hash = cluster.id;

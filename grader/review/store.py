@@ -68,8 +68,9 @@ class ReviewStore:
         return _read(self.file(None), ClassReview, ClassReview())
 
     def vanished(self, keys: Collection[str]) -> tuple[str, ...]:
-        """Students with a review who are not in the class any more; reads every review."""
-        files = [file for file in sorted(self.folder.glob("*.yaml")) if file.name != CLASS_FILE]
+        """Students with a review who are not in the class any more; reads only theirs."""
+        known = {CLASS_FILE, *(self.file(key).name for key in keys)}
+        files = [file for file in sorted(self.folder.glob("*.yaml")) if file.name not in known]
         reviews = [read_source(file).read(StudentReview) for file in files]
         return tuple(one.key for one in reviews if one.key not in keys)
 

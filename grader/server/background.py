@@ -68,8 +68,9 @@ class Background:
                 rows = [standing(ledger, entry) for entry in ledger.read().entries]
                 write_class(bring_up_to_date(rows, ledger), ledger)
             self.problem = ""
-        except RosgradeError as error:
-            self.problem = f"The reports are not up to date: {error}"
+        except Exception as error:
+            # Also that of a check of the assignment's own; what was written down is safe.
+            self.problem = f"The reports are not up to date: {_said(error)}"
 
     def _judge(self, judging: Judging, loaded: LoadedAssignment, write: bool) -> None:
         try:
@@ -78,9 +79,10 @@ class Background:
                     judging.rows.append(row)
                 if write:
                     write_regraded(judging.rows, self._ledger)
-        except RosgradeError as error:
-            judging.problem = str(error)
         except Exception as error:
-            # A check of the assignment's own may raise anything; the server goes on.
-            judging.problem = f"{type(error).__name__}: {error}"
+            judging.problem = _said(error)
         judging.running = False
+
+
+def _said(error: Exception) -> str:
+    return str(error) if isinstance(error, RosgradeError) else f"{type(error).__name__}: {error}"

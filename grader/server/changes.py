@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 from grader.errors import UsageError
@@ -13,6 +14,7 @@ from grader.review.model import (
     ManualScore,
     StudentReview,
 )
+from grader.review.store import ReviewConflict
 from grader.server.reviewed_class import ReviewedClass, ReviewedRow
 
 
@@ -82,12 +84,14 @@ def change_cluster(reviewed: ReviewedClass, sent: Any) -> None:
                 store.save(saved.content.model_copy(update={"comments": comments}), saved.version)
         _count(reviewed, comment.text)
         return
-    of_class = store.of_class().content
-    kept = [one for one in of_class.forgiven if (one.check, one.cause) != (check, cause)]
+    if found[0].forgiven != sent["was"]:
+        raise ReviewConflict("This was forgiven or taken back meanwhile. Load the page again.")
+    now = store.of_class()
+    kept = [one for one in now.content.forgiven if (one.check, one.cause) != (check, cause)]
     if sent["do"] == "forgive":
         share, reason = float(sent["share"]), str(sent["reason"])
         kept.append(Forgiven(check=check, cause=cause, share=share, reason=reason, by=reviewed.by))
-    store.save(of_class.model_copy(update={"forgiven": tuple(kept)}), sent["version"])
+    store.save(now.content.model_copy(update={"forgiven": tuple(kept)}), now.version)
 
 
 def _count(reviewed: ReviewedClass, text: str) -> None:
@@ -98,4 +102,6 @@ def _count(reviewed: ReviewedClass, text: str) -> None:
     bank = sorted(times.items(), key=lambda one: -one[1])
     entries = tuple(BankEntry(text=known, used=count) for known, count in bank)
     changed: ClassReview = saved.content.model_copy(update={"bank": entries})
-    reviewed.store.save(changed, saved.version)
+    # Another reviewer may count at the same moment; that is worth no message.
+    with suppress(ReviewConflict):
+        reviewed.store.save(changed, saved.version)

@@ -180,7 +180,6 @@ class ReviewServer(LocalServer):
             clusters=found[:MOST_CLUSTERS],
             left=len(found) - MOST_CLUSTERS,
             rows={row.row.id: row for row in self._class.rows()},
-            version=self._class.store.of_class().version,
             quote=quote,
         )
 
