@@ -15,16 +15,16 @@ from grader.errors import GraderFault
 from grader.submission.git import run_git
 
 _COLUMNS = ("handed_in", "handed in", "submitted_at")
-_NOT_KNOWN = ("", "")
+NOT_KNOWN = ("", "")
 _IN_NAME = re.compile(
-    r"(\d{4}-\d\d-\d\d)[T_ -](\d\d)[-:.](\d\d)(?:[-:.](\d\d))?(Z|[+-]\d\d:?\d\d)?(?!\d)"
+    r"(\d{4}-\d\d-\d\d)[T_ -](\d\d)[-:.](\d\d)(?:[-:.](\d\d))?(Z|\+\d\d:?\d\d|-\d\d:\d\d)?(?!\d)"
 )
 _COMMITTER = re.compile(r"^committer .*> (\d{1,11}) ([+-]\d{4})$", re.MULTILINE)
 _GIT_LIMIT_S = 20.0
 
 
 def timed(rows: Sequence[HandedIn], staging: Path) -> list[HandedIn]:
-    """Rows with their times: the roster is asked first, then platform, name of the file, git."""
+    """Rows with their times: the roster is asked first, then platform and names, then git."""
     found = []
     for row in rows:
         time, problem = row.time, ""
@@ -34,7 +34,7 @@ def timed(rows: Sequence[HandedIn], staging: Path) -> list[HandedIn]:
         except ValueError as error:
             problem = f"when it was handed in is not known: {error}"
         if row.path is not None and not time[0]:
-            time = _of(row.path, staging)
+            time = _of_commit(row.path, staging / "committed")
         found.append(replace(with_problem(row, problem) if problem else row, time=time))
     return found
 
@@ -43,10 +43,11 @@ def with_attempts(rows: Sequence[HandedIn], staging: Path) -> list[HandedIn]:
     """Rows, and one for each earlier attempt, with its time."""
     found = list(rows)
     for row in rows:
-        for number, path in enumerate(row.earlier, start=1):
-            key, time = f"{row.key} (attempt {number})", _of(path, staging)
+        for number, (path, time) in enumerate(row.earlier, start=1):
+            known = time if time[0] else _of_commit(path, staging / "committed")
+            key = f"{row.key} (attempt {number})"
             attempt = HandedIn(key, path, row.name, columns=row.columns)
-            found.append(replace(attempt, time=time, attempt_of=row.key))
+            found.append(replace(attempt, time=known, attempt_of=row.key))
     return found
 
 
@@ -57,10 +58,11 @@ def of_metadata(about: Mapping[str, Any]) -> tuple[str, str]:
     return _valid(text, "Gradescope's metadata")
 
 
-def _of(path: Path, staging: Path) -> tuple[str, str]:
-    match = _IN_NAME.search(path.name)
+def of_name(name: str) -> tuple[str, str]:
+    """A time in a name that the platform or the instructor gave, never one of the student's."""
+    match = _IN_NAME.search(name)
     if match is None:
-        return _of_commit(path, staging / "committed")
+        return NOT_KNOWN
     day, hour, minute, second, offset = match.groups(default="")
     return _valid(f"{day}T{hour}:{minute}:{second or '00'}{offset}", "the name of the file")
 
@@ -73,7 +75,7 @@ def _of_commit(path: Path, ours: Path) -> tuple[str, str]:
     """
     git = path / ".git"
     if git.is_symlink() or not git.is_dir():
-        return _NOT_KNOWN
+        return NOT_KNOWN
     try:
         for name in ("objects/info", "refs"):
             (ours / name).mkdir(parents=True, exist_ok=True)
@@ -86,7 +88,7 @@ def _of_commit(path: Path, ours: Path) -> tuple[str, str]:
         moment = datetime.fromtimestamp(int(seconds), datetime.strptime(zone, "%z").tzinfo)
     except (GraderFault, OSError, ValueError, IndexError, OverflowError):
         # An empty repository, or one that is damaged.
-        return _NOT_KNOWN
+        return NOT_KNOWN
     return _valid(moment.isoformat(), f"the committer date of git commit {sha[:7]}")
 
 
@@ -95,7 +97,7 @@ def _valid(text: str, source: str) -> tuple[str, str]:
     try:
         return _iso(text), source
     except ValueError:
-        return _NOT_KNOWN
+        return NOT_KNOWN
 
 
 def _iso(text: str) -> str:

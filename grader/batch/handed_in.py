@@ -28,7 +28,7 @@ class HandedIn:
         email: As the roster says it, or empty.
         columns: What the roster says of the student, by header in lower case.
         time: When it was handed in, as in :mod:`~grader.batch.hand_in_time`.
-        earlier: Earlier attempts that lie beside it, first to last.
+        earlier: Earlier attempts that lie beside it, first to last, with their times.
         attempt_of: Key of the student's row, where this is an earlier attempt.
     """
 
@@ -41,7 +41,7 @@ class HandedIn:
     email: str = ""
     columns: Mapping[str, str] = field(default_factory=dict, compare=False)
     time: tuple[str, str] = ("", "")
-    earlier: tuple[Path, ...] = ()
+    earlier: tuple[tuple[Path, tuple[str, str]], ...] = ()
     attempt_of: str = ""
 
 
@@ -56,15 +56,15 @@ class Entry:
     late: bool = False
     fault: str = ""
     time: tuple[str, str] = ("", "")
-    attempts: tuple[Path, ...] = ()
+    attempts: tuple[tuple[Path, tuple[str, str]], ...] = ()
 
 
 def row_of(entry: Entry) -> HandedIn:
     """The row of an entry, before a roster says whose it is."""
-    last = (*entry.attempts, entry.path)[max(0, len(entry.attempts) - 1)]
+    last = entry.attempts[-1][0] if entry.attempts else entry.path
     path = None if entry.fault else _archive_in(last) or last
     row = HandedIn(entry.key, path, entry.name, entry.late, fault=entry.fault)
-    earlier = tuple(_archive_in(each) or each for each in entry.attempts[:-1])
+    earlier = tuple((_archive_in(path) or path, time) for path, time in entry.attempts[:-1])
     return replace(row, time=entry.time, earlier=earlier)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from grader.batch.groups import with_groups
-from grader.batch.hand_in_time import of_metadata, timed, with_attempts
+from grader.batch.hand_in_time import NOT_KNOWN, of_metadata, of_name, timed, with_attempts
 from grader.batch.handed_in import (
     FOREIGN,
     Entry,
@@ -191,7 +191,10 @@ def _entries(
             stem = stem_of(item)
             moodle = _MOODLE.fullmatch(stem)
             names = (moodle["name"] if moodle else stem,)
-            yield Entry(shown(stem), item, names, attempts=attempts_in(item))
+            attempts = tuple((path, of_name(path.name)) for path in attempts_in(item))
+            # Moodle names the folder, but the student the archive.
+            time = attempts[-1][1] if attempts else of_name("" if moodle else item.name)
+            yield Entry(shown(stem), item, names, time=time, attempts=attempts)
         else:
             on_left_out(shown(item.name))
     for files in canvas.values():
@@ -215,7 +218,7 @@ def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> Entry:
         (match["user"], match["name"]),
         late=late,
         fault=fault,
-        attempts=attempts,
+        attempts=tuple((each, NOT_KNOWN) for each in attempts),
     )
 
 
@@ -286,7 +289,7 @@ def _of_gradescope(item: Path, about: Any) -> Iterator[Entry]:
     submitters = about.get(":submitters") if isinstance(about, dict) else None
     listed = submitters if isinstance(submitters, list) else []
     people = [person for person in listed if isinstance(person, dict)]
-    time = of_metadata(about) if isinstance(about, dict) else ("", "")
+    time = of_metadata(about) if isinstance(about, dict) else NOT_KNOWN
     for person in people or [{}]:
         values = (person.get(field) for field in (":sid", ":email", ":name"))
         names = tuple(str(value) for value in values if value) or (item.name,)

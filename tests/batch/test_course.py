@@ -188,6 +188,17 @@ def test_who_canvas_calls_late_without_a_time_loses_nothing_and_has_a_note(cours
     assert "marked late, but not by how much, so nothing is deducted" in row.note
 
 
+def test_a_name_that_the_student_chose_is_no_time(course: Class) -> None:
+    course.hand_in("lopezana_90211_1234_ws_2026-10-14T10-00-00Z.zip", "bot")
+    course.hand_in("Wei Ng_4711_assignsubmission_file_/ws_2026-10-14T10-00Z.zip", "bot", text="wei")
+    # A number behind it is not an offset.
+    course.hand_in("dee_2026-10-14-10-00-00-0100.zip", "bot", text="dee")
+    rows = course.grade()
+    assert [lines(row) for row in rows.values()] == [[], [], []]
+    notes = "".join(row.note for row in rows.values())
+    assert notes.count("handed in 2026-10-14 10:00 without a zone by the name of the file") == 1
+
+
 def test_the_roster_says_when_and_goes_before_the_platform(course: Class) -> None:
     course.hand_in("lopezana_LATE_90211_1234_ws.zip", "bot")
     course.hand_in("ngwei_90212_1235_ws.zip", "bot", text="wei")
