@@ -9,8 +9,10 @@ from grader.findings.finding import Status
 from grader.grade.model import points_for, total
 from grader.report.model.class_row import ClassRow
 from grader.report.model.result_model import CheckPart
-from grader.review.cause import cause
+from grader.report.text.words import cut
+from grader.review.cause import MOST_CHARACTERS, cause
 from grader.review.model import ClassReview
+from grader.safe_text import one_line
 
 _NOTHING = ClassReview()
 
@@ -23,6 +25,7 @@ class Cluster:
         check: Id of the check.
         title: Of the check.
         cause: In words; together with ``check`` it names the cluster, also in ``class.yaml``.
+        example: What the check observed of the first of them, whole.
         lost: Key of each student -> points that the check cost; in the order of the rows.
         forgiven: Share of the points that is given back now, in [0, 1].
     """
@@ -30,6 +33,7 @@ class Cluster:
     check: str
     title: str
     cause: str
+    example: str
     lost: dict[str, float]
     forgiven: float = 0.0
 
@@ -61,6 +65,7 @@ def clusters(rows: Sequence[ClassRow], of_class: ClassReview = _NOTHING) -> tupl
             name,
             members[0][1].title,
             why,
+            cut(one_line(members[0][1].observed), MOST_CHARACTERS),
             {key: total((check.max_points, -check.points)) for key, check in members},
             shares.get((name, why), 0.0),
         )
