@@ -218,7 +218,6 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
     from grader.report.text.last_save import what_changed
     from grader.report.text.terminal import print_changes, print_grade
 
-    scores: list[float | None] = []
     clock = Clock()
     with ExitStack() as shown:
         watching = Watching(work.submission, work.report, work, work.loaded.folder)
@@ -226,14 +225,7 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
             title = work.loaded.assignment.title
             if event is Step.BEGAN:
                 clock = Clock()
-                page.show(
-                    text="grading the saved files",
-                    title=f"… {title}",
-                    is_old=True,
-                    phases={},
-                    early=(),
-                    changed="",
-                )
+                page.begin(f"… {title}")
                 shown.enter_context(work.progress.shown())
                 continue
             shown.close()
@@ -247,23 +239,18 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
                 history = partial(with_history, work.report)
                 result = write_graded(event.graded, work.report, clock, amended=history)
                 console.rule(f"{time.strftime('%H:%M:%S')}, after {clock.elapsed_s:.1f} s")
-                scores.append(result.known_score)
-                changed = ""
+                points = score(result)
+                changed = what_changed(work.before, result) if work.before is not None else ""
+                page.show_grade(
+                    f"{points}, graded at {time.strftime('%H:%M:%S')}",
+                    f"{points}: {title}",
+                    changed,
+                    (result.known_score, result.known_max_score),
+                )
                 if work.before is None:
                     print_grade(console, title, result)
                 else:
-                    changed = what_changed(work.before, result)
-                    print_changes(console, work.before, result, scores)
+                    print_changes(console, work.before, result, page.state.scores)
                 work.before = result
-                points = score(result)
-                page.show(
-                    text=f"{points}, graded at {time.strftime('%H:%M:%S')}",
-                    title=f"{points}: {title}",
-                    is_old=False,
-                    changed=changed,
-                    scores=tuple(scores),
-                    most=result.known_max_score,
-                    is_new=True,
-                )
                 work.runner.get_ready()
             work.progress.say(f"watching {work.submission}; Ctrl-C ends")

@@ -67,6 +67,25 @@ class ReportPage(LocalServer):
         with self._lock:
             self.state = replace(self.state, version=self.state.version + is_new, **changes)
 
+    def begin(self, title: str) -> None:
+        """Show that a grading begins, and that the report is that of an earlier save."""
+        self.show(
+            text="grading the saved files",
+            title=title,
+            is_old=True,
+            phases={},
+            early=(),
+            changed="",
+        )
+
+    def show_grade(
+        self, text: str, title: str, changed: str, score: tuple[float | None, float]
+    ) -> None:
+        """Show a new report, and a score of so many points beside those before."""
+        scores = (*self.state.scores, score[0])
+        self.show(text=text, title=title, changed=changed, scores=scores, most=score[1])
+        self.show(is_new=True, is_old=False)
+
     def show_phase(self, scenario: str, text: str) -> None:
         """Show what a scenario does now; the first takes the place of what was done before."""
         with self._lock:

@@ -54,7 +54,9 @@ def test_the_page_of_a_watched_submission_follows_by_itself(
         expect(page.get_by_role("status")).to_have_text("3 of 3 points")
         expect(page).to_have_title("3 of 3 points: Publish")
         old = "document.querySelector('main').classList.contains('is-old')"
-        served.show(text="grading the saved files", is_old=True)
+        served.show_grade("1 of 3 points", "1 of 3", "", (1.0, 3.0))
+        served.show_grade("Not graded", "not graded", "", (None, 3.0))
+        served.begin("… Publish")
         served.show_phase("listen", "recording")
         served.tell("period passes now")
         expect(page.locator("#phases li")).to_have_text(["listen: recording"])
@@ -62,7 +64,7 @@ def test_the_page_of_a_watched_submission_follows_by_itself(
         assert page.evaluate(old)
         assert Axe().run(page).response["violations"] == []
         changed = "period: failed → passed, +2"
-        served.show(is_old=False, changed=changed, scores=(1.0, None, 3.0), most=3.0)
+        served.show_grade("3 of 3 points", "3 of 3", changed, (3.0, 3.0))
         expect(page.get_by_text(f"Since your last save: {changed}")).to_be_visible()
         expect(page.get_by_role("img")).to_have_attribute(
             "aria-label", "Scores since watching began, of 3 points: 1, not graded, 3"

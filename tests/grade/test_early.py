@@ -30,14 +30,13 @@ def test_a_check_is_told_when_its_last_scenario_is_recorded():
     assert early(stops, turns, recordings=both) == {one.id: one.status for one in whole.results}
 
 
-def test_what_it_requires_must_be_known_too():
-    alive = Told("alive", PASS, scenarios=("far",))
+def test_what_it_requires_is_judged_in_the_runs_so_far():
     stops = Told("stops", PASS, requires=("alive",), scenarios=("near",))
-    assert early(alive, stops) == {}
-    built = Told("built", PASS, Subject.SUBMISSION)
-    assert early(built, replace(stops, requires=("built",)), wanted=["stops"]) == {
-        "stops": Status.PASSED
-    }
+    alive = Told("alive", {"near": PASS})
+    assert early(alive, stops, wanted=["stops"]) == {"stops": Status.PASSED}
+    assert early(Told("alive", {"near": FAIL}), stops, wanted=["stops"]) == {}
+    built = Told("built", FAIL, Subject.SUBMISSION)
+    assert early(built, recordings={}) == {"built": Status.FAILED}
 
 
 def test_what_may_be_run_again_is_not_told():
