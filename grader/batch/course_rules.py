@@ -83,9 +83,9 @@ class ClassRules:
 
     @cached_property
     def _earlier(self) -> dict[str, list[Entry]]:
-        """The earlier attempts of each row."""
+        """The earlier attempts of each row, first to last: 10 comes after 9."""
         found: dict[str, list[Entry]] = {}
-        for entry in self._written.entries:
+        for entry in sorted(self._written.entries, key=lambda one: (len(one.key), one.key)):
             if entry.attempt_of:
                 found.setdefault(entry.attempt_of, []).append(entry)
         return found

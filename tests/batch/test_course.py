@@ -276,6 +276,16 @@ def test_the_same_handed_in_twice_is_two_attempts(course: Class) -> None:
     assert lines(row) == [("attempts", 0)] and row.score == 8
 
 
+def test_the_tenth_attempt_comes_after_the_ninth(course: Class) -> None:
+    course.rules(f"{COURSE}attempts: {{counts: last, at_most: 10}}\n")
+    for number in range(1, 12):
+        course.hand_in(f"ana/attempt-{number}", *(["bot"] * (number == 10)), text=str(number))
+    row = course.grade()["ana"]
+    assert row.result is not None
+    assert [one.score for one in row.result.attempts] == [0] * 9 + [8, 0]
+    assert row.score == 8
+
+
 def test_canvas_resubmissions_side_by_side_are_attempts(course: Class) -> None:
     for number, name in ((31, "ws.zip"), (32, "ws-1.zip"), (40, "ws-2.zip")):
         course.hand_in(f"lopezana_90211_{number}_{name}", "bot", text=name)
