@@ -38,7 +38,7 @@ soak: setup ## grade a class of 200 (or N=...) under load, and look for a grade 
 
 wheels: setup ## build both wheels in dist/: rosgrade, and the solutions for instructors
 	@$(run) -m hatchling build -t wheel
-	@cd solutions && ../$(run) -m hatchling build -t wheel -d ../dist
+	@cd reference && ../$(run) -m hatchling build -t wheel -d ../dist
 
 docs: setup ## regenerate docs/, and build the site in build/site
 	@$(run) -m grader.docs

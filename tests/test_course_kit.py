@@ -289,7 +289,7 @@ def test_what_pip_installs_from_the_wheel_lists_starts_and_checks(
 
 def test_the_solutions_that_instructors_install_beside_it_are_found(tmp_path: Path) -> None:
     site = tmp_path / "site"
-    for project in (ROOT, ROOT / "solutions"):
+    for project in (ROOT, ROOT / "reference"):
         build = WheelBuilder(str(project)).build(directory=str(tmp_path), versions=["standard"])
         with zipfile.ZipFile(next(build)) as wheel:
             assert not [name for name in wheel.namelist() if (site / name).exists()]

@@ -9,12 +9,11 @@ DATA = "grader/_data"
 
 
 class Solutions(BuildHookInterface):
-    """Adds ``reference/`` and every ``mutants*.yaml``."""
+    """Adds every folder here, and every ``mutants*.yaml``."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Say which files lie where in the wheel."""
         checkout = Path(self.root).parent
         included = build_data["force_include"]
-        included[str(checkout / "reference")] = f"{DATA}/reference"
-        for file in checkout.glob("assignments/*/mutants*.yaml"):
+        for file in (*checkout.glob("reference/*/"), *checkout.glob("assignments/*/mutants*.yaml")):
             included[str(file)] = f"{DATA}/{file.relative_to(checkout).as_posix()}"
