@@ -19,7 +19,7 @@ from grader.sandbox.limits import BUILD
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
 from grader.submission.build.build import build_key
-from grader.submission.build.colcon import BuildLimits
+from grader.submission.build.colcon import BuildLimits, builds_at_once
 from grader.submission.prepare import Prepared, prepare
 from grader.submission.record import BuildRecord, PackageRecord
 from tests.submission.samples import INTERFACES, MANIFEST, NODE, SETUP_PY, Tree, zip_bytes
@@ -340,6 +340,11 @@ def test_as_many_files_are_compiled_at_once_as_there_is_memory_for(
     assert build.succeeded, build.log
     numbers = [int(line) for line in build.log.splitlines() if line.isdecimal()]
     assert len(numbers) == 6 and max(numbers) == min(most, len(os.sched_getaffinity(0)))
+
+
+@pytest.mark.parametrize(("gib", "builds"), [(1, 1), (4, 1), (8, 3), (64, 28)])
+def test_as_many_builds_compile_at_once_as_there_is_memory_for(gib: int, builds: int) -> None:
+    assert builds_at_once(gib * 2**30, BUILD.memory_bytes) == builds
 
 
 def test_without_colcon_the_text_says_how_to_get_it(tree: Tree, named_ros: RosInstallation) -> None:

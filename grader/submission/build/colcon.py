@@ -10,7 +10,7 @@ import shutil
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 COMPILE_S = 60.0
 _COMPILER_BYTES = 1024 * MIB
 """A compiler takes 750 MiB for a file that includes rclcpp."""
+_USABLE = 0.875
+"""Share of the memory that builds may have together; the rest is for all else."""
 STOPPED = "Exception in job execution"
 """The message of colcon when its executor stops in spite of --continue-on-error."""
 UNTOUCHABLE = """\
@@ -92,7 +94,16 @@ class Colcon:
     wall_s: float
 
     def build(self, finished: set[str]) -> Outcome:
-        """Build what can be built, and add it to the packages that are finished already."""
+        """Build what can be built, and add it to the packages that are finished already.
+
+        What compiles waits until there is memory for it.
+        """
+        if self.only_python:
+            return self._build(finished)
+        with _compiling(self.setting.limits.room.memory_bytes):
+            return self._build(finished)
+
+    def _build(self, finished: set[str]) -> Outcome:
         started: set[str] = set()
 
         def on_output(text: str) -> None:
@@ -246,6 +257,18 @@ class Colcon:
         if not deep or outcome.ended_by_us:
             return outcome
         return replace(outcome, ended_by_us=f"it nested folders more than {MOST_DEEP} deep")
+
+
+def builds_at_once(memory_bytes: int, each_bytes: int) -> int:
+    """How many builds that compile fit into the memory of a machine; at least one."""
+    return max(1, int(_USABLE * memory_bytes) // each_bytes)
+
+
+@cache
+def _compiling(each_bytes: int) -> threading.BoundedSemaphore:
+    """Places for the builds of this process that may take so much memory each."""
+    memory_bytes = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    return threading.BoundedSemaphore(builds_at_once(memory_bytes, each_bytes))
 
 
 def _colcon(ros: RosInstallation, path: str) -> list[str]:
