@@ -365,8 +365,7 @@ class Cell:
         watch = Stopwatch(self._meter)
         while True:
             yield watch
-            # A message ends the wait at once, and so does a publisher that comes; for all else
-            # the graph has to be polled.
+            # A publisher that comes ends the wait at once; for all else the graph has to be polled.
             tick_s = _TICK_S if self._matched_ns is None else _CALM_TICK_S
             self._probe.spin_once(self._player.pause_s(tick_s))
             now = time.monotonic()

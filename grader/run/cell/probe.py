@@ -14,6 +14,7 @@ from typing import Any
 
 import rclpy
 from rcl_interfaces.msg import Log
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidServiceNameException
@@ -21,6 +22,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
 
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.interface import FEEDBACK
@@ -36,6 +38,8 @@ _LAST_SEQUENCE = 2**32 - 1
 _MOST_UNANSWERED = 5
 _ROSOUT = "/rosout"
 _ROSOUT_DEPTH = 1000
+_LONG_QUEUE = 100
+"""Depth from which on messages may wait: at a tenth of a second, no more than 1000 Hz fill it."""
 _LONGEST = 8192
 _LONGEST_NAME = 256
 _LEVELS = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "FATAL"}
@@ -81,6 +85,21 @@ def match_events(on_match: Callable[[Any], None]) -> SubscriptionEventCallbacks:
     return SubscriptionEventCallbacks(matched=on_match, use_default_callbacks=False)
 
 
+class Waiting(MutuallyExclusiveCallbackGroup):
+    """A subscription whose messages wait until they are taken: to be woken for each takes long.
+
+    The executor is woken by its first publisher only, because in Fast DDS a message that waits
+    wakes also an executor that asked for the events of its subscription.
+    """
+
+    is_matched = False
+
+    def can_execute(self, entity: Any) -> bool:
+        """Whether the executor may call it."""
+        is_event = not isinstance(entity, Subscription)
+        return is_event and not self.is_matched and super().can_execute(entity)
+
+
 class Probe:
     """Subscribes to the scenario's topics and calls parameter services.
 
@@ -102,6 +121,8 @@ class Probe:
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
+        self._waiting: list[tuple[Any, Callable[[Any, Any], None]]] = []
+        self._is_flooded = False
         self._topics: dict[str, Topic] = {}
         self._limits: RunLimits | None = None
         self._fallbacks: set[str] = set()
@@ -123,8 +144,7 @@ class Probe:
         self._logs = KeptLines(limits.output_bytes)
         # Also what was published before the probe was matched.
         profile = qos_profile("reliable", "transient_local", _ROSOUT_DEPTH)
-        events = match_events(self.note_match)
-        self.node.create_subscription(Log, _ROSOUT, self._take_log, profile, event_callbacks=events)
+        self._create_subscription(_ROSOUT, Log, profile, self._take_log, raw=False)
         for topic in topics:
             self._topics[topic.name] = topic
             if not topic.ours:
@@ -132,8 +152,13 @@ class Probe:
             self._subscribe(topic, topic.reliability, topic.durability)
 
     def spin_once(self, limit_s: float) -> None:
-        """Handle what has arrived, waiting at most so long for something to arrive."""
-        self._executor.spin_once(timeout_sec=limit_s)
+        """Handle what has arrived, after at most so long a wait.
+
+        Services, what is in short queues, and a publisher that comes or goes end the wait.
+        """
+        self._executor.spin_once(timeout_sec=0.0 if self._is_flooded else limit_s)
+        taken = [self._take(*one) for one in self._waiting]
+        self._is_flooded = any(number > _LONG_QUEUE // 4 for number in taken)
 
     def has_met(self) -> bool:
         """Whether an endpoint came or went at one of the probe's since this was last asked."""
@@ -157,7 +182,7 @@ class Probe:
         def receive(data: bytes, info: Any) -> None:
             self._keep(topic, type, data, info, name)
 
-        return self._create_subscription(topic, type, profile, receive)
+        return self._create_subscription(topic, import_interface(type), profile, receive)
 
     def matches(self, endpoint: Endpoint) -> bool:
         """Whether it is a publisher that is recorded, or subscribes to the simulator."""
@@ -231,20 +256,58 @@ class Probe:
         def receive(data: bytes, info: Any) -> None:
             self._receive(topic, data, info)
 
-        self._create_subscription(topic.name, topic.type, profile, receive)
+        self._create_subscription(topic.name, import_interface(topic.type), profile, receive)
 
-    def _create_subscription(self, topic: str, type: str, profile: QoSProfile, receive: Any) -> Any:
-        events = match_events(self.note_match)
-        return self.node.create_subscription(
-            import_interface(type), topic, receive, profile, event_callbacks=events, raw=True
+    def _create_subscription(
+        self,
+        topic: str,
+        type: Any,
+        profile: QoSProfile,
+        receive: Any,
+        *,
+        raw: bool = True,
+    ) -> Any:
+        group = Waiting() if profile.depth >= _LONG_QUEUE else None
+
+        def met(event: Any) -> None:
+            if group is not None:
+                group.is_matched = True
+            self.note_match(event)
+
+        subscription = self.node.create_subscription(
+            type,
+            topic,
+            receive,
+            profile,
+            callback_group=group,
+            event_callbacks=match_events(met),
+            raw=raw,
         )
+        if group is not None:
+            self._waiting.append((subscription, receive))
+        return subscription
+
+    def _take(self, subscription: Any, receive: Callable[[Any, Any], None]) -> int:
+        """Hand over what waits in a subscription; returns how many messages."""
+        for number in range(_ROSOUT_DEPTH):
+            try:
+                with subscription.handle:
+                    taken = subscription.handle.take_message(
+                        subscription.msg_type, subscription.raw
+                    )
+            except RuntimeError:  # a payload that is no such message
+                continue
+            if taken is None:
+                return number
+            receive(*taken)
+        return _ROSOUT_DEPTH
 
     @property
     def logs(self) -> list[LogLine]:
         """What loggers published on /rosout so far, within bounds."""
         return self._logs.lines
 
-    def _take_log(self, record: Any) -> None:
+    def _take_log(self, record: Any, _: Any) -> None:
         stamp_ns = record.stamp.sec * NS + record.stamp.nanosec
         name, text = (
             str(value)[:longest].encode(errors="replace").decode()
@@ -271,7 +334,7 @@ class Probe:
             self._seen.add(key)
         if not topic.ours:
             self.counts[topic.name] += 1
-            self.last_message_ns = time.time_ns()
+            self.last_message_ns = info["received_timestamp"]
         self._keep(topic.name, topic.type, data, info)
 
     def _keep(self, topic: str, type: str, data: bytes, info: Any, join: str = "") -> None:
