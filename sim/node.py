@@ -35,6 +35,9 @@ from sim.publishers import (
 )
 from sim.simulation import Simulation, Step
 
+_LEAST_QUEUE = 100
+"""Commands that may arrive from one look to the next; a robot that always looks misses none."""
+
 
 class Sink(Protocol):
     """Receiver of the truth, such as a recording; called from the loop, so it must be quick."""
@@ -68,8 +71,14 @@ class RosSimulator:
         simulation: Simulation,
         sink: Sink | None = None,
         steady_ns: Callable[[], int] = time.monotonic_ns,
+        recorders: int = -1,
     ) -> None:
-        """Create publishers and the subscription in a node of the caller; nothing is sent yet."""
+        """Create publishers and the subscription in a node of the caller; nothing is sent yet.
+
+        Args:
+            recorders: How many subscriptions to a sensor do not mind when its data come together,
+                each with its own time, if they are the only ones.
+        """
         self._node, self._simulation, self._sink = node, simulation, sink
         self._steady_ns = steady_ns
         options, lidar = simulation.options, simulation.lidar
@@ -80,15 +89,17 @@ class RosSimulator:
         tf = transform_type() if topics.tf.enabled else None
         self.transforms = tf and TransformPublisher(node, options, tf)
         package, _, name = topics.command.type.split("/")
+        depth = max(topics.command.depth, _LEAST_QUEUE)
+        command = self._command = topics.command.model_copy(update={"depth": depth})
         self.command: Any = node.create_subscription(
             getattr(importlib.import_module(f"{package}.msg"), name),
-            topics.command.topic,
+            command.topic,
             _never,
-            qos_profile(topics.command),
+            qos_profile(command),
             callback_group=PolledGroup(),
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
-        self._command = topics.command
+        self._recorders = recorders
         self._pacer: Pacer | None = None
         self._pending: deque[tuple[int, Twist]] = deque()
         self._stamp_ns = 0
@@ -124,7 +135,16 @@ class RosSimulator:
             pacer.done += 1
             self._publish(step)
         # With a clock every step is visible.
-        return pacer.plan(0 if self.clock is not None else self._simulation.next_output_ns)
+        return pacer.plan(0 if self.clock is not None else self._next_visible_ns())
+
+    def _next_visible_ns(self) -> int | None:
+        return self._simulation.next_output_ns(
+            scans=self._is_heard(self.scan),
+            odometry=self.transforms is not None or self._is_heard(self.odometry),
+        )
+
+    def _is_heard(self, sensor: OdometryPublisher | ScanPublisher) -> bool:
+        return bool(sensor.publisher.get_subscription_count() > self._recorders)
 
     def run(self, stop: threading.Event) -> None:
         """Keep time until ``stop`` is set or the node's context is shut down."""

@@ -12,7 +12,7 @@ LATE_NS = 5_000_000
 MAX_BATCH = 100
 """Most steps that are caught up at once, so that the loop can be ended in between."""
 
-MAX_AHEAD = 5
+MAX_AHEAD = 10
 """Most steps that are done together where no difference can be seen."""
 
 

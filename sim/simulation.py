@@ -79,18 +79,17 @@ class Schedule:
         self._rate = Fraction(options.rate).limit_denominator(1_000_000)
         self._starts_ns = round(options.starts * NS)
         self._stops_ns = math.inf if options.stops is None else round(options.stops * NS)
-        self._next = 1
+        self._plan(1)
 
-    def next_ns(self) -> int:
+    def _plan(self, number: int) -> None:
+        self.next_ns = STEP_NS * math.ceil(number * NS / (self._rate * STEP_NS))
         """End of the step at which it will be due."""
-        return STEP_NS * math.ceil(self._next * NS / (self._rate * STEP_NS))
 
     def is_due(self, time_ns: int) -> bool:
-        """Whether it is due at a time; times must increase."""
-        count = math.floor(time_ns * self._rate / NS)
-        if count < self._next:
+        """Whether it is due at the end of a step; times must increase."""
+        if time_ns < self.next_ns:
             return False
-        self._next = count + 1
+        self._plan(math.floor(time_ns * self._rate / NS) + 1)
         return self._starts_ns <= time_ns < self._stops_ns
 
 
@@ -135,10 +134,10 @@ class Simulation:
         """Simulated time."""
         return self._index * STEP_NS
 
-    @property
-    def next_output_ns(self) -> int | None:
-        """Simulated time of the next step that brings data of a sensor, or None without one."""
-        return min((one.next_ns() for one in (self._scans, self._samples) if one), default=None)
+    def next_output_ns(self, *, scans: bool = True, odometry: bool = True) -> int | None:
+        """Simulated time of the next step that brings data of these sensors, or None for never."""
+        wanted = (scans and self._scans, odometry and self._samples)
+        return min((one.next_ns for one in wanted if one), default=None)
 
     def advance(self, command: Twist | None = None) -> Step:
         """Simulate one step of 10 ms.

@@ -98,7 +98,7 @@ def due_ms(rate: float, seconds: int = 10, **window: str) -> list[int]:
     schedule = Schedule(LidarOptions.model_validate({"rate": f"{rate} Hz", **window}))
     found = []
     for step in range(1, 100 * seconds + 1):
-        expected = schedule.next_ns()
+        expected = schedule.next_ns
         if schedule.is_due(step * STEP_NS):
             assert step * STEP_NS == expected or window
             found.append(10 * step)

@@ -35,7 +35,7 @@ class SimulatedRobot:
         options = self._options = SimulatorOptions.model_validate_json(order.options)
         self._world = read_scenario_world(Path(order.world), order.values)
         self._simulation: Simulation = make_simulation(self._world, options, order.seed)
-        self._ros = RosSimulator(node, self._simulation, self)
+        self._ros = RosSimulator(node, self._simulation, self, recorders=1)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._ros.run, args=(self._stop,), daemon=True)
         self._start = self._simulation.pose
