@@ -218,6 +218,8 @@ if PIPE is not None and str(PIPE[1]) == os.environ.get("ROSGRADE_TRACER_PIPE"):
     sys.meta_path.insert(0, _Finder)
     # Imports make objects and no garbage: until rclpy.init() there is little to look for.
     gc.set_threshold(_IMPORTED)
+    # It writes code for messages when they are built; rosidl_generator_py does without if it lacks.
+    sys.modules["rosidl_generator_py.generate_py_impl"] = None  # type: ignore[assignment]
     _count_more_cpus()
     _keep_pipes()
     import atexit
