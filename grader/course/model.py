@@ -110,6 +110,7 @@ class Extension(Model):
 class CourseFile(Model):
     """The whole of ``course.yaml``."""
 
+    rosgrade: Literal[1] = Field(1, description="Version of this format.")
     title: str
     time_zone: Zone | None = Field(None, description="IANA name, for times without an offset.")
     late: Late | None = None
