@@ -11,7 +11,6 @@ from grader.batch.class_files import class_rows, standing
 from grader.batch.files import REPORT_FILE, STUDENT_FILE
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.rendering import NOT_UP_TO_DATE, bring_up_to_date
-from grader.errors import RosgradeError
 from grader.report.files import folder_name, write_whole
 from grader.report.formats.gradebook import why_no_score
 from grader.report.formats.mail import Letter, address
@@ -21,7 +20,6 @@ from grader.report.model.result_model import Result
 from grader.report.model.student import for_student
 from grader.report.text.summary import summary
 from grader.safe_text import one_line
-from grader.submission.git import commit_folder
 
 FEEDBACK_FOLDER = "rosgrade-feedback"
 
@@ -78,26 +76,10 @@ def letters(found: Sequence[Feedback], subject: str) -> tuple[list[Letter], list
     return messages, problems
 
 
-def write_files(feedback: Feedback, place: Path) -> list[Path]:
+def write_files(feedback: Feedback, place: Path) -> None:
     """Write the files for a student's repository into a folder of their own."""
     folder = place / folder_name(feedback.entry.key) / FEEDBACK_FOLDER
     readme, report = folder / "README.md", folder / "report.html"
     text = render_markdown(feedback.result)
     write_whole(readme, f"{text}\nThe whole report: `{report.name}` in this folder.\n")
     write_whole(report, feedback.report.read_bytes())
-    return [readme, report]
-
-
-def commit(
-    found: Sequence[Feedback], files: Sequence[Sequence[Path]], branch: str
-) -> tuple[int, list[str]]:
-    """Commit the files in the clones; how many commits there are, and who got none."""
-    commits, problems = 0, []
-    for one, written in zip(found, files, strict=True):
-        # A team has one clone.
-        if one.entry.review_key == one.entry.key:
-            try:
-                commits += commit_folder(Path(one.entry.source), branch, FEEDBACK_FOLDER, written)
-            except RosgradeError as error:
-                problems.append(f"{one_line(one.entry.key)}: {error}")
-    return commits, problems

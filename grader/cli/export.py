@@ -232,29 +232,19 @@ def mail(
 
 
 @app.command()
-def feedback(
-    out: ClassFolder,
-    folder: Folder = Path("feedback"),
-    branch: Annotated[
-        str | None,
-        typer.Option(help="Also commit it on this branch of each clone; nothing is pushed."),
-    ] = None,
-) -> None:
+def feedback(out: ClassFolder, folder: Folder = Path("feedback")) -> None:
     """Write for each student the files for their repository: a README.md and the report.
 
     Ends with 1 if a student gets none, and says who and why.
     """
-    from grader.batch.feedback import class_feedback, commit, write_files
+    from grader.batch.feedback import class_feedback, write_files
     from grader.report.files import refuse_part
 
     refuse_part(folder, out / "submissions", f"the results in {out}")
     found, problems = class_feedback(out)
-    files = [write_files(one, folder) for one in found]
+    for one in found:
+        write_files(one, folder)
     say(f"{folder}: files for {counted(len(found), 'student')}")
-    if branch is not None:
-        committed, failed = commit(found, files, branch)
-        say(f"{counted(committed, 'new commit')} on {branch}; push them yourself")
-        problems += failed
     _end(problems)
 
 

@@ -7,7 +7,6 @@ import io
 import json
 import mailbox
 import re
-import subprocess
 import zipfile
 from contextlib import closing
 from dataclasses import replace
@@ -71,28 +70,9 @@ def out(tmp_path: Path) -> Path:
             if key == "ana":
                 (folder / "student-report.html").write_text("copy for ana")
             ledger.put(key, folder)
-            source = str(tmp_path / "clones" / key)
-            entries.append(Entry(key, name, sha256=key, email=email, source=source))
+            entries.append(Entry(key, name, sha256=key, email=email))
         ledger.write([*entries, Entry("gil", problem="handed in nothing")], "lesson", "f" * 64)
     return tmp_path / "out"
-
-
-def clone_of(place: Path, key: str) -> Path:
-    clone = place / "clones" / key if key else place
-    clone.mkdir(parents=True, exist_ok=True)
-    git(clone, "init", "-q", "-b", "main")
-    (clone / "node.py").write_text("print()\n")
-    git(clone, "add", ".")
-    who = ("-c", "user.name=x", "-c", "user.email=x@example.org")
-    git(clone, *who, "commit", "-q", "-m", "Hand in")
-    return clone
-
-
-def git(folder: Path, *arguments: str) -> str:
-    done = subprocess.run(
-        ["git", *arguments], cwd=folder, capture_output=True, text=True, check=True
-    )
-    return done.stdout.strip()
 
 
 def messages(file: Path) -> list[EmailMessage]:
@@ -159,52 +139,15 @@ def test_a_sender_who_is_no_address_is_refused(rosgrade: Rosgrade, out: Path) ->
     assert ended.returncode == 2 and "--from Prof: is no address" in ended.stderr
 
 
-def test_the_files_for_a_repository_are_committed_beside_what_is_checked_out(
+def test_the_files_for_a_repository_hold_the_students_copy(
     rosgrade: Rosgrade, out: Path, tmp_path: Path
 ) -> None:
-    clone = clone_of(tmp_path, "ana")
-    (clone / "node.py").write_text("print('not committed')\n")
-    other = clone_of(tmp_path, "ben")
-    git(other, "branch", "feedback")
-    command = ("export", "feedback", out, "--out", "files", "--branch", "feedback")
-    before = git(clone, "status", "--porcelain"), git(clone, "rev-parse", "HEAD")
-    ended = rosgrade(*command)
-    assert ended.returncode == 1 and "1 new commit on feedback" in ended.stdout
-    assert "ben: has a branch feedback of its own" in ended.stderr
-    assert f"{tmp_path}/clones/cy is not a clone" in ended.stderr
-    assert (git(clone, "status", "--porcelain"), git(clone, "rev-parse", "HEAD")) == before
-    assert git(clone, "branch", "--show-current") == "main"
-    assert git(clone, "ls-tree", "-r", "--name-only", "feedback").split("\n") == [
-        "node.py",
-        "rosgrade-feedback/README.md",
-        "rosgrade-feedback/report.html",
-    ]
-    assert git(clone, "show", "feedback:rosgrade-feedback/report.html") == "copy for ana"
-    readme = (tmp_path / "files" / "ana" / "rosgrade-feedback" / "README.md").read_text()
+    ended = rosgrade("export", "feedback", out, "--out", "files")
+    assert ended.returncode == 1 and "gil: handed in nothing" in ended.stderr
+    folder = tmp_path / "files" / "ana" / "rosgrade-feedback"
+    assert (folder / "report.html").read_text() == "copy for ana"
+    readme = (folder / "README.md").read_text()
     assert "It publishes every 300 ms" in readme and "ends after SIGINT" not in readme
-    assert "0 new commits on feedback" in rosgrade(*command).stdout
-
-
-def test_a_repository_that_only_points_to_another_one_is_not_written(
-    rosgrade: Rosgrade, out: Path, tmp_path: Path
-) -> None:
-    mine = clone_of(tmp_path, "mine")
-    for key in ("ana", "ben"):
-        (tmp_path / "clones" / key).mkdir()
-    (tmp_path / "clones" / "ana" / ".git").write_text(f"gitdir: {mine}/.git\n")
-    (tmp_path / "clones" / "ben" / ".git").symlink_to(mine / ".git")
-    rosgrade("export", "feedback", out, "--branch", "feedback")
-    assert git(mine, "branch", "--list", "feedback") == ""
-
-
-def test_a_row_without_a_known_source_writes_to_no_repository(
-    rosgrade: Rosgrade, out: Path, tmp_path: Path
-) -> None:
-    here = clone_of(tmp_path, "")
-    ledger = Ledger(out)
-    ledger.write([replace(one, source="") for one in ledger.read().entries], "lesson", "f" * 64)
-    assert rosgrade("export", "feedback", out, "--branch", "feedback").returncode == 1
-    assert git(here, "branch", "--list", "feedback") == ""
 
 
 def canvas(place: Path) -> Path:
