@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pytest
+
+from grader.report.html import source_code
 from grader.report.html.source_code import LONGEST_LINE, code_lines
 
 
@@ -40,3 +43,10 @@ def test_a_huge_line_is_cut_and_says_so() -> None:
     html = shown("# " + "x" * 250_000)
     assert len(html) < 2 * LONGEST_LINE
     assert "… 248002 more characters" in html
+
+
+def test_a_text_that_takes_its_grammar_long_is_shown_whole_without_colours(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(source_code, "MOST_S", 0.0)
+    assert shown("def a(): ...\n\ndef b(): ...\n").endswith("\n\ndef b(): ...")

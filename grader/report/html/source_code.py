@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import time
+from collections.abc import Iterator
 from pathlib import PurePosixPath
 
 from markupsafe import Markup, escape
@@ -11,24 +13,18 @@ from grader.safe_text import visible
 
 LONGEST_LINE = 2_000
 """Characters of a line that are shown."""
-# The grammars of what students write; others, some of which take long, are never tried.
+MOST_S = 1.0
+"""Time for colours; what is left of the file after it is shown without. Grammars are patterns, and
+a text of nothing but blanks takes some of them minutes."""
 _GRAMMARS = {
-    ".py": "python",
-    ".c": "cpp",
-    ".cc": "cpp",
-    ".cpp": "cpp",
-    ".cxx": "cpp",
-    ".h": "cpp",
-    ".hpp": "cpp",
-    ".xml": "xml",
-    ".xacro": "xml",
-    ".urdf": "xml",
-    ".yaml": "yaml",
-    ".yml": "yaml",
-    ".cfg": "ini",
-    ".toml": "toml",
-    ".cmake": "cmake",
-    ".sh": "bash",
+    "python": (".py",),
+    "cpp": (".c", ".cc", ".cpp", ".cxx", ".h", ".hpp"),
+    "xml": (".xml", ".xacro", ".urdf"),
+    "yaml": (".yaml", ".yml"),
+    "ini": (".cfg",),
+    "toml": (".toml",),
+    "cmake": (".cmake", "CMakeLists.txt"),
+    "bash": (".sh",),
 }
 _CODE_POINT = re.compile(r"&lt;(U\+[0-9A-F]{4,5})&gt;")
 
@@ -39,22 +35,15 @@ def code_lines(path: str, text: str) -> list[Markup]:
     Characters that are invisible or reorder text are shown by their code point, and of a huge line
     its beginning.
     """
-    from pygments import lex
-    from pygments.lexers import get_lexer_by_name
-
-    file = PurePosixPath(path)
-    name = "cmake" if file.name == "CMakeLists.txt" else _GRAMMARS.get(file.suffix.lower(), "text")
-    lexer = get_lexer_by_name(name, stripnl=False, ensurenl=False)
     shown = "\n".join(map(_bounded, visible(text).split("\n")))
-    lines = [Markup("")]
-    for kind, value in lex(shown if shown.endswith("\n") else f"{shown}\n", lexer):
-        color = _color(kind)
-        for number, part in enumerate(value.split("\n")):
+    lines = [""]
+    for color, piece in _pieces(path, shown if shown.endswith("\n") else f"{shown}\n"):
+        for number, part in enumerate(piece.split("\n")):
             if number:
-                lines.append(Markup(""))
-            html = Markup(_CODE_POINT.sub(r"<mark>\1</mark>", str(escape(part))))
-            lines[-1] += Markup('<span class="{}">{}</span>').format(color, html) if color else html
-    return lines[:-1]
+                lines.append("")
+            html = _CODE_POINT.sub(r"<mark>\1</mark>", str(escape(part)))
+            lines[-1] += f'<span class="{color}">{html}</span>' if color and html else html
+    return list(map(Markup, lines[:-1]))
 
 
 def _bounded(line: str) -> str:
@@ -62,11 +51,20 @@ def _bounded(line: str) -> str:
     return line if left <= 0 else f"{line[:LONGEST_LINE]} … {left} more characters"
 
 
-def _color(kind: object) -> str:
-    """The class of a token: comment, string, keyword, number, or the name of what is defined."""
+def _pieces(path: str, text: str) -> Iterator[tuple[str, str]]:
+    """The text in pieces, each with its class: comment, string, keyword, number, definition."""
+    from pygments import lex
+    from pygments.lexers import get_lexer_by_name
     from pygments.token import STANDARD_TYPES, Token
 
-    short = STANDARD_TYPES.get(kind, "")
-    if kind in (Token.Name.Function, Token.Name.Class, Token.Name.Tag, Token.Name.Decorator):
-        return "f"
-    return {"c": "c", "s": "s", "k": "k", "m": "m"}.get(short[:1], "")
+    file, done, end_s = PurePosixPath(path), 0, time.monotonic() + MOST_S
+    defined = (Token.Name.Function, Token.Name.Class, Token.Name.Tag, Token.Name.Decorator)
+    for grammar, endings in _GRAMMARS.items():
+        if file.suffix.lower() in endings or file.name in endings:
+            for kind, piece in lex(text, get_lexer_by_name(grammar, stripnl=False)):
+                color = "f" if kind in defined else STANDARD_TYPES.get(kind, "")[:1]
+                yield color if color in "cfkms" else "", piece
+                done += len(piece)
+                if time.monotonic() > end_s:
+                    break
+    yield "", text[done:]
