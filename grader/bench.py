@@ -14,8 +14,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import defaultdict
-from collections.abc import Callable
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
@@ -40,8 +40,10 @@ from grader.sandbox.trial import choose
 from grader.submission.build.build_cache import BUILDS
 from grader.submission.prepare import Prepared, prepare
 
-CLASSES = {"timed_publisher": 100, "bot_controller": 20}
+CLASSES = {"timed_publisher": 100, "bot_controller": 40, "p_controller": 40}
 """Assignment, without and with a robot -> size of its class."""
+CELLS = {"at rest": ("bot_controller", "blocked"), "driving": ("bot_controller", "open")}
+"""What the robot does -> assignment and scenario in which the reference does it."""
 ASSIGNMENT = "timed_publisher"
 REGRADED = 50
 OUTPUT = Path("rosgrade-bench.json")
@@ -143,18 +145,22 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
             grading = Grading(loaded, runner, folder / "batch-cache")
             work = partial(_grade_into, grading, prepared, folder / name)
             work(0)
+            repeats: Counter[str] = Counter()
             before_s, own_s = runner.cpu_s, time.process_time()
             began_s = time.monotonic()
             with ThreadPoolExecutor(max_workers=runner.admission.most) as pool:
                 futures = [pool.submit(work, number) for number in range(count)]
                 for number, future in enumerate(as_completed(futures), start=1):
-                    future.result()
+                    repeats.update(future.result())
                     if number % 20 == 0:
                         print(f"{name}: {number} of {count}", file=sys.stderr, flush=True)
             wall_s = time.monotonic() - began_s
             cpu_s = runner.cpu_s - before_s + time.process_time() - own_s
         samples[f"batch of {name}: submissions per minute"].append(60 * count / wall_s)
         samples[f"batch of {name}: CPU of each"].append(cpu_s / count)
+        samples[f"batch of {name}: runs repeated"].append(repeats.total())
+        for why, number in repeats.most_common():
+            print(f"{name}: {number} times run again: {why}", file=sys.stderr)
         share = cpu_s / cpu_count() / wall_s
         samples[f"batch of {name}: share of what the CPUs bound"].append(share)
         began_s = time.monotonic()
@@ -168,10 +174,43 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
             samples[f"batch of {name}: times the plain test program's rate"].append(times)
 
 
-def _grade_into(grading: Grading, prepared: Prepared, folder: Path, number: int) -> None:
+def _grade_into(grading: Grading, prepared: Prepared, folder: Path, number: int) -> Iterable[str]:
+    """Grade one more of the class; returns why runs were repeated."""
     own = folder / str(number)
     clock = Clock()
-    write_graded(grading.grade_prepared(prepared, own / RECORDINGS_FOLDER), own, clock)
+    graded = grading.grade_prepared(prepared, own / RECORDINGS_FOLDER)
+    write_graded(graded, own, clock)
+    return graded.repeats
+
+
+def _cell(samples: Samples, folder: Path, _: int) -> None:
+    """What share of a core a cell and the student's process in it take together."""
+    sandbox, _notice = choose(Choice.AUTO, folder / "cell-cache")
+    for what, (name, scenario_id) in CELLS.items():
+        loaded = load_assignment(name)
+        prepared = prepare(
+            reference_of(name), ros.find(), cache=folder / "cell-cache", sandbox=sandbox
+        )
+        (scenario,) = (one for one in loaded.assignment.scenarios if one.id == scenario_id)
+        assert prepared.install is not None
+        with Runner(ros.find(), sandbox=sandbox) as runner:
+            taken_s = []
+            for seconds in (2, 2, 12):
+                until = scenario.until.model_validate({"elapsed": f"{seconds} s"})
+                update = {"until": until, "timeout": 2 * seconds}
+                before_s = runner.cpu_s
+                runner.run(
+                    loaded.assignment,
+                    scenario.model_copy(update=update),
+                    prepared.record,
+                    prepared.install,
+                    folder / "cell.mcap",
+                    seed=1,
+                    worlds=loaded.folder,
+                )
+                taken_s.append(runner.cpu_s - before_s)
+        # The first run also pays for what the prefork server imports.
+        samples[f"cell with a robot {what}: share of a core"].append((taken_s[2] - taken_s[1]) / 10)
 
 
 def _plain(samples: Samples, prepared: Prepared) -> float:
@@ -217,6 +256,7 @@ def _simulator(samples: Samples, folder: Path, _: int) -> None:
 MEASUREMENTS: dict[str, Callable[[Samples, Path, int], None]] = {
     "check": _check,
     "batch": _batch,
+    "cell": _cell,
     "simulator": _simulator,
 }
 

@@ -34,7 +34,7 @@ from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose
 from grader.scratch import Scratch
 
-ASSIGNMENTS = ("simple_publisher", "timed_publisher")
+ASSIGNMENTS = ("simple_publisher", "timed_publisher", "bot_controller", "p_controller")
 _BURST_S = _PAUSE_S = (0.3, 3.0)
 
 

@@ -54,6 +54,8 @@ class Graded:
     runs: Mapping[str, int]
     faults: Mapping[str, str]
     references: Mapping[str, Replay] = field(default_factory=dict)
+    repeats: tuple[str, ...] = ()
+    """Why a run was repeated, one text for each."""
 
 
 class Grading:
@@ -163,6 +165,7 @@ class Grading:
         alone: list[str] = []
         remaps = {scenario.id: frozenset[str]() for scenario in self._scenarios}
         first = 1
+        repeats: list[str] = []
         for attempt in range(1, MOST_RUNS + 1):
             run = partial(self._run, loaded, support, prepared, folder, remaps)
             told = partial(self._on_recorded, prepared.record, recordings)
@@ -194,9 +197,21 @@ class Grading:
             again = [name for name in doubtful if name not in alone]
             if not again and not alone:
                 break
+            if attempt < MOST_RUNS:
+                repeats += [f"{name}, failed on a disturbed machine" for name in again]
+                repeats += [
+                    f"{name}, {faults.get(name, 'too disturbed').splitlines()[0]}" for name in alone
+                ]
         files = {name: folder / f"{name}.mcap" for name in recordings}
         return Graded(
-            result, prepared, recordings, files, runs, faults, read_references(self._loaded)
+            result,
+            prepared,
+            recordings,
+            files,
+            runs,
+            faults,
+            read_references(self._loaded),
+            tuple(repeats),
         )
 
     def _run_all(
