@@ -24,10 +24,7 @@ _LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "rosgrade-report")
 
 def load_used(ledger: Ledger) -> LoadedAssignment:
     """The assignment that a class is graded with."""
-    written = ledger.read()
-    out = str(ledger.out)
-    name = stored_assignment(ledger.out, written.assignment, written.location, "regrade", out)
-    return load_assignment(name)
+    return _load(ledger, ledger.read().location)
 
 
 def check_lines(loaded: LoadedAssignment, check: str) -> tuple[int, str]:
@@ -68,29 +65,24 @@ def with_check(loaded: LoadedAssignment, check: str, text: str, place: Path) -> 
         raise
 
 
-def next_place(ledger: Ledger) -> Path:
-    """The folder for the next version that is used."""
-    there = [int(one.name) for one in (ledger.out / FOLDER).glob("[0-9]*") if one.name.isdecimal()]
-    return ledger.out / FOLDER / str(max(there, default=0) + 1)
-
-
-def remember(ledger: Ledger, place: Path) -> None:
-    """Write down beside a new version what the class is graded with until now."""
+def new_place(ledger: Ledger) -> Path:
+    """A new folder for a version that is used, where what is used until now is written down."""
+    there = [int(one.name) for one in (ledger.out / FOLDER).glob("*") if one.name.isdecimal()]
+    place = ledger.out / FOLDER / str(max(there, default=0) + 1)
     before = json.dumps({"location": ledger.read().location}) + "\n"
     write_whole(place / _BEFORE, before)
+    return place
 
 
 def load_before(ledger: Ledger) -> LoadedAssignment | None:
     """The assignment before the one that the class is graded with; None if that is the first."""
-    written = ledger.read()
-    file = Path(written.location or "").parent / _BEFORE
-    if written.location is None or not file.is_file():
-        return None
-    location = read_json(file)["location"]
-    out = str(ledger.out)
-    return load_assignment(
-        stored_assignment(ledger.out, written.assignment, location, "regrade", out)
-    )
+    file = Path(ledger.read().location or "").parent / _BEFORE
+    return _load(ledger, read_json(file)["location"]) if file.is_file() else None
+
+
+def _load(ledger: Ledger, location: str | None) -> LoadedAssignment:
+    out, name = ledger.out, ledger.read().assignment
+    return load_assignment(stored_assignment(out, name, location, "regrade", str(out)))
 
 
 def _span(loaded: LoadedAssignment, check: str, lines: list[str]) -> tuple[int, int]:

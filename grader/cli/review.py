@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import threading
+from contextlib import suppress
 from getpass import getuser
 from pathlib import Path
 from typing import Annotated
@@ -52,9 +53,7 @@ def review(
 def _initials() -> str:
     """Initials of the name that git knows, or the user's name."""
     name = ""
-    try:
+    with suppress(OSError):
         command = ["git", "config", "user.name"]
         name = subprocess.run(command, capture_output=True, text=True, check=False).stdout
-    except OSError:
-        pass
     return "".join(word[0] for word in name.split()) or getuser()

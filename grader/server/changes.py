@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
 
 from grader.errors import UsageError
-from grader.review.model import (
-    BankEntry,
-    ClassReview,
-    Comment,
-    Forgiven,
-    ManualScore,
-    StudentReview,
-)
+from grader.review.model import BankEntry, Comment, Forgiven, ManualScore, StudentReview
 from grader.review.store import ReviewConflict
 from grader.server.reviewed_class import ReviewedClass, ReviewedRow
 
@@ -28,44 +23,42 @@ def change_student(reviewed: ReviewedClass, row: ReviewedRow, sent: Any) -> None
     if sent["do"] == "undo":
         store.undo(key, sent["version"])
         return
-    update = _UPDATES[sent["do"]](store.student(key).content, row, sent, reviewed.by)
-    store.save(store.student(key).content.model_copy(update=update), sent["version"])
+    review = store.student(key).content
+    store.save(review.model_copy(update=_update(review, row, sent, reviewed.by)), sent["version"])
     if sent["do"] == "comment" and sent.get("index") is None:
         _count(reviewed, sent["text"])
 
 
-def _score(review: StudentReview, row: ReviewedRow, sent: Any, by: str) -> dict[str, Any]:
+def _update(review: StudentReview, row: ReviewedRow, sent: Any, by: str) -> dict[str, Any]:
+    if sent["do"] == "score":
+        return {"manual": dict(_scores(review, row, sent, by))}
+    if sent["do"] == "notes":
+        return {"notes": str(sent["notes"])}
+    comments, index = list(review.comments), sent.get("index")
+    if sent["do"] == "uncomment":
+        del comments[index]
+    elif sent["do"] == "comment":
+        new = Comment(text=sent["text"], by=by, file=sent.get("file"), line=sent.get("line"))
+        begin, end = (len(comments), None) if index is None else (index, index + 1)
+        comments[begin:end] = [new]
+    else:
+        raise ValueError(sent["do"])
+    return {"comments": tuple(comments)}
+
+
+def _scores(
+    review: StudentReview, row: ReviewedRow, sent: Any, by: str
+) -> Iterator[tuple[str, ManualScore]]:
+    item, points = sent["item"], sent["points"]
     adjustments = row.row.result.adjustments if row.row.result else ()
-    most = next((one.max_points for one in adjustments if one.item == sent["item"]), None)
+    most = {one.item: one.max_points for one in adjustments}.get(item)
     if most is None:
-        raise UsageError(f"{sent['item']}: is no item of this assignment any more")
-    scores = {name: score for name, score in review.manual.items() if name != sent["item"]}
-    if sent["points"] is not None:
-        points = float(sent["points"])
-        if not 0 <= points <= most:
-            raise UsageError(f"Give 0 to {most:g} points, not {points:g}.")
-        scores[sent["item"]] = ManualScore(points=points, by=by, note=str(sent["note"]))
-    return {"manual": scores}
-
-
-def _comment(review: StudentReview, _: ReviewedRow, sent: Any, by: str) -> dict[str, Any]:
-    new = Comment(text=sent["text"], by=by, file=sent.get("file"), line=sent.get("line"))
-    index, old = sent.get("index"), review.comments
-    if index is None:
-        return {"comments": (*old, new)}
-    return {"comments": (*old[: int(index)], new, *old[int(index) + 1 :])}
-
-
-def _uncomment(review: StudentReview, _: ReviewedRow, sent: Any, by: str) -> dict[str, Any]:
-    index = int(sent["index"])
-    return {"comments": (*review.comments[:index], *review.comments[index + 1 :])}
-
-
-def _notes(_: StudentReview, __: ReviewedRow, sent: Any, by: str) -> dict[str, Any]:
-    return {"notes": str(sent["notes"])}
-
-
-_UPDATES = {"score": _score, "comment": _comment, "uncomment": _uncomment, "notes": _notes}
+        raise UsageError(f"{item}: is no item of this assignment any more")
+    yield from ((name, score) for name, score in review.manual.items() if name != item)
+    if points is not None:
+        if not 0 <= float(points) <= most:
+            raise UsageError(f"Give 0 to {most:g} points, not {float(points):g}.")
+        yield item, ManualScore(points=float(points), by=by, note=str(sent["note"]))
 
 
 def change_cluster(reviewed: ReviewedClass, sent: Any) -> None:
@@ -97,11 +90,9 @@ def change_cluster(reviewed: ReviewedClass, sent: Any) -> None:
 def _count(reviewed: ReviewedClass, text: str) -> None:
     """Count the use of a comment in the bank, which holds the most used first."""
     saved = reviewed.store.of_class()
-    times = {one.text: one.used for one in saved.content.bank}
-    times[text] = times.get(text, 0) + 1
-    bank = sorted(times.items(), key=lambda one: -one[1])
-    entries = tuple(BankEntry(text=known, used=count) for known, count in bank)
-    changed: ClassReview = saved.content.model_copy(update={"bank": entries})
+    times = Counter({one.text: one.used for one in saved.content.bank})
+    times[text] += 1
+    bank = tuple(BankEntry(text=known, used=count) for known, count in times.most_common())
     # Another reviewer may count at the same moment; that is worth no message.
     with suppress(ReviewConflict):
-        reviewed.store.save(changed, saved.version)
+        reviewed.store.save(saved.content.model_copy(update={"bank": bank}), saved.version)

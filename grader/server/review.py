@@ -18,15 +18,8 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
-from grader.assignment.load import LoadedAssignment
 from grader.batch.class_files import INSTRUCTOR_FOLDER
-from grader.batch.edited_assignment import (
-    check_lines,
-    load_before,
-    next_place,
-    remember,
-    with_check,
-)
+from grader.batch.edited_assignment import check_lines, load_before, new_place, with_check
 from grader.errors import RosgradeError, UsageError
 from grader.findings.finding import Status
 from grader.report.html.overview import render_overview
@@ -224,18 +217,14 @@ class ReviewServer(LocalServer):
     def _regrade(self, _: Request, sent: Any) -> Response:
         """Begin to judge the class: ``preview``, ``apply`` or ``back``."""
         ledger, check, do = self._class.ledger, str(sent["check"]), sent["do"]
-        new: LoadedAssignment | None
         if self._background.judging.running:
             raise UsageError("The class is being judged. Wait until that has ended.")
-        if do == "preview":
-            place = Path(tempfile.mkdtemp(dir=self._scratch.name))
-            new = with_check(self._class.loaded, check, str(sent["text"]), place)
-        elif do == "apply":
-            place = next_place(ledger)
-            new = with_check(self._class.loaded, check, str(sent["text"]), place)
-            remember(ledger, place)
-        else:
+        if do == "back":
             new = load_before(ledger)
+        else:
+            scratch = do == "preview"
+            place = Path(tempfile.mkdtemp(dir=self._scratch.name)) if scratch else new_place(ledger)
+            new = with_check(self._class.loaded, check, str(sent["text"]), place)
         if new is None:
             raise UsageError("There is no assignment to go back to.")
         self._background.judge(do.capitalize(), check, new, write=do != "preview")

@@ -22,15 +22,8 @@ from grader.review.model import StudentReview
 from grader.review.store import ReviewStore, Saved
 from grader.submission.kept_source import SOURCE_FOLDER, KeptSource, read_source
 
-
-@dataclass(frozen=True)
-class _Read:
-    """A row with its review, as they were in files of these versions."""
-
-    versions: tuple[object, ...]
-    done: Done
-    saved: Saved[StudentReview]
-    problem: str
+_Read = tuple[Done, Saved[StudentReview], str]
+"""A row, its review, and why that cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +49,7 @@ class ReviewedClass:
         self.out, self.by = out, by
         self.ledger, self.store = Ledger(out), ReviewStore(out)
         self._reading = threading.Lock()
-        self._known: dict[str, _Read] = {}
-        self._shared: tuple[object, ...] = ()
+        self._known: dict[str, tuple[object, _Read]] = {}
         self._loaded: tuple[object, LoadedAssignment] | None = None
         self.ledger.read()
 
@@ -76,22 +68,22 @@ class ReviewedClass:
             return self._rows()
 
     def _rows(self) -> list[ReviewedRow]:
-        written = self.ledger.read()
-        course = (_version(self.out / written.course),) if written.course else ()
-        shared = (_version(self.out / BATCH_FILE), _version(self.store.file(None)), *course)
-        if shared != self._shared:
-            self._known, self._shared = {}, shared
-        adjust = None
+        written, adjust = self.ledger.read(), None
+        course = _version(self.out / written.course) if written.course else None
+        forgiven = self.store.of_class().content.forgiven
+        shared = (_version(self.out / BATCH_FILE), course, forgiven)
+        found = {}
         for entry in written.entries:
-            result = self.ledger.folder(entry.key) / RESULT_FILE
-            versions = (_version(result), _version(self.store.file(entry.review_key)))
-            if entry.key not in self._known or self._known[entry.key].versions != versions:
+            files = (self.ledger.folder(entry.key) / RESULT_FILE, self.store.file(entry.review_key))
+            version = (*map(_version, files), shared)
+            known, read = self._known.get(entry.key, (None, None))
+            if read is None or known != version:
                 adjust = adjust or ClassAdjustments(self.ledger)
-                self._known[entry.key] = self._read(entry, adjust, versions)
-        known = {entry.key: self._known[entry.key] for entry in written.entries}
-        rows = class_rows([one.done for one in known.values()], self.ledger)
-        found = ((row, known[row.id]) for row in rows)
-        return [ReviewedRow(row, one.done.entry, one.saved, one.problem) for row, one in found]
+                read = self._read(entry, adjust)
+                self._known[entry.key] = version, read
+            found[entry.key] = read
+        rows = class_rows([done for done, _, _ in found.values()], self.ledger)
+        return [ReviewedRow(row, found[row.id][0].entry, *found[row.id][1:]) for row in rows]
 
     def find(self, name: str) -> tuple[ReviewedRow, list[ReviewedRow]]:
         """A row by the name in its address, and all rows."""
@@ -109,11 +101,11 @@ class ReviewedClass:
         """What was handed in, as far as it is text and was kept."""
         return read_source(self.ledger.folder(row.row.id) / SOURCE_FOLDER)
 
-    def _read(self, entry: Entry, adjust: ClassAdjustments, versions: tuple[object, ...]) -> _Read:
+    def _read(self, entry: Entry, adjust: ClassAdjustments) -> _Read:
         done = standing(self.ledger, entry)
         try:
             saved = self.store.student(entry.review_key)
-            return _Read(versions, adjust.row(done), saved, "")
+            return adjust.row(done), saved, ""
         except RosgradeError as error:
             # No points until it can be read: what a person gave must not seem to be taken away.
             why = str(error)
@@ -121,7 +113,7 @@ class ReviewedClass:
             result = done.result and done.result.model_copy(update={"adjustments": (unread,)})
             entry = replace(entry, problem="; ".join(filter(None, (entry.problem, why))))
             saved = Saved(StudentReview(key=entry.review_key), "")
-            return _Read(versions, replace(done, entry=entry, result=result), saved, why)
+            return replace(done, entry=entry, result=result), saved, why
 
 
 def _version(file: Path) -> object:
