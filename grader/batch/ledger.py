@@ -169,7 +169,12 @@ class Ledger:
             state = (self.folder(key) / RESULT_FILE).stat()
         except OSError:
             return None
-        return self._kept(key, (state.st_ino, state.st_mtime_ns, state.st_size))
+        # Read once for all that ask.
+        version = (state.st_ino, state.st_mtime_ns, state.st_size)
+        if key not in self._results or self._results[key][0] != version:
+            whole = self.whole_result(key)
+            self._results[key] = version, for_class(whole) if whole is not None else None
+        return self._results[key][1]
 
     def whole_result(self, key: str) -> Result | None:
         """A row's result as it was written; None where there is none or it is damaged."""
@@ -180,15 +185,6 @@ class Ledger:
             return read_result(file)
         except RosgradeError:
             return None
-
-    def _kept(self, key: str, version: tuple[int, ...]) -> Result | None:
-        """The result of a file, read once for all that ask."""
-        known, result = self._results.get(key, ((), None))
-        if known != version:
-            whole = self.whole_result(key)
-            result = for_class(whole) if whole is not None else None
-            self._results[key] = version, result
-        return result
 
     def write(
         self,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from contextlib import ExitStack
-from dataclasses import dataclass, field
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -138,7 +138,6 @@ class _Work:
     grading: Grading | None = None
     problem: RosgradeError | None = None
     before: Result | None = None
-    told: set[str] = field(default_factory=set)
 
     def begin(self) -> None:
         from grader.batch.grading import Grading
@@ -146,7 +145,6 @@ class _Work:
         from grader.report.text.last_save import failed_scenarios
 
         self.runner.get_ready()
-        self.told.clear()
         try:
             self.loaded, self.problem = self.load(), None
         except RosgradeError as error:
@@ -188,18 +186,16 @@ class _Work:
             judged = judge_early(self.loaded, record, recordings, self.before.reasons)
             known += map(early_line, judged)
         for text in known:
-            if text not in self.told:
-                self.told.add(text)
+            if text not in self.page.state.early:
                 self.progress.tell(text)
-                self.page.tell(text)
+                self.page.show(early=(*self.page.state.early, text))
 
     def _line(self, error: SourceError) -> str:
         """The line of a file that an error is in, where it is there to be read."""
-        try:
+        with suppress(OSError, IndexError):
             lines = (self.submission / error.file).read_text("utf-8", "replace").splitlines()
-            return f": {one_line(lines[(error.line or 0) - 1])}" if error.line else ""
-        except (OSError, IndexError):
-            return ""
+            return f": {one_line(lines[error.line - 1])}" if error.line else ""
+        return ""
 
     def cancel(self) -> None:
         assert self.grading is not None

@@ -92,11 +92,6 @@ class ReportPage(LocalServer):
             others = {name: one for name, one in self.state.phases.items() if name and scenario}
             self.show(phases={**others, scenario: text})
 
-    def tell(self, text: str) -> None:
-        """Show something that is known already."""
-        with self._lock:
-            self.show(early=(*self.state.early, text))
-
     def _outer_page(self, _: Request) -> Response:
         from grader.report.html.page import render_page
 

@@ -58,7 +58,7 @@ def test_the_page_of_a_watched_submission_follows_by_itself(
         served.show_grade("Not graded", "not graded", "", (None, 3.0))
         served.begin("… Publish")
         served.show_phase("listen", "recording")
-        served.tell("period passes now")
+        served.show(early=("period passes now",))
         expect(page.locator("#phases li")).to_have_text(["listen: recording"])
         expect(page.locator("#early li")).to_have_text(["period passes now"])
         assert page.evaluate(old)

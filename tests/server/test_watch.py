@@ -52,7 +52,7 @@ def test_what_it_does_and_what_is_known_already_is_shown(page: ReportPage, clien
     assert client.get("/state").json["phases"] == {"": "building bot_publisher"}
     page.show_phase("run", "recording")
     page.show_phase("stop", "recorded")
-    page.tell("period passes now")
+    page.show(early=("period passes now",))
     state = client.get("/state").json
     assert state["phases"] == {"run": "recording", "stop": "recorded"}
     assert state["early"] == ["period passes now"]
