@@ -161,7 +161,9 @@ class Grading:
             support = TypeSupport(loaded, self._runner.ros, self._cache)
         self._on_recorded(prepared.record, {})
         can_run = prepared.install is not None and unnamed is None
-        again = [scenario.id for scenario in self._scenarios] if can_run else []
+        # The longest start first: none of them is left to run alone in the end.
+        longest = sorted(self._scenarios, key=lambda scenario: -scenario.timeout)
+        again = [scenario.id for scenario in longest] if can_run else []
         alone: list[str] = []
         remaps = {scenario.id: frozenset[str]() for scenario in self._scenarios}
         first = 1

@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 from rclpy.exceptions import NameValidationException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node as RclpyNode
 from rclpy.node import NodeNameNonExistentError
 from rclpy.topic_endpoint_info import TopicEndpointInfo
@@ -132,7 +133,7 @@ class GraphObserver:
         for topic, _ in self._found(self._node.get_topic_names_and_types):
             for kind in Kind:
                 for info in self._found(partial(self._infos, kind, topic)):
-                    if info.node_name == _UNKNOWN_NAME:
+                    if info["node_name"] == _UNKNOWN_NAME:
                         continue
                     nodes.add(self._see_node(info, now_ns))
                     if topic not in _INFRASTRUCTURE:
@@ -152,11 +153,13 @@ class GraphObserver:
             self.forbidden_names = True
             return ()
 
-    def _infos(self, kind: Kind, topic: str) -> list[TopicEndpointInfo]:
+    def _infos(self, kind: Kind, topic: str) -> list[dict[str, Any]]:
+        """What rclpy makes its TopicEndpointInfo of, which takes longest of all."""
         validate_full_topic_name(topic)
-        if kind is Kind.PUBLISHER:
-            return self._node.get_publishers_info_by_topic(topic)
-        return self._node.get_subscriptions_info_by_topic(topic)
+        ask = getattr(rclpy_implementation, f"rclpy_get_{kind.value}s_info_by_topic")
+        with self._node.handle:
+            found: list[dict[str, Any]] = ask(self._node.handle, topic, False)
+        return found
 
     def _services_of(self, ask: _OfNode, base: str, namespace: str) -> list[tuple[str, list[str]]]:
         validate_node_name(base)
@@ -166,19 +169,20 @@ class GraphObserver:
         except NodeNameNonExistentError:
             return []
 
-    def _see_node(self, info: TopicEndpointInfo, now_ns: int) -> tuple[str, str]:
-        gid = bytes(info.endpoint_gid)
-        key = (full_name(info.node_namespace, info.node_name), gid[:12].hex())
+    def _see_node(self, info: dict[str, Any], now_ns: int) -> tuple[str, str]:
+        gid = bytes(info["endpoint_gid"])
+        key = (full_name(info["node_namespace"], info["node_name"]), gid[:12].hex())
         known = self._nodes.get(key)
         if known is None or known.vanished_ns is not None:
             self._nodes[key] = Node(key[0], self._owner(gid), now_ns)
             self.changed_ns = now_ns
         return key
 
-    def _see_endpoint(self, kind: Kind, topic: str, info: TopicEndpointInfo, now_ns: int) -> str:
-        gid = bytes(info.endpoint_gid)
+    def _see_endpoint(self, kind: Kind, topic: str, found: dict[str, Any], now_ns: int) -> str:
+        gid = bytes(found["endpoint_gid"])
         key = gid.hex()
         if key not in self._endpoints:
+            info = TopicEndpointInfo(**found)
             self._endpoints[key] = Endpoint(
                 kind=kind,
                 topic=topic,

@@ -31,7 +31,7 @@ from grader.run.process.process_sandbox import ProcessSandbox, SandboxedProcess
 
 _AFTERMATH_S = 0.5
 _STOP_TICK_S = 0.005
-_LOOK_S = 0.2
+_LOOK_S = 0.5
 """Time between two looks whether a process was stopped by a signal."""
 _SUSPENDED_NS = NS // 2
 """What was stopped for so long will not go on by itself."""
