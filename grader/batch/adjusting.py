@@ -41,8 +41,7 @@ class ClassAdjustments:
         if row.result is None:
             return row
         result, notes = self._with_notes(row.result)
-        problem = "; ".join(filter(None, (row.entry.problem, *notes)))
-        return replace(row, entry=replace(row.entry, problem=problem), result=result)
+        return replace(row, entry=row.entry.with_problem(*notes), result=result)
 
     def _with_notes(self, result: Result) -> tuple[Result, tuple[str, ...]]:
         key = result.submission.id

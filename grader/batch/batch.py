@@ -143,8 +143,7 @@ class Batch:
             entry, result = self._entries[key], self.ledger.result(key)
             version = (entry.sha256, self.loaded.sha256)
             if result is None or (result.submission.sha256, result.assignment.sha256) != version:
-                problem = "; ".join(filter(None, (entry.problem, NOT_YET)))
-                entry, result = replace(entry, problem=problem), None
+                entry, result = entry.with_problem(NOT_YET), None
             left.append(Done(entry, result, fresh=False))
         return left
 
@@ -273,8 +272,7 @@ class Batch:
                 self._entries[name] = kept
             except RosgradeError as error:
                 why = f"an earlier attempt could not be kept: {error}".partition("\n")[0]
-                problem = "; ".join(filter(None, (entry.problem, why)))
-                self._entries[key] = replace(entry, problem=problem)
+                self._entries[key] = entry.with_problem(why)
 
     def _write(self) -> None:
         loaded = self.loaded

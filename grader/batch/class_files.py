@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from grader.batch.adjusting import ClassAdjustments
@@ -35,7 +34,7 @@ _MOST_TWINS = 5
 def notes(done: Sequence[Done]) -> dict[str, str]:
     """What an instructor should know of each row, in a few words; empty for an ordinary one."""
     same = _same(done)
-    return {item.entry.key: _note(item, same.get(_original(item.entry), ())) for item in done}
+    return {item.entry.key: _note(item, same.get(item.entry.original, ())) for item in done}
 
 
 def copies(done: Sequence[Done]) -> int:
@@ -48,13 +47,9 @@ def _same(done: Sequence[Done]) -> dict[str, list[Entry]]:
     originals = {item.entry.same_as for item in done}
     same: dict[str, list[Entry]] = {key: [] for key in originals if key}
     for item in done:
-        if _original(item.entry) in same:
-            same[_original(item.entry)].append(item.entry)
+        if item.entry.original in same:
+            same[item.entry.original].append(item.entry)
     return same
-
-
-def _original(entry: Entry) -> str:
-    return entry.same_as or entry.key
 
 
 def _hand(entry: Entry) -> str:
@@ -84,8 +79,7 @@ def standing(ledger: Ledger, entry: Entry) -> Done:
     if result is not None and entry.sha256 in ("", result.submission.sha256):
         return Done(entry, result, fresh=False)
     if entry.sha256 and not entry.fault:
-        problem = "; ".join(part for part in (entry.problem, NO_RESULT) if part)
-        entry = replace(entry, problem=problem)
+        entry = entry.with_problem(NO_RESULT)
     return Done(entry, None, fresh=False)
 
 

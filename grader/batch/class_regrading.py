@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
@@ -62,7 +62,7 @@ def regrade_class(
     adjust.vanished()
     refuse_other(ledger.out, written.assignment, loaded)
     chosen = {
-        entry.same_as or entry.key
+        entry.original
         for entry in entries
         if only is None or ledger.folder(entry.key).name == only.resolve().name
     }
@@ -70,7 +70,7 @@ def regrade_class(
         before = ledger.result(entry.key)
         if entry.fault:
             yield Regraded(Done(entry, None, fresh=False), None, problem=entry.fault)
-        elif (entry.same_as or entry.key) not in chosen:
+        elif entry.original not in chosen:
             yield Regraded(standing(ledger, entry), before)
         elif before is not None and entry.sha256 in ("", before.submission.sha256):
             yield _regrade(loaded, ledger, entry, before, adjust, write=write)
@@ -118,5 +118,5 @@ def _regrade(
 
 
 def _not_judged(entry: Entry, before: Result | None, why: str) -> Regraded:
-    problem = "; ".join(part for part in (entry.problem, f"not judged again: {why}") if part)
-    return Regraded(Done(replace(entry, problem=problem), before, fresh=False), before, problem=why)
+    noted = entry.with_problem(f"not judged again: {why}")
+    return Regraded(Done(noted, before, fresh=False), before, problem=why)

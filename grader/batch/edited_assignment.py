@@ -22,11 +22,6 @@ _BEFORE = "before.json"
 _LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "rosgrade-report")
 
 
-def load_used(ledger: Ledger) -> LoadedAssignment:
-    """The assignment that a class is graded with."""
-    return _load(ledger, ledger.read().location)
-
-
 def check_lines(loaded: LoadedAssignment, check: str) -> tuple[int, str]:
     """The number of the first line of a check in ``assignment.yaml``, and its lines."""
     lines = loaded.file.read_text(encoding="utf-8").splitlines(keepends=True)

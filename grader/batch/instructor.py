@@ -29,7 +29,7 @@ def write_similarity(loaded: LoadedAssignment, ledger: Ledger) -> tuple[Path, in
     """Write the page of the submissions that are alike: its file, and how many pairs there are."""
     same: dict[str, list[Entry]] = {}
     for entry in _entries(ledger):
-        same.setdefault(entry.same_as or entry.key, []).append(entry)
+        same.setdefault(entry.original, []).append(entry)
     names = {key: ", ".join(one.name or one.key for one in found) for key, found in same.items()}
     known = _known(loaded)
     own = {

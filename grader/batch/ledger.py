@@ -11,7 +11,7 @@ import json
 import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -68,6 +68,15 @@ class Entry:
     def review_key(self) -> str:
         """Whose review is this row's: a team has one, that of its first member."""
         return self.team or self.key
+
+    @property
+    def original(self) -> str:
+        """Key of the row that was graded for all who handed in the same."""
+        return self.same_as or self.key
+
+    def with_problem(self, *problems: str) -> Entry:
+        """The row with more problems."""
+        return replace(self, problem="; ".join(filter(None, (self.problem, *problems))))
 
 
 @dataclass(frozen=True)

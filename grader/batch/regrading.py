@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader import resources
-from grader.assignment.load import LoadedAssignment, list_assignments
+from grader.assignment.load import LoadedAssignment, list_assignments, load_assignment
 from grader.assignment.selection import visible_part
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
+from grader.batch.ledger import Ledger
 from grader.batch.reference_run import read_references
 from grader.errors import UsageError
 from grader.findings.finding import Status
@@ -93,6 +94,17 @@ def stored_assignment(path: Path, name: str, location: str | None, *command: str
     raise UsageError(
         f"{path}: was graded with the assignment {name!r}{lay}; name its folder: "
         f"`{shlex.join(('rosgrade', *command))} FOLDER`"
+    )
+
+
+def load_used(
+    ledger: Ledger, named: str | None = None, command: str = "regrade"
+) -> LoadedAssignment:
+    """The assignment that a class is graded with, or another one that is named."""
+    used = ledger.read()
+    words = (command, str(ledger.out))
+    return load_assignment(
+        named or stored_assignment(ledger.out, used.assignment, used.location, *words)
     )
 
 

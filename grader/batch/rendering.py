@@ -49,8 +49,7 @@ def bring_up_to_date(
             try:
                 render_again(ledger.folder(entry.key), amended=adjust)
             except RosgradeError as error:
-                why = f"{NOT_UP_TO_DATE}: {error}"
-                entry = replace(entry, problem="; ".join(filter(None, (entry.problem, why))))
+                entry = entry.with_problem(f"{NOT_UP_TO_DATE}: {error}")
         rows.append(replace(row, entry=entry))
     return rows
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.options import AssignmentName, file_option
+from grader.cli.options import AssignmentName, ClassFolder, file_option
 from grader.cli.screen.console import print_error, print_warning, say
 from grader.findings.wording import counted
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from grader.report.model.class_row import RowStatus
 
 Folder = Annotated[Path, typer.Option("--out", help="Folder to write to.")]
-ClassFolder = Annotated[Path, typer.Argument(help="Folder of a batch.")]
 Results = Annotated[Path, typer.Argument(help="Folder with the reports of a class.")]
 File = Annotated[Path, file_option("--output", "-o", text="File to write.")]
 

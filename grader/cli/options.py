@@ -23,6 +23,13 @@ if TYPE_CHECKING:
 AssignmentName = Annotated[
     str, typer.Argument(help="Id of the assignment, or its folder.", callback=assignment_argument)
 ]
+UsedAssignment = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="[ASSIGNMENT]", help="Id or folder; by default the one used for grading."
+    ),
+]
+ClassFolder = Annotated[Path, typer.Argument(help="Folder of a batch.")]
 ReportFolder = Annotated[
     Path, typer.Option(help="Folder for report.html, result.json and the recordings.")
 ]

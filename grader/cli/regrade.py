@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.options import Quiet
+from grader.cli.options import Quiet, UsedAssignment
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
 
@@ -29,10 +29,7 @@ def regrade(
         Path,
         typer.Argument(help="Folder of a batch, of a report or of recordings, or one .mcap file."),
     ],
-    assignment: Annotated[
-        str | None,
-        typer.Argument(help="Id or folder; by default the one used for grading."),
-    ] = None,
+    assignment: UsedAssignment = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Show who would gain what, and write nothing.")
     ] = False,
@@ -118,22 +115,17 @@ def _write(ledger: Ledger, rows: Sequence[Regraded]) -> None:
 
 
 def _class(path: Path, assignment: str | None, quiet: bool, *, write: bool) -> None:
-    from grader.assignment.load import load_assignment
     from grader.batch.class_regrading import regrade_class
     from grader.batch.ledger import Ledger
-    from grader.batch.regrading import stored_assignment
+    from grader.batch.regrading import load_used
 
     began_s = time.monotonic()
     rows = []
     with Ledger(path).opened() as ledger:
-        written = ledger.read()
-        stored = assignment or stored_assignment(
-            path, written.assignment, written.location, "regrade", str(path)
-        )
-        loaded = load_assignment(stored)
+        loaded = load_used(ledger, assignment)
         say(f"Assignment: {loaded.file}")
         with Progress(quiet).shown() as progress:
-            progress.begin("judging", len(written.entries))
+            progress.begin("judging", len(ledger.read().entries))
             for row in regrade_class(loaded, ledger, write=write):
                 rows.append(row)
                 progress.advance(row.done.entry.key)

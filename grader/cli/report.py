@@ -17,16 +17,14 @@ from grader.cli.formats import (
     JunitFamilyName,
     with_file_formats,
 )
+from grader.cli.options import UsedAssignment
 from grader.cli.screen.console import print_warning, say
 
 
 @with_file_formats
 def report(
     out: Annotated[Path, typer.Argument(help="A report folder, or the folder of a class.")],
-    assignment: Annotated[
-        str | None,
-        typer.Argument(help="Id or folder; by default the one used for grading."),
-    ] = None,
+    assignment: UsedAssignment = None,
     files: FormatFiles = MappingProxyType({}),
     junit_family: JunitFamilyName = JunitFamily.XUNIT2,
     gradescope_metadata: GradescopeMetadata = None,

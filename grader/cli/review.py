@@ -6,16 +6,16 @@ import subprocess
 import threading
 from contextlib import suppress
 from getpass import getuser
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from grader.cli.options import ClassFolder
 from grader.cli.screen.console import open_page, say
 
 
 def review(
-    out: Annotated[Path, typer.Argument(help="Folder of a batch.")],
+    out: ClassFolder,
     port: Annotated[
         int, typer.Option(min=0, max=65535, metavar="N", help="Port; 0 means any free port.")
     ] = 0,

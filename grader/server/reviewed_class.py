@@ -10,9 +10,9 @@ from grader.assignment.load import LoadedAssignment
 from grader.batch.adjusting import ClassAdjustments
 from grader.batch.batch import Done
 from grader.batch.class_files import class_rows, standing
-from grader.batch.edited_assignment import load_used
 from grader.batch.files import RESULT_FILE
 from grader.batch.ledger import BATCH_FILE, Entry, Ledger
+from grader.batch.regrading import load_used
 from grader.errors import RosgradeError, UsageError
 from grader.report.files import folder_name
 from grader.report.model.class_row import ClassRow
