@@ -173,7 +173,7 @@ def test_a_cause_is_forgiven_with_a_click(visit: Opened, out: Path) -> None:
     assert (forgiven.reason, forgiven.by) == ("the handout was unclear", "AK")
 
 
-def test_a_changed_check_is_previewed_where_it_is_edited(visit: Opened) -> None:
+def test_a_changed_check_is_previewed_applied_and_taken_back(visit: Opened) -> None:
     page = visit("regrade?check=docs")
     text = page.locator("#text")
     text.fill(text.input_value().replace("80 %", "oops"))
@@ -183,3 +183,7 @@ def test_a_changed_check_is_previewed_where_it_is_edited(visit: Opened) -> None:
     page.get_by_role("button", name="Preview").click()
     expect(page.get_by_text("3 students gain 12 points")).to_be_visible()
     expect(text).to_have_value(re.compile("share: 50 %"))
+    page.get_by_role("button", name="Apply").click()
+    page.get_by_role("button", name="Back").click()
+    expect(page.get_by_text("3 lose 12")).to_be_visible()
+    expect(page.get_by_role("button", name="Back")).to_be_hidden()
