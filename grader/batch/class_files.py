@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -31,24 +32,16 @@ NO_RESULT = "it has no result; run the batch again"
 _MOST_TWINS = 5
 
 
-def notes(done: Sequence[Done]) -> dict[str, str]:
-    """What an instructor should know of each row, in a few words; empty for an ordinary one."""
-    same = _same(done)
-    return {item.entry.key: _note(item, same.get(item.entry.original, ())) for item in done}
-
-
 def copies(done: Sequence[Done]) -> int:
     """How many submissions are the same as another one; what a team shares is one."""
-    return sum(len({_hand(entry) for entry in same}) - 1 for same in _same(done).values())
+    return sum(len(set(map(_hand, same))) - 1 for same in _same(done).values())
 
 
 def _same(done: Sequence[Done]) -> dict[str, list[Entry]]:
-    """Rows with the same submission, by the key of the one that was graded for all of them."""
-    originals = {item.entry.same_as for item in done}
-    same: dict[str, list[Entry]] = {key: [] for key in originals if key}
+    """Rows by the key of the one that was graded for all with the same submission."""
+    same: dict[str, list[Entry]] = defaultdict(list)
     for item in done:
-        if item.entry.original in same:
-            same[item.entry.original].append(item.entry)
+        same[item.entry.original].append(item.entry)
     return same
 
 
@@ -85,7 +78,7 @@ def standing(ledger: Ledger, entry: Entry) -> Done:
 
 def class_rows(done: Sequence[Done], ledger: Ledger | None = None) -> list[ClassRow]:
     """The rows of a class as the overview shows them, sorted by key."""
-    noted = notes(done)
+    same = _same(done)
     own = (item for item in done if not item.entry.attempt_of)
     rows = sorted(own, key=lambda item: item.entry.key)
     return [
@@ -94,7 +87,7 @@ def class_rows(done: Sequence[Done], ledger: Ledger | None = None) -> list[Class
             name=item.entry.name,
             report=_report(item, ledger),
             result=item.result,
-            note=noted[item.entry.key],
+            note=_note(item, same[item.entry.original]),
             late=item.entry.late or _is_late(item.result),
             missing=not (item.entry.sha256 or item.entry.fault),
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from grader.batch.handed_in import HandedIn, with_problem
+from grader.batch.handed_in import HandedIn
 from grader.course.load import Course, login
 from grader.errors import UsageError
 from grader.findings.wording import listing
@@ -20,7 +20,7 @@ def with_groups(rows: Sequence[HandedIn], course: Course | None) -> list[HandedI
         paths = {rows[at].path for at in handed}
         for at in members if len(paths) > 1 else ():
             names = listing([rows[one].key for one in handed])
-            found[at] = with_problem(rows[at], f"{names} of one group handed in different files")
+            found[at] = rows[at].with_problem(f"{names} of one group handed in different files")
         for at in members if len(paths) == 1 else ():
             if at not in handed:
                 found[at] = _shared(rows[handed[0]], rows[at])

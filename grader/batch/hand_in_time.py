@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from grader.batch.handed_in import HandedIn, with_problem
+from grader.batch.handed_in import HandedIn
 from grader.course.instant import read_time
 from grader.errors import GraderFault
 from grader.submission.git import run_git
@@ -35,7 +35,7 @@ def timed(rows: Sequence[HandedIn], staging: Path) -> list[HandedIn]:
             problem = f"when it was handed in is not known: {error}"
         if row.path is not None and not time[0]:
             time = _of_commit(row.path, staging / "committed")
-        found.append(replace(with_problem(row, problem) if problem else row, time=time))
+        found.append(replace(row.with_problem(problem), time=time))
     return found
 
 

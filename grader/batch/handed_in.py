@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from grader.batch.roster import Student
 from grader.submission.intake.archive import SUFFIXES
 from grader.submission.read.manifest import MANIFEST
 
@@ -44,6 +45,21 @@ class HandedIn:
     earlier: tuple[tuple[Path, tuple[str, str]], ...] = ()
     attempt_of: str = ""
 
+    def with_problem(self, problem: str) -> HandedIn:
+        """The row with a problem more."""
+        return replace(self, problem="; ".join(filter(None, (problem, self.problem))))
+
+    def of(self, student: Student) -> HandedIn:
+        """The row with what a roster says of its student."""
+        return replace(
+            self,
+            key=student.key,
+            name=student.name,
+            problem=student.problem,
+            email=student.email,
+            columns=student.columns,
+        )
+
 
 @dataclass(frozen=True)
 class Entry:
@@ -73,11 +89,6 @@ def stem_of(item: Path) -> str:
     known = (*SUFFIXES, *FOREIGN)
     suffix = next((s for s in known if item.is_file() and item.name.lower().endswith(s)), "")
     return item.name[: len(item.name) - len(suffix)] or item.name
-
-
-def with_problem(row: HandedIn, problem: str) -> HandedIn:
-    """The row with a problem more."""
-    return replace(row, problem="; ".join(part for part in (problem, row.problem) if part))
 
 
 def _archive_in(folder: Path) -> Path | None:

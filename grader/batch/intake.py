@@ -23,7 +23,6 @@ from grader.batch.handed_in import (
     only_archive,
     row_of,
     stem_of,
-    with_problem,
 )
 from grader.batch.roster import Roster, Student
 from grader.batch.roster_match import matched, unique
@@ -99,16 +98,9 @@ def take_in_roster(
 
 
 def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn | None) -> HandedIn:
-    row = HandedIn(
-        student.key,
-        None,
-        student.name,
-        problem=student.problem,
-        email=student.email,
-        columns=student.columns,
-    )
+    row = HandedIn("", None).of(student)
     if not student.submission:
-        return with_problem(row, "handed in nothing")
+        return row.with_problem("handed in nothing")
     if cloned is not None:
         return replace(row, path=cloned.path, fault=cloned.fault)
     if _REPOSITORY.match(student.submission):

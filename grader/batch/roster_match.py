@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
 
-from grader.batch.handed_in import Entry, HandedIn, row_of, stem_of, with_problem
+from grader.batch.handed_in import Entry, HandedIn, row_of, stem_of
 from grader.batch.roster import Roster, Student, name_forms, resemblance, written
 from grader.findings.wording import listing
 from grader.submission.intake.paths import shown
@@ -114,16 +114,14 @@ def matched(
             rows.append(replace(row_of(entry), problem="; ".join(filter(None, parts))))
             continue
         for key in sorted(keys):
-            student = students[key]
             handed.setdefault(key, []).append((len(rows), shown(entry.path.name)))
-            row = replace(row_of(entry), key=key, name=student.name, problem=student.problem)
-            rows.append(replace(row, columns=student.columns, email=student.email))
+            rows.append(row_of(entry).of(students[key]))
     for key, found in handed.items():
         for at, file in found if len(found) > 1 else ():
             others = [other for _, other in found[:_MOST_TWICE] if other != file] or [file]
-            rows[at] = with_problem(rows[at], f"handed in twice: {listing(others)} too")
+            rows[at] = rows[at].with_problem(f"handed in twice: {listing(others)} too")
         for at, _ in found if key in doubtful else ():
-            rows[at] = with_problem(rows[at], f"{listing(doubtful[key])} may be theirs too")
+            rows[at] = rows[at].with_problem(f"{listing(doubtful[key])} may be theirs too")
     for student in roster.students:
         if student.key not in handed:
             row = _missing(student)
@@ -138,9 +136,7 @@ def _missing(student: Student) -> HandedIn:
     why = "handed in nothing"
     if student.submission:
         why += f": {shown(student.submission)} is not among the submissions"
-    row = HandedIn(student.key, None, student.name, problem=student.problem)
-    row = replace(row, columns=student.columns, email=student.email)
-    return with_problem(row, why)
+    return HandedIn("", None).of(student).with_problem(why)
 
 
 def unique(rows: list[HandedIn]) -> list[HandedIn]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
@@ -40,19 +40,9 @@ class Question:
     weight: int
 
 
-Rule = Callable[[Work], Iterator[Question]]
-_RULES: list[Rule] = []
-
-
-def rule(apply: Rule) -> Rule:
-    """Put a rule into the catalogue."""
-    _RULES.append(apply)
-    return apply
-
-
 def ask(work: Work) -> list[Question]:
     """The most special questions about a work, of different rules if possible; always the same."""
-    found = [sorted(apply(work), key=lambda one: -one.weight) for apply in _RULES]
+    found = [sorted(rule(work), key=lambda one: -one.weight) for rule in _RULES]
     ranked = [(turn, -one.weight, one) for asked in found for turn, one in enumerate(asked)]
     chosen: list[Question] = []
     for *_, one in sorted(ranked, key=lambda item: item[:2]):
@@ -62,7 +52,6 @@ def ask(work: Work) -> list[Question]:
     return chosen[:QUESTIONS]
 
 
-@rule
 def slow_callback(work: Work) -> Iterator[Question]:
     """One run of a callback took much longer than the others."""
     for recording in work.recordings:
@@ -83,7 +72,6 @@ def slow_callback(work: Work) -> Iterator[Question]:
                 yield Question(text, work.evidence(rf"\b{method}\b"), 5)
 
 
-@rule
 def pause(work: Work) -> Iterator[Question]:
     """Nothing was published for much longer than usual."""
     for recording, messages in work.published():
@@ -98,7 +86,6 @@ def pause(work: Work) -> Iterator[Question]:
             yield Question(text, work.evidence(r"\bpublish\("), 4)
 
 
-@rule
 def jump(work: Work) -> Iterator[Question]:
     """A published number changes at once."""
     for recording, messages in work.published():
@@ -120,7 +107,6 @@ def jump(work: Work) -> Iterator[Question]:
             yield Question(text, (*work.evidence(rf"\b{re.escape(field)}\s*=[^=]"), *seen), 4)
 
 
-@rule
 def timer(work: Work) -> Iterator[Question]:
     """Another period of a timer."""
     places = list(work.places(r"\bcreate_(?:wall_)?timer\b"))
@@ -140,7 +126,6 @@ def timer(work: Work) -> Iterator[Question]:
         yield Question(text, (str(place), *facts), 1 + 2 * work.is_rare(place))
 
 
-@rule
 def parameter(work: Work) -> Iterator[Question]:
     """Another default of a parameter."""
     pattern = r"\bdeclare_parameter(?:<[^>]*>)?\(\s*[\"']([^\"']+)[\"']\s*,\s*([^,)]+)"
@@ -154,7 +139,6 @@ def parameter(work: Work) -> Iterator[Question]:
         yield Question(text, tuple(dict.fromkeys((str(place), *uses))), 1 + 2 * work.is_rare(place))
 
 
-@rule
 def queue(work: Work) -> Iterator[Question]:
     """Another depth of a queue."""
     for place in work.places(r"\bcreate_(publisher|subscription)\b"):
@@ -173,7 +157,6 @@ def queue(work: Work) -> Iterator[Question]:
         yield Question(text, (str(place), *ends), 2 * work.is_rare(place))
 
 
-@rule
 def line(work: Work) -> Iterator[Question]:
     """A condition; where there is none, any line."""
     conditions = work.places(r"^(?:if|elif|while|\} else if)\b(?! __name__)")
@@ -185,6 +168,9 @@ def line(work: Work) -> Iterator[Question]:
         for place in sorted(places, key=lambda one: -len(one.text)):
             text = f"{place.short} reads {code(place.text)}. {asked}"
             yield Question(text, (str(place),), weight + 2 * work.is_rare(place))
+
+
+_RULES = (slow_callback, pause, jump, timer, parameter, queue, line)
 
 
 def _at(recording: Recording, time_ns: int) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import errno
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +18,7 @@ from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.variable import Variable
 from grader.batch.batch import NOT_YET, Batch, Done
-from grader.batch.class_files import copies, find_reports, notes
+from grader.batch.class_files import class_rows, copies, find_reports
 from grader.batch.executor import BatchExecutor, ExecutorLost, LocalExecutor
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
@@ -43,6 +43,11 @@ scenarios:
 checks:
   - {id: package, uses: package.found, with: {package: bot}, points: 1}
 """
+
+
+def notes_of(done: Sequence[Done]) -> dict[str, str]:
+    """What the class says of each row."""
+    return {row.id: row.note for row in class_rows(done)}
 
 
 class Class:
@@ -143,7 +148,7 @@ def test_two_who_handed_in_nothing_did_not_copy_from_each_other(course: Class) -
         (course.folder / "class" / name).mkdir()
     done = course.grade(course.executor())
     assert [done[key].entry.same_as for key in ("cai", "dora", "emil")] == ["ana", "", ""]
-    told = notes(list(done.values()))
+    told = notes_of(list(done.values()))
     assert told["dora"] == told["emil"] == "the submission is empty"
 
 
@@ -161,7 +166,7 @@ def test_the_source_of_each_lies_beside_its_result_also_of_the_same_submission(
 
 def test_each_of_those_who_handed_in_the_same_names_the_others(course: Class) -> None:
     course.hand_in("dora", "first")
-    told = notes(list(course.grade(course.executor()).values()))
+    told = notes_of(list(course.grade(course.executor()).values()))
     assert {key: note.partition(";")[0] for key, note in told.items() if key != "ben"} == {
         "ana": "the same submission as cai and dora",
         "cai": "the same submission as ana and dora",
@@ -177,11 +182,11 @@ def test_a_team_did_not_copy_from_itself_but_may_have_been_copied_from(course: C
         "dora:\n  :submitters:\n  - :name: Dora\n  - :name: Dan\n"
     )
     done = list(course.grade(course.executor()).values())
-    assert {key: "same submission" in note for key, note in notes(done).items()} == {
+    assert {key: "same submission" in note for key, note in notes_of(done).items()} == {
         **dict.fromkeys(("Ana", "Abe", "cai"), True),
         **dict.fromkeys(("Dora", "Dan", "ben"), False),
     }
-    told = {key: note.partition(";")[0] for key, note in notes(done).items()}
+    told = {key: note.partition(";")[0] for key, note in notes_of(done).items()}
     assert told["Ana"] == told["Abe"] == "the same submission as cai"
     assert told["cai"] == "the same submission as Abe and Ana"
     assert copies(done) == 1
@@ -196,18 +201,18 @@ def test_a_team_did_not_copy_from_itself_but_may_have_been_copied_from(course: C
 def test_of_very_many_the_same_a_few_are_named() -> None:
     first = Done(Entry("0"), None, fresh=False)
     same = [Done(Entry(str(number), same_as="0"), None, fresh=False) for number in range(1, 500)]
-    told = notes([first, *same])
+    told = notes_of([first, *same])
     assert told["0"] == "the same submission as 1, 2, 3, 4, 5 and 494 others"
     assert told["2"] == "the same submission as 0, 1, 3, 4, 5 and 494 others"
     assert told["499"] == "the same submission as 0, 1, 2, 3, 4 and 494 others"
-    assert notes([first, *same[:6]])["6"] == "the same submission as 0, 1, 2, 3, 4 and 1 other"
+    assert notes_of([first, *same[:6]])["6"] == "the same submission as 0, 1, 2, 3, 4 and 1 other"
 
 
 def test_the_row_of_what_was_not_graded_says_why() -> None:
     sample = not_graded()
     result = make_result(sample.grade, sample.recordings, sample.facts)
     observed = next(c.observed for c in result.checks if c.status is Status.ERROR)
-    assert notes([Done(Entry("ana"), result, fresh=True)])["ana"] == f"not graded: {observed}"
+    assert notes_of([Done(Entry("ana"), result, fresh=True)])["ana"] == f"not graded: {observed}"
 
 
 def test_a_full_disk_is_the_machine_s_and_says_what_to_do(course: Class) -> None:
