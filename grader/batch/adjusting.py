@@ -57,4 +57,7 @@ class ClassAdjustments:
 
     def vanished(self) -> tuple[str, ...]:
         """Students with a review that no row of the class uses; every review is read for it."""
-        return self._store.vanished({entry.review_key for entry in self._entries.values()})
+        keys = {entry.review_key for entry in self._entries.values()}
+        for key in keys:
+            self._store.student(key)
+        return self._store.vanished(keys)

@@ -2,8 +2,11 @@
 
 from pathlib import Path
 
+import pytest
+
 from grader.batch.adjusting import ClassAdjustments
 from grader.batch.ledger import Entry, Ledger
+from grader.errors import AssignmentError
 from grader.report.model.result_model import Result
 from grader.review.model import Comment, StudentReview
 from grader.review.store import ReviewStore
@@ -33,3 +36,7 @@ def test_a_team_has_one_review_that_of_its_first_member(tmp_path: Path) -> None:
     # What no row uses is named, and stays.
     assert adjust.vanished() == ("ben", "zoe")
     assert store.student("ben").content.comments[0].text == "to ben"
+    # One that cannot be read is an error before anything is written.
+    store.file("cai").write_text("key: cai\ncomments: [nice]\n", encoding="utf-8")
+    with pytest.raises(AssignmentError):
+        adjust.vanished()
