@@ -38,33 +38,21 @@ def bring_up_to_date(
         The rows with the results as they are now.
     """
     adjust = ClassAdjustments(ledger, now)
+    released = adjust.visible - VISIBLE_ONLY
     rows = []
     for before in done:
         row = adjust.row(before)
         entry, result = row.entry, row.result
-        if result is not None and (
-            not _same_additions(result, before.result)
-            or (row.fresh and _is_released(result, adjust.visible))
-        ):
+        shows_more = row.fresh and any(
+            check.visibility in released for check in (result.checks if result else ())
+        )
+        if result != before.result or shows_more:
             try:
                 render_again(ledger.folder(entry.key), amended=adjust)
             except RosgradeError as error:
                 entry = entry.with_problem(f"{NOT_UP_TO_DATE}: {error}")
         rows.append(replace(row, entry=entry))
     return rows
-
-
-def _same_additions(one: Result, other: Result | None) -> bool:
-    parts = [
-        (each.adjustments, each.comments, each.attempts)
-        for each in (one, other)
-        if each is not None
-    ]
-    return parts[0] == parts[-1]
-
-
-def _is_released(result: Result, visible: frozenset[str]) -> bool:
-    return any(check.visibility in visible - VISIBLE_ONLY for check in result.checks)
 
 
 def render_again(
@@ -79,8 +67,10 @@ def render_again(
     """
     found = find(folder)
     result = found.result or read_result(folder / RESULT_FILE)
-    loaded = _load(assignment or _stored(folder, result))
-    if loaded.sha256 != result.assignment.sha256:
+    used = result.assignment
+    words = ("report", str(folder))
+    loaded = _load(assignment or stored_assignment(folder, used.id, used.location, *words))
+    if loaded.sha256 != used.sha256:
         raise UsageError(
             f"{folder}: the assignment has changed since this was graded. "
             f"{regrade_command(folder, loaded)} judges again with the new assignment"
@@ -98,11 +88,6 @@ def render_again(
     if now != result:
         write_whole(folder / RESULT_FILE, result_json(now))
     return now
-
-
-def _stored(folder: Path, result: Result) -> str:
-    assignment = result.assignment
-    return stored_assignment(folder, assignment.id, assignment.location, "report", str(folder))
 
 
 def _changed(result: Result, grade: Grade) -> list[str]:
