@@ -28,7 +28,7 @@ from grader.run.cell.domain import lock_domain
 from sim.description import SimulatorOptions
 from sim.motion import NS, Pose, Twist
 from sim.node import RosSimulator, make_node
-from sim.pacing import Lateness
+from sim.pacing import MAX_AHEAD, Lateness
 from sim.simulation import STEP_NS, EventKind, Step, make_simulation
 from sim.world import parse_world
 
@@ -78,9 +78,9 @@ class Bench:
         rclpy.init(context=context, domain_id=self.domain_id)
         return context
 
-    def simulator(self, **options: object) -> RosSimulator:
-        read = SimulatorOptions.model_validate(options)
-        return RosSimulator(self.node, make_simulation(ROOM, read), self.truth, lambda: self.now_ns)
+    def simulator(self, *, recorders: int = -1, **options: object) -> RosSimulator:
+        simulation = make_simulation(ROOM, SimulatorOptions.model_validate(options))
+        return RosSimulator(self.node, simulation, self.truth, lambda: self.now_ns, recorders)
 
     def wait(self, condition: Callable[[], bool], what: str) -> None:
         """Serve the student's node until something holds."""
@@ -121,6 +121,26 @@ def command(v: float, w: float) -> TwistMessage:
     message = TwistMessage()
     message.linear.x, message.angular.z = v, w
     return message
+
+
+def test_odometry_is_published_on_time_as_soon_as_another_than_the_recorder_hears_it(
+    bench: Bench,
+) -> None:
+    simulator = bench.simulator(recorders=1, lidar={"enabled": False})
+    recorded = bench.listen(Odometry, "/odom", 100)
+    count = simulator.odometry.publisher.get_subscription_count
+    bench.wait(lambda: count() == 1, "match")
+    simulator.start()
+    bench.now_ns = STEP_NS
+    together_ns = simulator.catch_up()
+    assert together_ns == STEP_NS + MAX_AHEAD * STEP_NS
+    bench.listen(Odometry, "/odom")
+    bench.wait(lambda: count() == 2, "second match")
+    bench.now_ns = together_ns
+    assert simulator.catch_up() == 14 * STEP_NS
+    bench.wait(lambda: len(recorded) == 3, "odometry")
+    stamps = [one.header.stamp.nanosec for one in recorded]
+    assert [(later - sooner) % NS for sooner, later in pairwise(stamps)] == [30_000_000] * 2
 
 
 @pytest.mark.parametrize("continuous", [False, True])
