@@ -42,6 +42,7 @@ class Background:
         self._ledger = reviewed.ledger
         self._worker = ThreadPoolExecutor(1, "background")
         self._next: Future[None] | None = None
+        self._ended = False
         self._worker.submit(reviewed.rows)
         self.refresh()
 
@@ -60,6 +61,7 @@ class Background:
 
     def close(self) -> None:
         """End, when all that was begun is written."""
+        self._ended = True
         self._worker.shutdown()
 
     def _refresh(self) -> None:
@@ -77,6 +79,8 @@ class Background:
             with self._ledger.opened() if write else nullcontext():
                 for row in regrade_class(loaded, self._ledger, write=write):
                     judging.rows.append(row)
+                    if self._ended and not write:
+                        break
                 if write:
                     write_regraded(judging.rows, self._ledger)
         except Exception as error:
