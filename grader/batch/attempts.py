@@ -9,12 +9,11 @@ from pathlib import Path
 from grader.batch.files import RESULT_FILE
 from grader.batch.ledger import EARLIER, keep_earlier
 from grader.errors import RosgradeError
-from grader.findings.finding import Status
 from grader.report.model.class_result import for_class
 from grader.report.model.result import read_result, result_json
-from grader.report.model.result_model import AttemptPart, CheckPart, Result
+from grader.report.model.result_model import AttemptPart, Result
 from grader.report.model.student import for_student
-from grader.report.text.words import STATUS, number
+from grader.report.text.last_save import change, changed_checks
 from grader.safe_text import one_line
 
 MOST_KEPT = 20
@@ -77,21 +76,8 @@ def with_history(folder: Path, result: Result) -> Result:
 
 def _changes(before: Result, after: Result) -> tuple[str, ...]:
     """Which checks ended differently, a line each."""
-    known = {check.id: check for check in before.checks}
-    return tuple(
-        _change(known[check.id], check)
-        for check in after.checks
-        if check.id in known
-        and (known[check.id].status, known[check.id].points) != (check.status, check.points)
-    )
-
-
-def _change(before: CheckPart, after: CheckPart) -> str:
-    words = f"was {STATUS[before.status].word}, now {STATUS[after.status].word}"
-    judged = Status.ERROR not in (before.status, after.status)
-    if judged and before.points != after.points:
-        words += f" ({number(before.points)} → {number(after.points)} points)"
-    return f"{one_line(after.title)}: {words}"
+    changed = changed_checks(before, after)
+    return tuple(f"{one_line(new.title)}: {change(old, new)}" for old, new in changed)
 
 
 def _kind(result: Result) -> tuple[str, frozenset[str]]:

@@ -41,8 +41,8 @@ def test_each_attempt_says_what_changed_since_the_one_before():
         True,
     )
     assert second.changes == (
-        "The period of `/chatter`: was failed, now passed (0 → 3 points)",
-        "The secret: was failed, now passed (0 → 2 points)",
+        "The period of `/chatter`: failed → passed, +3",
+        "The secret: failed → passed, +2",
     )
 
 

@@ -146,7 +146,7 @@ def make_run(**changes: object) -> Recording:
 
 def attempts(*scores: float | None, **changes: Any) -> tuple[AttemptPart, ...]:
     """Attempts with these scores, of which the last counts."""
-    change = "Rate of `/chatter`: was failed, now passed (0 → 3 points)"
+    change = "Rate of `/chatter`: failed → passed, +3"
     return tuple(
         AttemptPart(
             score=score,

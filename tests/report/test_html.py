@@ -208,7 +208,7 @@ def test_earlier_attempts_are_shown_with_what_changed():
     sample = replace(full_points(), added={"attempts": attempts(1.0, None, 4.25)})
     text = squeezed(page(sample).text)
     assert "Attempt 3 ; the one before had no score." in text
-    assert "3 counts 4.25 / 10 Rate of /chatter: was failed, now passed (0 → 3 points)" in text
+    assert "3 counts 4.25 / 10 Rate of /chatter: failed → passed, +3" in text
     assert "2 not graded" in text and "1 1 / 10 the first that is known" in text
 
 

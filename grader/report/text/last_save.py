@@ -17,16 +17,31 @@ _LONGEST = 120
 
 def what_changed(before: Result, after: Result) -> str:
     """``period: failed → passed, +1.5``; of many checks those with the most points."""
-    known = {check.id: check for check in before.checks}
-    pairs = [(known[check.id], check) for check in after.checks if check.id in known]
-    changed = [
-        (old, new) for old, new in pairs if (old.status, old.points) != (new.status, new.points)
-    ]
-    changed.sort(key=lambda pair: -abs(_gain(*pair)))
-    lines = [_line(old, new) for old, new in changed[:_MOST]]
-    counts = {"more": len(changed) - len(lines), "new": len(after.checks) - len(pairs)}
+    changed = sorted(changed_checks(before, after), key=lambda pair: -abs(_gain(*pair)))
+    lines = [f"{new.id}: {change(old, new)}" for old, new in changed[:_MOST]]
+    known = {check.id for check in before.checks}
+    new = sum(check.id not in known for check in after.checks)
+    counts = {"more": len(changed) - len(lines), "new": new}
     lines += [f"{count} {what}" for what, count in counts.items() if count]
     return "; ".join(lines) or "no check changed"
+
+
+def changed_checks(before: Result, after: Result) -> list[tuple[CheckPart, CheckPart]]:
+    """The checks that ended differently: before, and after."""
+    known = {check.id: check for check in before.checks}
+    pairs = ((known[check.id], check) for check in after.checks if check.id in known)
+    return [
+        (old, new) for old, new in pairs if (old.status, old.points) != (new.status, new.points)
+    ]
+
+
+def change(old: CheckPart, new: CheckPart) -> str:
+    """``failed → passed, +1.5``."""
+    words = STATUS[new.status].word
+    if old.status is not new.status:
+        words = f"{STATUS[old.status].word} → {words}"
+    gain = _gain(old, new)
+    return words + (f", {'+' if gain > 0 else '−'}{number(abs(gain))}" if gain else "")
 
 
 def early_line(check: CheckResult) -> str:
@@ -51,15 +66,6 @@ def bars(scores: Sequence[float | None], most: float) -> str:
         "·" if score is None else _BARS[round(steps * score / most) if most else 0]
         for score in scores
     )
-
-
-def _line(old: CheckPart, new: CheckPart) -> str:
-    words = STATUS[new.status].word
-    if old.status is not new.status:
-        words = f"{STATUS[old.status].word} → {words}"
-    gain = _gain(old, new)
-    sign = "+" if gain > 0 else "−"
-    return f"{new.id}: {words}" + (f", {sign}{number(abs(gain))}" if gain else "")
 
 
 def _gain(old: CheckPart, new: CheckPart) -> float:

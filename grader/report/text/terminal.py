@@ -54,7 +54,7 @@ def print_grade(console: Console, title: str, result: Result) -> None:
 def print_changes(
     console: Console, before: Result, after: Result, scores: Sequence[float | None] = ()
 ) -> None:
-    """Print which checks ended differently than in an earlier grade, and what to fix now.
+    """Print in one line what changed since an earlier grade, and what to fix now.
 
     Args:
         console: Where to; its width, colours and encoding are respected.
@@ -66,50 +66,24 @@ def print_changes(
     elif len(scores) > 1:
         changed += f"   {last_save.bars(scores, after.known_max_score)}"
     console.print(Text.assemble(("Since your last save: ", "bold"), _line(console, changed)))
-    known = {check.id: check for check in before.checks}
-    table = _grid(overflowing=2, right=3)
-    for check in after.checks:
-        old = known.get(check.id)
-        if old and (old.status, explanation.points(old)) == (
-            check.status,
-            explanation.points(check),
-        ):
-            continue
-        table.add_row(
-            _status(console, check.status),
-            Text(f"was {STATUS[old.status].word}" if old else "new", "dim"),
-            Text(_line(console, check.title)),
-            Text(explanation.points(check), "bold"),
-        )
-    if table.row_count:
-        console.print(table)
     first = [check for check in after.checks if check.id == after.first_to_fix]
     for check in first or after.of(Status.ERROR)[:1]:
         _explain(console, after, check)
     _conclude(console, after, before)
 
 
-def _grid(overflowing: int, right: int, *, expand: bool = False) -> Table:
-    """An empty table without lines, of so many columns as it has to the right one."""
-    table = Table.grid(padding=(0, 2, 0, 0), expand=expand)
-    for index in range(right + 1):
-        if index == overflowing:
-            table.add_column(overflow="fold")
-        else:
-            table.add_column(no_wrap=True, justify="right" if index == right else "left")
-    return table
-
-
 def _table(console: Console, result: Result) -> Table:
     wide = console.width >= _WIDE
-    # The last column gets the width that is left over, and takes none from the others.
-    table = _grid(overflowing=1, right=2, expand=wide)
     longest = max(cell_len(_line(console, check.title)) for check in result.checks)
+    table = Table.grid(padding=(0, 2, 0, 0), expand=wide)
+    table.add_column(no_wrap=True)
+    table.add_column(
+        overflow="fold", width=min(longest, _TITLE) if wide else None, min_width=min(longest, 10)
+    )
+    table.add_column(no_wrap=True, justify="right")
     if wide:
-        table.columns[1].width = min(longest, _TITLE)
+        # It gets the width that is left over, and takes none from the others.
         table.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
-    else:
-        table.columns[1].min_width = min(longest, 10)
     titles = {check.id: check.title for check in result.checks}
     for check in result.checks:
         row = [
