@@ -42,7 +42,8 @@ wheels: setup ## build both wheels in dist/: rosgrade, and the solutions for ins
 
 docs: setup ## regenerate docs/, and build the site in build/site
 	@$(run) -m grader.docs
-	@NO_MKDOCS_2_WARNING=1 $(run) -m mkdocs build --strict --quiet
+	@NO_MKDOCS_2_WARNING=1 ROSGRADE_REPOSITORY=$${ROSGRADE_REPOSITORY-$$(git config remote.origin.url | \
+		sed -n 's|^git@\([^:]*\):|https://\1/|; s|\.git$$||; /^https:/p')} $(run) -m mkdocs build --strict --quiet
 
 clean: ## remove .venv, caches and reports
 	@rm -rf .venv .hypothesis .mypy_cache .pytest_cache .ruff_cache build dist rosgrade-report

@@ -1,8 +1,8 @@
 """The documentation that is made from the code: ``python -m grader.docs [--check]``.
 
-``docs/assignment-yaml.md`` comes from the models of the YAML, ``docs/checks.md`` from the
-catalogue of checks, ``docs/recording.md`` from the model of a recording. Nothing in them is typed
-twice; with ``--check`` a stale file is an error.
+``docs/assignment-yaml.md`` comes from the models of the YAML, ``docs/checks.md`` with a page for each
+family from the catalogue of checks, ``docs/recording.md`` from the model of a recording. Nothing in
+them is typed twice; with ``--check`` a stale file is an error.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import re
 import sys
 from collections.abc import Mapping
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -24,13 +25,14 @@ from grader.assignment import limits, model, mutant, variable
 from grader.assignment.own_check import FOLDER, lesson_checks
 from grader.assignment.stimuli.stimulus import stimulus_models
 from grader.checks import window
-from grader.checks.catalogue import CATALOGUE
+from grader.checks.catalogue import CATALOGUE, families
 from grader.checks.check import Check, Subject
 from grader.checks.tolerance import TimeTolerance
 from grader.diagnosis.explanation import explanations
 from grader.findings import finding
 from grader.recording import event, interaction, simulated
 from grader.recording import model as recording
+from grader.report.concepts import concepts
 from grader.spec.unit import UNITS, Dimension, format_duration
 from sim import description, world_model
 from sim.motion import Pose
@@ -161,21 +163,24 @@ def assignment_markdown() -> str:
     )
 
 
-def checks_markdown() -> str:
-    """The catalogue of checks, and the checks beside the YAML of rosgrade's own assignments."""
-    checks = CATALOGUE.values()
-    folders = sorted(resources.assignments().glob(f"*/{FOLDER}"))
-    return _rendered(
-        "checks.md",
-        overview=[(f"[`{check.name}`]({_anchor(check.name)})", check.title) for check in checks],
-        catalogue=checks,
-        check_markdown=check_markdown,
-        lessons=[
-            (folder.parent.name, check)
-            for folder in folders
-            for check in lesson_checks(folder.parent).values()
-        ],
-    )
+def checks_markdown() -> dict[str, str]:
+    """The overview of all checks, a page for each family, and one for those of single lessons."""
+    pages: dict[str, list[tuple[str, Check]]] = {}
+    for check in CATALOGUE.values():
+        pages.setdefault(check.family, []).append(("", check))
+    for folder in sorted(resources.assignments().glob(f"*/{FOLDER}")):
+        found = lesson_checks(folder.parent).values()
+        pages.setdefault("lessons", []).extend((folder.parent.name, check) for check in found)
+    written = {"checks.md": _rendered("checks.md", pages=pages, anchor=_anchor)}
+    for family, entries in pages.items():
+        written[f"checks/{family}.md"] = _rendered(
+            "checks-family.md",
+            about=family in families() and inspect.getdoc(import_module(f"grader.checks.{family}")),
+            entries=entries,
+            check_markdown=check_markdown,
+            concepts=concepts(),
+        )
+    return written
 
 
 def explanations_markdown() -> str:
@@ -335,7 +340,7 @@ def documents() -> dict[str, str]:
     """Every generated file of ``docs/``, by name."""
     return {
         "assignment-yaml.md": assignment_markdown(),
-        "checks.md": checks_markdown(),
+        **checks_markdown(),
         "explanations.md": explanations_markdown(),
         "recording.md": recording_markdown(),
     }
@@ -356,7 +361,7 @@ def main(arguments: list[str] | None = None) -> int:
         if options.check:
             print(f"{file} is stale: run python -m grader.docs", file=sys.stderr)
         else:
-            options.folder.mkdir(exist_ok=True)
+            file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text, encoding="utf-8")
             print(file)
     return 1 if old and options.check else 0

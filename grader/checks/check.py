@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import wraps
 from typing import Any, ClassVar, Protocol
 
 from grader.checks.need import Doubt, Need
-from grader.findings.finding import Finding
+from grader.findings.finding import Finding, Status
 from grader.findings.value import EXACT, NoSuchField, Tolerance
 from grader.spec.source import Model
 
@@ -71,12 +71,16 @@ class NoParameters(Parameters):
 
 @dataclass(frozen=True)
 class Check:
-    """One entry of the catalogue: ``family.noun``, as in YAML's ``uses``, and its function."""
+    """One entry of the catalogue: ``family.noun``, as in YAML's ``uses``, and its function.
+
+    ``concept`` is the page of ``docs/concepts`` for a failure whose cause names no other.
+    """
 
     name: str
     subject: Subject
     parameters: type[Parameters]
     judge: Callable[[Any, Any], Finding]
+    concept: str = ""
 
     @property
     def documentation(self) -> str:
@@ -116,7 +120,7 @@ def stop_if(reason: Reason | None) -> None:
 
 
 def check(
-    name: str, subject: Subject, parameters: type[Parameters] = NoParameters
+    name: str, subject: Subject, parameters: type[Parameters] = NoParameters, concept: str = ""
 ) -> Callable[[Callable[[Any, Any], Finding]], Check]:
     """Make a :class:`Check` of a function; its docstring becomes the catalogue's text."""
 
@@ -124,14 +128,16 @@ def check(
         @wraps(judge)
         def judged(subject: Any, parameters: Any) -> Finding:
             try:
-                return judge(subject, parameters)
+                finding = judge(subject, parameters)
             except Unmet as unmet:
-                return unmet.reason.finding(parameters.asked_for)
+                finding = unmet.reason.finding(parameters.asked_for)
             except NoSuchField as error:
                 text = f"the assignment expects what cannot be: {error}"
                 return Finding.error(parameters.asked_for, text)
+            is_open = finding.status is Status.FAILED and not finding.concept
+            return replace(finding, concept=concept) if is_open else finding
 
-        return Check(name, subject, parameters, judged)
+        return Check(name, subject, parameters, judged, concept)
 
     return decorate
 

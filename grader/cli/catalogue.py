@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.screen.console import output_console, print_error, print_warning
+from grader.cli.screen.console import output_console, print_error, print_warning, say
 from grader.errors import RosgradeError
 from grader.findings.wording import counted
 
@@ -96,6 +96,41 @@ def schema(
         "$id": f"urn:rosgrade:schema:{document.value}:1",
     }
     typer.echo(json.dumps({**head, **make()}, indent=2))
+
+
+def explain(
+    name: Annotated[str | None, typer.Argument(help="One idea; by default all of them.")] = None,
+    html: Annotated[
+        bool, typer.Option("--html", help="Write the page with its picture, to open in a browser.")
+    ] = False,
+) -> None:
+    """Explain an idea of ROS, such as QoS: what a failed check says to read."""
+    from rich.markdown import Markdown
+    from rich.table import Table
+
+    from grader.errors import UsageError
+    from grader.report import concepts
+    from grader.report.files import write_whole
+    from grader.report.html.page import render_page
+    from grader.spec.nearest_name import nearest_or_all
+
+    console, pages = output_console(), concepts.concepts()
+    if name is None:
+        table = Table("NAME", "WHAT IT EXPLAINS", box=None, pad_edge=False)
+        for page in pages.values():
+            table.add_row(page.name, page.title)
+        console.print(table)
+        console.print("\nrosgrade explain NAME shows one.")
+        return
+    if name not in pages:
+        raise UsageError(f"nothing to explain is called {name!r}." + nearest_or_all(name, pages))
+    if html:
+        styles = ("report.css", "handout.css", concepts.STYLE)
+        text = render_page("concept.html.j2", styles, concepts.SCRIPT, concept=pages[name])
+        write_whole(Path(f"{name}.html"), text)
+        say(f"Page: {name}.html")
+        return
+    console.print(Markdown(f"# {pages[name].title}\n\n{pages[name].plain}", hyperlinks=False))
 
 
 def checks(

@@ -14,6 +14,7 @@ class Cause:
     Attributes:
         ours: The fault is not, or not certainly, the student's: the finding is an error.
         disturbed: The run should be repeated: the machine has, or may have, a part in it.
+        concept: As that of a finding.
     """
 
     observed: str
@@ -21,6 +22,7 @@ class Cause:
     evidence: Evidence = field(default_factory=Evidence)
     ours: bool = False
     disturbed: bool = False
+    concept: str = ""
 
     @classmethod
     def to_repeat(cls, observed: str) -> Cause:
@@ -32,7 +34,7 @@ class Cause:
         if self.ours:
             return Finding.error(expected, self.observed, disturbed=self.disturbed, hint=self.hint)
         found = Finding.failed(expected, self.observed, self.hint, self.evidence)
-        return replace(found, disturbed=self.disturbed)
+        return replace(found, disturbed=self.disturbed, concept=self.concept)
 
     def after(self, beginning: str) -> Cause:
         """The same cause with a text before it."""

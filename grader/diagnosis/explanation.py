@@ -17,13 +17,14 @@ from __future__ import annotations
 import inspect
 from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from pkgutil import walk_packages
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar, cast
 
 from grader import diagnosis
+from grader.diagnosis.cause import Cause
 
 A = TypeVar("A")
 S = TypeVar("S", bound="Symptom[Any]")
@@ -32,6 +33,13 @@ _DEFINED: list[Explanation] = []
 
 class Symptom(Generic[A]):
     """What a check saw; its explanations answer with an ``A``, such as a cause."""
+
+    concept: ClassVar[str] = ""
+    """The page of ``docs/concepts`` for its causes, where an explanation declares no other."""
+
+    def __init_subclass__(cls, *, concept: str = "", **rest: Any) -> None:
+        super().__init_subclass__(**rest)
+        cls.concept = concept or cls.concept
 
 
 @dataclass(frozen=True)
@@ -52,6 +60,7 @@ class Explanation:
     is_general: bool = False
     example: str = ""
     only: str = ""
+    concept: str = ""
 
 
 def add(entry: Explanation) -> None:
@@ -60,7 +69,7 @@ def add(entry: Explanation) -> None:
 
 
 def explanation(
-    *symptoms: type[Symptom[Any]], general: bool = False, only: str = ""
+    *symptoms: type[Symptom[Any]], general: bool = False, only: str = "", concept: str = ""
 ) -> Callable[[Callable[[S], A]], Callable[[S], A]]:
     """Put a function into the catalogue.
 
@@ -68,13 +77,15 @@ def explanation(
         symptoms: Which it explains.
         general: Asked after all others: it says only what is there in any case.
         only: The one language of the programs that it explains.
+        concept: The page of ``docs/concepts`` that explains the idea.
     """
 
     def register(apply: Callable[[S], A]) -> Callable[[S], A]:
         sentence = " ".join((inspect.getdoc(apply) or "").split())
         for symptom in symptoms:
             name, module = apply.__name__, apply.__module__
-            add(Explanation(symptom, name, apply, module, sentence, general, only=only))
+            entry = Explanation(symptom, name, apply, module, sentence, general)
+            add(replace(entry, only=only, concept=concept or symptom.concept))
         return apply
 
     return register
@@ -101,8 +112,13 @@ def explanations() -> dict[type[Symptom[Any]], tuple[Explanation, ...]]:
 
 def explain(symptom: Symptom[A]) -> A | None:
     """The deepest explanation of a symptom that applies, or None."""
-    answers = (entry.apply(symptom) for entry in explanations()[type(symptom)])
-    return next((answer for answer in answers if answer is not None), None)
+    for entry in explanations()[type(symptom)]:
+        answer = entry.apply(symptom)
+        if isinstance(answer, Cause) and not answer.concept:
+            answer = replace(answer, concept=entry.concept)
+        if answer is not None:
+            return cast(A, answer)
+    return None
 
 
 def cause_of(symptom: Symptom[A]) -> A:

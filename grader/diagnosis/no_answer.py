@@ -31,7 +31,7 @@ _ROUNDING_S = 1e-6
 
 
 @dataclass(frozen=True)
-class NoAnswer(Symptom[Cause]):
+class NoAnswer(Symptom[Cause], concept="executors"):
     """A call or a goal was not answered in time.
 
     Attributes:

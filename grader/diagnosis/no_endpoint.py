@@ -74,7 +74,7 @@ _OTHER = {
 
 
 @dataclass(frozen=True)
-class NoEndpoint(Symptom[Cause]):
+class NoEndpoint(Symptom[Cause], concept="names"):
     """A publisher, a subscription, a service, an action, or a client of one is missing.
 
     Attributes:
@@ -204,7 +204,7 @@ def no_node(symptom: NoEndpoint) -> Cause | None:
     return why_no_node(symptom.recording)
 
 
-@explanation(NoEndpoint)
+@explanation(NoEndpoint, concept="interfaces")
 def other_interface(symptom: NoEndpoint) -> Cause | None:
     """The service or action has another type."""
     own = next((one for one in symptom.there if one.name == symptom.name), None)

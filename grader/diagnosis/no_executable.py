@@ -15,7 +15,7 @@ from grader.submission.record import PYTHON, PackageRecord, SourceError, Submiss
 
 
 @dataclass(frozen=True)
-class NoExecutable(Symptom[Cause]):
+class NoExecutable(Symptom[Cause], concept="packages"):
     """An executable is missing, or its function does not exist."""
 
     submission: SubmissionRecord

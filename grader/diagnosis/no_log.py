@@ -116,7 +116,7 @@ def process_ended(symptom: NotLogged) -> Cause | None:
     return why_ended(symptom.recording, symptom.seen)
 
 
-@explanation(NotLogged)
+@explanation(NotLogged, concept="qos")
 def no_history(symptom: NotLogged) -> Cause | None:
     """A late joiner does not request earlier messages (transient_local)."""
     wanted, recording = symptom.wanted, symptom.recording

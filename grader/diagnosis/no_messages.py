@@ -178,7 +178,7 @@ def no_endpoint(symptom: OnTopic) -> Cause | None:
     return why_no_endpoint(symptom.recording, symptom.kind, symptom.topic)
 
 
-@explanation(NoMessages, NotDelivered)
+@explanation(NoMessages, NotDelivered, concept="interfaces")
 def other_type(symptom: OnTopic) -> Cause | None:
     """The publisher and the subscription have different message types or definitions."""
     wanted = sorted({item.type for item in symptom.others})
@@ -204,7 +204,7 @@ def unreadable(symptom: OnTopic) -> Cause | None:
     return why_unreadable(symptom.recording, symptom.topic)
 
 
-@explanation(NoMessages, NotDelivered)
+@explanation(NoMessages, NotDelivered, concept="qos")
 def incompatible_qos(symptom: OnTopic) -> Cause | None:
     """The publisher's QoS offers less (reliability, durability, deadline) than requested."""
     pairs = [

@@ -24,7 +24,7 @@ _START = "start of "
 
 
 @dataclass(frozen=True)
-class NoNode(Symptom[Cause]):
+class NoNode(Symptom[Cause], concept="nodes"):
     """No node of the student appeared."""
 
     recording: Recording
@@ -52,7 +52,7 @@ class NoNode(Symptom[Cause]):
 
 
 @dataclass(frozen=True)
-class OtherNode(Symptom[Cause]):
+class OtherNode(Symptom[Cause], concept="names"):
     """A node does not have the expected name."""
 
     recording: Recording

@@ -97,7 +97,7 @@ def process_failed(symptom: NotAsked) -> Cause | None:
     return crashed.after(symptom.seen) if crashed is not None else raised
 
 
-@explanation(NotAsked)
+@explanation(NotAsked, concept="executors")
 def waits_in_a_callback(symptom: NotAsked) -> Cause | None:
     """call() or spin_until_future_complete() in a callback waits for an answer, and blocks it."""
     recording, seen = symptom.recording, symptom.seen

@@ -38,7 +38,7 @@ _OURS = re.compile(r"\n\[rosgrade: (.+)\]\n\Z")
 
 
 @dataclass(frozen=True)
-class NoPackage(Symptom[Cause]):
+class NoPackage(Symptom[Cause], concept="packages"):
     """A package is missing."""
 
     submission: SubmissionRecord
@@ -157,7 +157,7 @@ def why_too_new(package: PackageRecord) -> Cause | None:
 
 
 @dataclass(frozen=True)
-class NotBuilt(Symptom[Cause]):
+class NotBuilt(Symptom[Cause], concept="packages"):
     """A package was not built."""
 
     submission: SubmissionRecord

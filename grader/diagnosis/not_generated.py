@@ -56,7 +56,7 @@ class InterfaceName:
 
 
 @dataclass(frozen=True)
-class NoDefinition(Symptom[Cause]):
+class NoDefinition(Symptom[Cause], concept="interfaces"):
     """The definition of an interface is missing."""
 
     submission: SubmissionRecord
@@ -74,7 +74,7 @@ class NoDefinition(Symptom[Cause]):
 
 
 @dataclass(frozen=True)
-class NotGenerated(Symptom[Cause]):
+class NotGenerated(Symptom[Cause], concept="interfaces"):
     """The build generated no code for an interface."""
 
     package: PackageRecord

@@ -33,7 +33,7 @@ _OWN_S = 2.0
 _ENDED_PERIODS = 3.0
 
 
-@explanation(NoMessages, FewMessages)
+@explanation(NoMessages, FewMessages, concept="timers")
 def timer_destroyed(symptom: OnTopic) -> Cause | None:
     """The timer was destroyed: in C++ it ends with the variable that holds it."""
     recording = symptom.recording
@@ -52,7 +52,7 @@ def timer_destroyed(symptom: OnTopic) -> Cause | None:
     )
 
 
-@explanation(NoMessages)
+@explanation(NoMessages, concept="timers")
 def slow_timer(symptom: NoMessages) -> Cause | None:
     """The timer's period is longer than the observation: milliseconds were given as seconds."""
     recording, timers = symptom.recording, declarations.timers(symptom.recording)
@@ -92,7 +92,7 @@ def no_cpu_time(symptom: NoMessages) -> Cause | None:
     )
 
 
-@explanation(NoMessages, FewMessages)
+@explanation(NoMessages, FewMessages, concept="executors")
 def never_spun(symptom: OnTopic) -> Cause | None:
     """rclpy.spin() is never called, or the node is not given to the executor that spins."""
     # A program may publish without a timer, and needs no spin for that.
@@ -101,7 +101,7 @@ def never_spun(symptom: OnTopic) -> Cause | None:
     return why_never_spun(symptom.recording, symptom.seen, symptom.nodes)
 
 
-@explanation(NoMessages)
+@explanation(NoMessages, concept="executors")
 def blocked_executor(symptom: NoMessages) -> Cause | None:
     """A callback does not return, and blocks the executor."""
     sent = symptom.recording.sent
@@ -133,7 +133,7 @@ def no_answer(symptom: NoMessages) -> Cause | None:
     )
 
 
-@explanation(NoMessages)
+@explanation(NoMessages, concept="timers")
 def no_timer(symptom: NoMessages) -> Cause | None:
     """No timer was created, so nothing calls the callback that publishes."""
     recording = symptom.recording
@@ -170,7 +170,7 @@ def publish_not_reached(symptom: NoMessages) -> Cause:
     )
 
 
-@explanation(FewMessages, general=True)
+@explanation(FewMessages, general=True, concept="timers")
 def publishing_stopped(symptom: FewMessages) -> Cause:
     """A timer stopped or is too slow, or the program publishes without a timer and stops."""
     recording, evidence = symptom.recording, Evidence(moments=symptom.moments)

@@ -27,7 +27,7 @@ _LOOK = (
 
 
 @dataclass(frozen=True)
-class NotCanceled(Symptom[Cause]):
+class NotCanceled(Symptom[Cause], concept="executors"):
     """A goal was not canceled after a cancel request."""
 
     recording: Recording

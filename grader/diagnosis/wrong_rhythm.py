@@ -32,7 +32,7 @@ _ONE_TIMER = "Create one timer in the constructor, once, and publish once in its
 
 
 @dataclass(frozen=True)
-class WrongRhythm(Symptom[Cause]):
+class WrongRhythm(Symptom[Cause], concept="timers"):
     """Messages come at the wrong period, or irregularly.
 
     What a cause observes is a clause that follows the figures, or nothing.

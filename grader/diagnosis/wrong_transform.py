@@ -33,7 +33,7 @@ _NAMES = "Set header.frame_id = '{0.parent}' and child_frame_id = '{0.child}', w
 
 
 @dataclass(frozen=True)
-class NoTransform(Symptom[Cause]):
+class NoTransform(Symptom[Cause], concept="frames"):
     """A transform between two frames is not on its topic."""
 
     recording: Recording
@@ -71,7 +71,7 @@ class NoTransform(Symptom[Cause]):
 
 
 @dataclass(frozen=True)
-class BadTransform(Symptom[Cause]):
+class BadTransform(Symptom[Cause], concept="frames"):
     """A transform that may be of no use to tf2.
 
     Attributes:
@@ -195,7 +195,7 @@ def no_quaternion(symptom: BadTransform) -> Cause | None:
     )
 
 
-@explanation(BadTransform)
+@explanation(BadTransform, concept="stamps")
 def wrong_stamp(symptom: BadTransform) -> Cause | None:
     """The stamp is 0, always the same, or of another clock."""
     sent_ns, stamp_ns = symptom.one.message.stamp_ns, symptom.one.stamp_ns

@@ -170,6 +170,7 @@ class Finding:
             large for a fair verdict. For a failure: the machine may be part of the cause.
         remap: If a wrong name is the only cause of the failure: the rule that corrects it, such
             as ``/cmdvel:=/cmd_vel``. The other checks are then judged in a run with this rule.
+        concept: The page of ``docs/concepts`` that explains the idea behind a failure.
     """
 
     status: Status
@@ -180,6 +181,7 @@ class Finding:
     evidence: Evidence = field(default_factory=Evidence)
     disturbed: bool = False
     remap: str = ""
+    concept: str = ""
 
     @classmethod
     def passed(cls, expected: str, observed: str, evidence: Evidence | None = None) -> Finding:

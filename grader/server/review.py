@@ -234,7 +234,9 @@ class ReviewServer(LocalServer):
 def _page(name: str, **values: Any) -> Response:
     policy = "; connect-src 'self'; frame-src 'self'"
     styles = ("report.css", "review.css")
-    return HTMLResponse(render_page(f"{name}.html.j2", styles, f"{name}.js", policy, **values))
+    return HTMLResponse(
+        render_page(f"{name}.html.j2", styles, f"{name}.js", policy=policy, **values)
+    )
 
 
 def _part(template: str, **values: Any) -> str:

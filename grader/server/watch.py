@@ -96,7 +96,7 @@ class ReportPage(LocalServer):
         from grader.report.html.page import render_page
 
         policy = "; connect-src 'self'; frame-src 'self'"
-        return HTMLResponse(render_page("watch.html.j2", ("watch.css",), "watch.js", policy))
+        return HTMLResponse(render_page("watch.html.j2", ("watch.css",), "watch.js", policy=policy))
 
     def _read_report(self, _: Request) -> Response:
         try:

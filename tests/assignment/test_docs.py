@@ -37,7 +37,7 @@ def test_a_stale_or_missing_file_is_reported_and_mended(
 
 
 def test_every_check_is_described_with_all_its_parameters() -> None:
-    text = docs.checks_markdown()
+    text = "\n".join(docs.checks_markdown().values())
     for check in all_checks().values():
         section = text.split(f"## {check.name}\n")[1].split("\n## ")[0]
         for name, field in check.parameters.model_fields.items():
@@ -45,16 +45,24 @@ def test_every_check_is_described_with_all_its_parameters() -> None:
 
 
 def test_links_lead_to_headings() -> None:
-    for text in (docs.assignment_markdown(), docs.checks_markdown()):
-        outside = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
-        headings = {
-            re.sub(r"[^a-z0-9_ -]", "", line.lstrip("# ").lower()).replace(" ", "-")
-            for line in outside.splitlines()
-            if line.startswith("#")
-        }
-        links = set(re.findall(r"\]\(#([^)]*)\)", outside))
-        assert links
-        assert links <= headings
+    text = docs.assignment_markdown()
+    outside = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    headings = {
+        re.sub(r"[^a-z0-9_ -]", "", line.lstrip("# ").lower()).replace(" ", "-")
+        for line in outside.splitlines()
+        if line.startswith("#")
+    }
+    links = set(re.findall(r"\]\(#([^)]*)\)", outside))
+    assert links
+    assert links <= headings
+
+
+def test_a_link_to_a_check_still_leads_to_it() -> None:
+    pages = docs.checks_markdown()
+    for check in all_checks().values():
+        anchor = check.name.replace(".", "").lower()
+        found = re.search(rf'<a id="{anchor}"></a>\[.*?\]\(([^)#]*)#{anchor}\)', pages["checks.md"])
+        assert found and f"## {check.name}\n" in pages[found[1]]
 
 
 def test_a_value_is_described_in_the_words_of_yaml(catalogue: dict[str, Check]) -> None:

@@ -67,7 +67,7 @@ class Runs(Reported):
         return self
 
 
-@check("callbacks.run", Subject.RECORDING, Runs)
+@check("callbacks.run", Subject.RECORDING, Runs, concept="executors")
 def run(recording: Recording, parameters: Runs) -> Finding:
     """Callbacks run as often as expected.
 

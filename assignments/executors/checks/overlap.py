@@ -26,7 +26,7 @@ class NeverOverlap(Reported):
     at_least: int = Field(2, ge=1, description="How often each callback must have run.")
 
 
-@check("callbacks.never_overlap", Subject.RECORDING, NeverOverlap)
+@check("callbacks.never_overlap", Subject.RECORDING, NeverOverlap, concept="executors")
 def never_overlap(recording: Recording, parameters: NeverOverlap) -> Finding:
     """Callbacks never run at the same time.
 
@@ -123,7 +123,7 @@ class Overlapping(Reported):
     )
 
 
-@check("callbacks.overlap", Subject.RECORDING, Overlapping)
+@check("callbacks.overlap", Subject.RECORDING, Overlapping, concept="executors")
 def overlap(recording: Recording, parameters: Overlapping) -> Finding:
     """Callbacks run at the same time.
 

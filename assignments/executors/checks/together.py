@@ -34,7 +34,7 @@ class Together(Reported):
     )
 
 
-@check("callbacks.together", Subject.RECORDING, Together)
+@check("callbacks.together", Subject.RECORDING, Together, concept="executors")
 def together(recording: Recording, parameters: Together) -> Finding:
     """All callbacks run at the same time.
 

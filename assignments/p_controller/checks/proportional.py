@@ -52,7 +52,7 @@ class Proportional(GoalParameters):
     gain_max: Frequency | None = Field(None, description="Greatest gain.")
 
 
-@check("motion.proportional", Subject.RECORDING, Proportional)
+@check("motion.proportional", Subject.RECORDING, Proportional, concept="angles")
 def proportional(recording: Recording, parameters: Proportional) -> Finding:
     """angular.z is proportional to the heading error.
 

@@ -114,7 +114,7 @@ class Answers(Parameters):
         return not self.cases or case.group in self.cases
 
 
-@check("rotation.answers", Subject.RECORDING, Answers)
+@check("rotation.answers", Subject.RECORDING, Answers, concept="angles")
 def answers(recording: Recording, parameters: Answers) -> Finding:
     """Rotations are converted correctly.
 

@@ -85,7 +85,7 @@ def _is(run: Run, name: str) -> bool:
     return abs(period_s - named_s) <= _SAME_PERIOD * named_s
 
 
-@check("executor.overlap", Subject.RECORDING, Overlap)
+@check("executor.overlap", Subject.RECORDING, Overlap, concept="executors")
 def overlap(recording: Recording, parameters: Overlap) -> Finding:
     """Callbacks run at the same time, or never do.
 
@@ -180,7 +180,7 @@ class ExecutorKind(Parameters):
     )
 
 
-@check("executor.kind", Subject.RECORDING, ExecutorKind)
+@check("executor.kind", Subject.RECORDING, ExecutorKind, concept="executors")
 def kind(recording: Recording, parameters: ExecutorKind) -> Finding:
     """The executor is of a kind, and callbacks are in the same group or in different ones.
 

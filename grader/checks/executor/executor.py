@@ -81,7 +81,7 @@ class _Answers:
         return late <= max(int((1.0 - share) * number + 1e-9), one)
 
 
-@check("executor.responsive", Subject.RECORDING, Responsive)
+@check("executor.responsive", Subject.RECORDING, Responsive, concept="executors")
 def responsive(recording: Recording, parameters: Responsive) -> Finding:
     """The executor keeps spinning while the node works.
 
@@ -306,7 +306,7 @@ class Timer(Parameters):
     topic: TopicName = Field(description="Topic on which the callback of a timer publishes.")
 
 
-@check("executor.timer", Subject.RECORDING, Timer)
+@check("executor.timer", Subject.RECORDING, Timer, concept="timers")
 def timer(recording: Recording, parameters: Timer) -> Finding:
     """The process has a timer.
 

@@ -52,7 +52,7 @@ class Found(OfInterface):
     asks = "a definition in `{self.parts.file}` of `{self.parts.package}`"
 
 
-@check("interface.found", Subject.SUBMISSION, Found)
+@check("interface.found", Subject.SUBMISSION, Found, concept="interfaces")
 def found(submission: SubmissionRecord, parameters: Found) -> Finding:
     """The definition of the interface is there.
 
@@ -79,7 +79,7 @@ class Generated(OfInterface):
     asks = "`colcon build` generates `{self.interface}`"
 
 
-@check("interface.generated", Subject.SUBMISSION, Generated)
+@check("interface.generated", Subject.SUBMISSION, Generated, concept="interfaces")
 def generated(submission: SubmissionRecord, parameters: Generated) -> Finding:
     """The build generates code for the interface.
 
@@ -116,7 +116,7 @@ class Fields(Defined):
         return f"the fields {codes(wanted)}" if wanted else "no field"
 
 
-@check("interface.fields", Subject.SUBMISSION, Fields)
+@check("interface.fields", Subject.SUBMISSION, Fields, concept="interfaces")
 def fields(submission: SubmissionRecord, parameters: Fields) -> Finding:
     """The interface has the expected fields.
 
@@ -135,7 +135,7 @@ class Constants(Defined):
         return f"the constants {codes(wanted)}" if wanted else "no constant"
 
 
-@check("interface.constants", Subject.SUBMISSION, Constants)
+@check("interface.constants", Subject.SUBMISSION, Constants, concept="interfaces")
 def constants(submission: SubmissionRecord, parameters: Constants) -> Finding:
     """The interface has the expected constants.
 
@@ -203,7 +203,7 @@ class Manifest(OfInterface):
     asks = "package.xml of `{self.parts.package}` has what an interface package needs"
 
 
-@check("interface.manifest", Subject.SUBMISSION, Manifest)
+@check("interface.manifest", Subject.SUBMISSION, Manifest, concept="interfaces")
 def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding:
     """package.xml names the packages that an interface package needs.
 

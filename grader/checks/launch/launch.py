@@ -39,7 +39,7 @@ class Graph(Parameters):
         return f"{codes(self.nodes)} and no other node{topics}"
 
 
-@check("launch.graph", Subject.RECORDING, Graph)
+@check("launch.graph", Subject.RECORDING, Graph, concept="names")
 def graph(recording: Recording, parameters: Graph) -> Finding:
     """Exactly the expected nodes are started, on the expected topics.
 

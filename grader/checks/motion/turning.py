@@ -38,7 +38,7 @@ class TwoPhases(GoalParameters):
     speed: Speed = Field(0.01, description="Commanded speed that still counts as none.")
 
 
-@check("motion.two_phases", Subject.RECORDING, TwoPhases)
+@check("motion.two_phases", Subject.RECORDING, TwoPhases, concept="angles")
 def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
     """At the goal's position the robot turns and no longer drives.
 
@@ -115,7 +115,7 @@ class ShortWay(GoalParameters):
     )
 
 
-@check("motion.short_way", Subject.RECORDING, ShortWay)
+@check("motion.short_way", Subject.RECORDING, ShortWay, concept="angles")
 def short_way(recording: Recording, parameters: ShortWay) -> Finding:
     """The robot always turns the short way.
 

@@ -32,7 +32,7 @@ class Starts(Parameters):
     asks = "the program creates a node"
 
 
-@check("node.starts", Subject.RECORDING, Starts)
+@check("node.starts", Subject.RECORDING, Starts, concept="nodes")
 def starts(recording: Recording, parameters: Starts) -> Finding:
     """The program starts and has a node.
 
@@ -63,7 +63,7 @@ class NodeExists(Parameters):
     )
 
 
-@check("node.exists", Subject.RECORDING, NodeExists)
+@check("node.exists", Subject.RECORDING, NodeExists, concept="names")
 def exists(recording: Recording, parameters: NodeExists) -> Finding:
     """The node appears under its name.
 
@@ -110,7 +110,7 @@ class Alive(Parameters):
         return f"{code(self.name) if self.name else 'the node'} runs until SIGINT (Ctrl-C)"
 
 
-@check("node.alive", Subject.RECORDING, Alive)
+@check("node.alive", Subject.RECORDING, Alive, concept="nodes")
 def alive(recording: Recording, parameters: Alive) -> Finding:
     """The node stays alive until it is asked to end.
 
@@ -191,7 +191,7 @@ class Ends(Parameters):
         return f"the process ends within {format_duration(self.within)} of SIGINT (Ctrl-C)"
 
 
-@check("node.ends", Subject.RECORDING, Ends)
+@check("node.ends", Subject.RECORDING, Ends, concept="nodes")
 def ends(recording: Recording, parameters: Ends) -> Finding:
     """The process ends by itself after Ctrl-C.
 

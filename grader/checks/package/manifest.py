@@ -28,7 +28,7 @@ class Manifest(OfPackage):
     )
 
 
-@check("package.manifest", Subject.SUBMISSION, Manifest)
+@check("package.manifest", Subject.SUBMISSION, Manifest, concept="packages")
 def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding:
     """package.xml names the description, the maintainer and the licence of the package.
 

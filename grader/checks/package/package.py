@@ -50,7 +50,7 @@ class PackageFound(OfPackage):
         return f"the package {code(self.package)}{types}"
 
 
-@check("package.found", Subject.SUBMISSION, PackageFound)
+@check("package.found", Subject.SUBMISSION, PackageFound, concept="packages")
 def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding:
     """The package is there and has a valid package.xml.
 
@@ -80,7 +80,7 @@ class Builds(OfPackage):
     asks = "`colcon build` builds `{self.package}`"
 
 
-@check("package.builds", Subject.SUBMISSION, Builds)
+@check("package.builds", Subject.SUBMISSION, Builds, concept="packages")
 def builds(submission: SubmissionRecord, parameters: Builds) -> Finding:
     """The package builds with colcon.
 
@@ -111,7 +111,7 @@ class Executable(OfPackage):
     )
 
 
-@check("package.executable", Subject.SUBMISSION, Executable)
+@check("package.executable", Subject.SUBMISSION, Executable, concept="packages")
 def executable(submission: SubmissionRecord, parameters: Executable) -> Finding:
     """The executable is installed where `ros2 run` finds it.
 
@@ -165,7 +165,7 @@ class Dependencies(OfPackage):
         return f"every ROS package that {whose} imports is in package.xml"
 
 
-@check("package.dependencies", Subject.SUBMISSION, Dependencies)
+@check("package.dependencies", Subject.SUBMISSION, Dependencies, concept="packages")
 def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Finding:
     """package.xml declares the ROS packages that the code uses.
 

@@ -26,7 +26,7 @@ class File(OfPackage):
     )
 
 
-@check("package.file", Subject.SUBMISSION, File)
+@check("package.file", Subject.SUBMISSION, File, concept="packages")
 def file(submission: SubmissionRecord, parameters: File) -> Finding:
     """The package installs a file, such as a launch file or a parameter file.
 

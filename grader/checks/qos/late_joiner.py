@@ -51,7 +51,7 @@ class LateJoiner(Parameters):
         return f"{who} the last {counted(self.last, 'message')} published before it, and no more"
 
 
-@check("qos.late_joiner", Subject.RECORDING, LateJoiner)
+@check("qos.late_joiner", Subject.RECORDING, LateJoiner, concept="qos")
 def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     """A late joiner gets the last messages, and no more.
 

@@ -84,7 +84,7 @@ class Profile(Parameters):
         return Qos(**{_ATTRIBUTES.get(name, name): item for name, item in self.policies.items()})
 
 
-@check("qos.offered", Subject.RECORDING, Profile)
+@check("qos.offered", Subject.RECORDING, Profile, concept="qos")
 def offered(recording: Recording, parameters: Profile) -> Finding:
     """Publishers on the topic offer the expected QoS.
 
@@ -94,7 +94,7 @@ def offered(recording: Recording, parameters: Profile) -> Finding:
     return _judge(recording, parameters, Kind.PUBLISHER)
 
 
-@check("qos.requested", Subject.RECORDING, Profile)
+@check("qos.requested", Subject.RECORDING, Profile, concept="qos")
 def requested(recording: Recording, parameters: Profile) -> Finding:
     """Subscriptions to the topic request the expected QoS.
 
@@ -197,7 +197,7 @@ class Depth(Parameters):
     )
 
 
-@check("qos.depth", Subject.RECORDING, Depth)
+@check("qos.depth", Subject.RECORDING, Depth, concept="qos")
 def depth(recording: Recording, parameters: Depth) -> Finding:
     """The queue has the expected depth.
 
@@ -323,7 +323,7 @@ class Compatible(Parameters):
         )
 
 
-@check("qos.compatible", Subject.RECORDING, Compatible)
+@check("qos.compatible", Subject.RECORDING, Compatible, concept="qos")
 def compatible(recording: Recording, parameters: Compatible) -> Finding:
     """A given peer matches or does not match, by the rules of DDS.
 

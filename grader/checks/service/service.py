@@ -194,7 +194,7 @@ class Concurrent(Parameters):
         )
 
 
-@check("service.concurrent", Subject.RECORDING, Concurrent)
+@check("service.concurrent", Subject.RECORDING, Concurrent, concept="executors")
 def concurrent(recording: Recording, parameters: Concurrent) -> Finding:
     """A second call during a slow call is processed as expected.
 

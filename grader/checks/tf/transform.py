@@ -95,7 +95,7 @@ class Static(EdgeParameters):
         return f"{self.words}: x, y, z = {place}; roll, pitch, yaw = {turn}"
 
 
-@check("tf.static", Subject.RECORDING, Static)
+@check("tf.static", Subject.RECORDING, Static, concept="frames")
 def static(recording: Recording, parameters: Static) -> Finding:
     """A static transform is published, so that late joiners get it, and has the right values.
 
@@ -127,7 +127,7 @@ class Broadcast(EdgeParameters):
         return f"{self.words} at {self.rate:g} Hz{', moving' if self.moving else ''}"
 
 
-@check("tf.broadcast", Subject.RECORDING, Broadcast)
+@check("tf.broadcast", Subject.RECORDING, Broadcast, concept="stamps")
 def broadcast(recording: Recording, parameters: Broadcast) -> Finding:
     """A transform is broadcast at the right rate, with stamps of the node's clock.
 
@@ -176,7 +176,7 @@ class Follows(EdgeParameters):
             yield NamedFields(("fields", field), self.source or "", text)
 
 
-@check("tf.follows", Subject.RECORDING, Follows)
+@check("tf.follows", Subject.RECORDING, Follows, concept="frames")
 def follows(recording: Recording, parameters: Follows) -> Finding:
     """A transform follows a pose: that of a topic, or the true one of the simulated robot.
 

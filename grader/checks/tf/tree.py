@@ -39,7 +39,7 @@ class Tree(Parameters):
         return f"one tree of frames{frames} below {code(self.root) if self.root else 'one root'}"
 
 
-@check("tf.tree", Subject.RECORDING, Tree)
+@check("tf.tree", Subject.RECORDING, Tree, concept="frames")
 def tree(recording: Recording, parameters: Tree) -> Finding:
     """The frames make one tree: one root, connected, and no frame with two parents.
 

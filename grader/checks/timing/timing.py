@@ -87,7 +87,7 @@ class Period(Parameters):
         return PeriodLimits(self.period, median_s, spread_s, self.outliers)
 
 
-@check("timing.period", Subject.RECORDING, Period)
+@check("timing.period", Subject.RECORDING, Period, concept="timers")
 def period(recording: Recording, parameters: Period) -> Finding:
     """Messages come at the expected period.
 
@@ -240,7 +240,7 @@ class Rate(Parameters):
         return words
 
 
-@check("timing.rate", Subject.RECORDING, Rate)
+@check("timing.rate", Subject.RECORDING, Rate, concept="timers")
 def rate(recording: Recording, parameters: Rate) -> Finding:
     """Messages come at a rate within bounds.
 

@@ -33,7 +33,7 @@ class Topic(Parameters):
     )
 
 
-@check("topic.published", Subject.RECORDING, Topic)
+@check("topic.published", Subject.RECORDING, Topic, concept="names")
 def published(recording: Recording, parameters: Topic) -> Finding:
     """The node publishes on the topic.
 
@@ -42,7 +42,7 @@ def published(recording: Recording, parameters: Topic) -> Finding:
     return _presence(recording, Kind.PUBLISHER, parameters)
 
 
-@check("topic.subscribed", Subject.RECORDING, Topic)
+@check("topic.subscribed", Subject.RECORDING, Topic, concept="names")
 def subscribed(recording: Recording, parameters: Topic) -> Finding:
     """The node subscribes to the topic.
 
@@ -102,7 +102,7 @@ class Type(Topic):
     )
 
 
-@check("topic.type", Subject.RECORDING, Type)
+@check("topic.type", Subject.RECORDING, Type, concept="interfaces")
 def type_(recording: Recording, parameters: Type) -> Finding:
     """The topic has the expected message type.
 
@@ -141,7 +141,7 @@ class Untouched(Parameters):
         return f"no publisher on {codes(self.topics, last='or')}"
 
 
-@check("topic.untouched", Subject.RECORDING, Untouched)
+@check("topic.untouched", Subject.RECORDING, Untouched, concept="names")
 def untouched(recording: Recording, parameters: Untouched) -> Finding:
     """Only the robot publishes its sensors.
 

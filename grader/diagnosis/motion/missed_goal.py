@@ -122,7 +122,7 @@ def wrong_place(symptom: GoalMissed) -> Cause | None:
     return None
 
 
-@explanation(GoalMissed)
+@explanation(GoalMissed, concept="executors")
 def loop_in_a_callback(symptom: GoalMissed) -> Cause | None:
     """A callback does not return: its loop never sees newer odometry."""
     stuck = None if symptom.is_at_rest else stuck_callback(symptom.run.recording)
@@ -135,14 +135,14 @@ def loop_in_a_callback(symptom: GoalMissed) -> Cause | None:
     )
 
 
-@explanation(GoalMissed)
+@explanation(GoalMissed, concept="angles")
 def yaw_misread(symptom: GoalMissed) -> Cause | None:
     """The yaw is computed wrongly from the quaternion."""
     misread = None if symptom.is_at_rest else misread_yaw(symptom.run, symptom.position_m)
     return symptom.cause(f": {misread}", misread.hint) if misread else None
 
 
-@explanation(GoalMissed)
+@explanation(GoalMissed, concept="angles")
 def angle_not_wrapped(symptom: GoalMissed) -> Cause | None:
     """It turns the long way: the angle error is not wrapped to -pi .. pi."""
     run = symptom.run

@@ -22,7 +22,7 @@ _AS_SENT_RAD = 0.06
 
 
 @dataclass(frozen=True)
-class HeadingMissed(Symptom[Cause]):
+class HeadingMissed(Symptom[Cause], concept="angles"):
     """The robot is at the goal with the wrong heading."""
 
     run: Approach

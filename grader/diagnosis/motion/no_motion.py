@@ -153,7 +153,7 @@ def not_finite(symptom: NotMoved) -> Cause | None:
     return why_rejected(symptom.recording)
 
 
-@explanation(NotMoved)
+@explanation(NotMoved, concept="qos")
 def robot_not_matched(symptom: NotMoved) -> Cause | None:
     """The QoS of the publisher does not match that of the robot's subscription."""
     recording = symptom.recording

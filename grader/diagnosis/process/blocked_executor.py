@@ -73,6 +73,7 @@ def why_blocked(
             moments=(Moment("first call that was not answered", since_s),),
             places=(place,) if place else (),
         ),
+        concept="executors",
     )
 
 
@@ -88,6 +89,7 @@ def why_slow(recording: Recording, seen: str, nodes: Collection[str]) -> Cause |
         f"service waited {format_duration(wait_s)} or more",
         HINT,
         Evidence(moments=(moment,)),
+        concept="executors",
     )
 
 
@@ -130,6 +132,7 @@ def why_never_spun(
             "Add the node to the executor that spins, executor.add_node(node), or call "
             "rclpy.spin(node).",
             Evidence(moments=(until_the_end(recording, "no executor had the node"),)),
+            concept="executors",
         )
     place = interrupted_place(recording, process.name)
     where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
@@ -140,6 +143,7 @@ def why_never_spun(
             moments=(until_the_end(recording, "rclpy.spin() was still not called"),),
             places=(place,) if place else (),
         ),
+        concept="executors",
     )
 
 

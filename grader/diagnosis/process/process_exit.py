@@ -104,7 +104,7 @@ def why_crashed(recording: Recording) -> Cause | None:
 
 
 @dataclass(frozen=True)
-class ProcessExit(Symptom[Cause]):
+class ProcessExit(Symptom[Cause], concept="nodes"):
     """A process ended too early."""
 
     recording: Recording

@@ -27,17 +27,17 @@ if TYPE_CHECKING:
 
 
 def render_page(
-    template: str, styles: tuple[str, ...], script: str = "", policy: str = "", **values: Any
+    template: str, styles: tuple[str, ...], *scripts: str, policy: str = "", **values: Any
 ) -> str:
     """Render a page.
 
     Args:
         template: Its file, as that of the others in ``templates/``.
-        script: A page without one runs none.
+        scripts: A page without one runs none.
         policy: What it may do besides, as in a Content-Security-Policy.
         values: What the template prints.
     """
-    style, code = "".join(map(_asset, styles)), _asset(script) if script else ""
+    style, code = "".join(map(_asset, styles)), "".join(map(_asset, scripts))
     values |= {"style": Markup(style), "script": Markup(code)}
     values["policy"] = _content_security_policy(style, code) + policy
     return environment().get_template(template).render(values)

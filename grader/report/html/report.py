@@ -11,6 +11,7 @@ from grader.findings.finding import Plot, Status
 from grader.grade.model import Grade
 from grader.recording.event import Breach
 from grader.recording.model import Recording
+from grader.report.concepts import SCRIPT, STYLE, concepts
 from grader.report.drawing.callbacks import draw_callbacks
 from grader.report.drawing.cases import draw_cases
 from grader.report.drawing.frames import draw_frames
@@ -51,16 +52,20 @@ def render_report(
     """
     assignment = grade.assignment
     sections = make_sections(grade, result, recordings)
+    named = {one.concept for check in result.checks for one in check.findings}
+    pages = {name: page for name, page in concepts().items() if name in named}
     runs = [section.recording for section in sections if section.recording]
     return render_page(
         "report.html.j2",
-        ("report.css",),
+        ("report.css", *([STYLE] if pages else ())),
         "report.js",
+        *([SCRIPT] if pages else ()),
         title=assignment.title,
         result=result,
         # The first of all has none before it to be compared with.
         attempts=result.attempts if len(result.attempts) > 1 else (),
         first=next((one for one in result.checks if one.id == result.first_to_fix), None),
+        concepts=pages,
         titles={check.id: check.title for check in result.checks},
         sections=sections,
         faults=_faults(result),

@@ -13,7 +13,7 @@ from typing import Any
 
 from grader.report.model.result_model import Result
 
-_FINDING = frozenset({"scenario", "status", "expected", "hint"})
+_FINDING = frozenset({"scenario", "status", "expected", "hint", "concept"})
 _CHECK = _FINDING | {
     "id",
     "title",

@@ -124,7 +124,8 @@ def _finding(item: ScenarioFinding) -> dict[str, Any]:
         "traceback": item.traceback,
         **{
             name: getattr(item.finding, name)
-            for name in ("status", "expected", "observed", "hint", "disturbed", "evidence")
+            for name in model.FindingPart.model_fields
+            if hasattr(item.finding, name)
         },
     }
 

@@ -96,13 +96,17 @@ class SubmissionPart(Identity):
 
 
 class FindingPart(_Part):
-    """A check's finding in one scenario, or about the submission (``scenario`` is null)."""
+    """A check's finding in one scenario, or about the submission (``scenario`` is null).
+
+    ``concept`` is what ``rosgrade explain`` takes, or empty.
+    """
 
     scenario: str | None
     status: Status
     expected: str
     observed: str
     hint: str
+    concept: str = ""
     disturbed: bool
     traceback: str
     evidence: Evidence

@@ -45,6 +45,8 @@ def explain(check: CheckPart, result: Result) -> list[Row]:
         log = next((item.evidence.log for item in items if item.evidence.log), ())
         if log:
             rows.append(Row("printed", clean("\n".join(log))))
+        named = filter(None, dict.fromkeys(one_line(item.concept) for item in items))
+        rows += [Row("read", f"`rosgrade explain {concept}`") for concept in named]
     if waits := points_waiting(check, result):
         rows.append(Row("waiting", waits))
     return rows
