@@ -1,8 +1,8 @@
 """The documentation that is made from the code: ``python -m grader.docs [--check]``.
 
-``docs/assignment-yaml.md`` comes from the models of the YAML, ``docs/checks.md`` with a page for each
-family from the catalogue of checks, ``docs/recording.md`` from the model of a recording. Nothing in
-them is typed twice; with ``--check`` a stale file is an error.
+``docs/assignment-yaml.md`` comes from the models of the YAML, ``docs/checks.md`` and a page for
+each family from the catalogue of checks, ``docs/recording.md`` from the model of a recording.
+Nothing in them is typed twice; with ``--check`` a stale file is an error.
 """
 
 from __future__ import annotations
