@@ -120,7 +120,8 @@
       shownFile = files.value = path;
       annotate();
     }
-    if (line || !find(".is-marked", code)) markLine(find(`#L${line || 1}`, code), Boolean(line));
+    const row = find(`#L${line}`, code) ?? find(".is-marked", code) ?? find("#L1", code);
+    markLine(row, line !== undefined);
   };
   const markLine = (row, focus) => {
     if (!row) return;
@@ -203,7 +204,7 @@
       text.focus();
     },
     b: () => { const bank = find("#bank"); if (bank) { bank.open = true; find("button", bank).focus(); } },
-    r: () => show("report"), s: () => show("source"),
+    r: () => show("report"), s: () => show("source", 0),  // the marked line gets the focus
     "?": () => keys.showModal(),
   };
   const act = (key) => {

@@ -93,7 +93,10 @@ def test_an_item_is_scored_by_a_key_and_the_next_one_is_marked(visit: Opened, ou
 def test_a_comment_at_a_line_survives_a_reload_and_stands_in_the_source(visit: Opened) -> None:
     page = visit("s/ben/")
     page.keyboard.press("s")
-    page.locator("#L3 .line").click()
+    expect(page.locator("#L1 .line")).to_be_focused()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("c")
     expect(page.locator("#where")).to_contain_text(f"at {NODE}:3")
     page.keyboard.type("Use the logger.")
     page.keyboard.press("Control+Enter")
