@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -125,22 +124,10 @@ def _times(course: Course) -> Mistakes:
 
 
 def _contradictions(course: Course) -> Mistakes:
-    costs = False
     for name, one in course.spec.assignments.items():
-        rules = course.rules(name)
         for key, text in (("closes", one.closes), ("published", one.published)):
-            if text and course.instant(text) < rules.due:
+            if text and course.instant(text) < course.instant(one.due):
                 yield ("assignments", name, key), f"is before the due time, {one.due}"
-        late, room_s = rules.late, math.inf
-        if rules.closes is not None:
-            room_s = (rules.closes - rules.due).total_seconds()
-        never = late is not None and room_s <= late.grace
-        if one.late and never:
-            text = "never applies: the assignment closes before it would deduct anything"
-            yield ("assignments", name, "late"), text
-        costs = costs or (late is not None and not late.is_free and not never)
-    if course.spec.tokens and not costs:
-        yield ("tokens",), "never apply: no assignment has a late policy that deducts anything"
     for at, extension in enumerate(course.spec.extensions):
         own = course.spec.assignments.get(extension.assignment)
         if own and extension.due and course.instant(extension.due) <= course.instant(own.due):

@@ -137,26 +137,6 @@ def test_a_contradiction_is_one_error_at_its_line(
     assert len(text.splitlines()) == 1
 
 
-@pytest.mark.parametrize(
-    "late", ["late: {per: day, deduct: 0}", "late: {per: day, deduct: 10 %, grace: 999999 min}"]
-)
-def test_tokens_that_nothing_would_ever_use_are_an_error(tmp_path: Path, late: str) -> None:
-    text = WHOLE.replace("late: {per: day, deduct: 10 %, grace: 15 min, at_most: 50 %}", late)
-    text = text.replace("    late: {per: hour, deduct: 0.5}\n", "    closes: 2026-10-26 23:59\n")
-    with pytest.raises(AssignmentError, match=r"course\.yaml:4: tokens: never apply"):
-        course(tmp_path, text)
-
-
-def test_an_own_policy_of_an_assignment_that_closes_before_it_is_an_error(tmp_path: Path) -> None:
-    text = refused(
-        tmp_path, "    late: {per: hour", "    closes: 2026-10-26 23:59\n    late: {per: hour"
-    )
-    assert text.endswith(
-        "course.yaml:11: assignments.qos.late: never applies: the assignment closes before it "
-        "would deduct anything"
-    )
-
-
 def test_an_assignment_without_rules_is_named_with_the_nearest(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"no assignment 'qo'\. Did you mean 'qos'"):
         course(tmp_path).rules("qo", "ana")
