@@ -32,9 +32,9 @@ class Regraded:
 
     @property
     def gained(self) -> float:
-        """Points gained, negative if lost, as far as points are known; 0 unless both are graded."""
+        """Points of the checks gained, negative if lost; 0 unless both are graded."""
         before, after = (
-            one.known_score if one is not None else None for one in (self.before, self.done.result)
+            one.score if one is not None else None for one in (self.before, self.done.result)
         )
         return total((after, -before)) if before is not None and after is not None else 0.0
 
@@ -108,8 +108,8 @@ def _regrade(
     changes = tuple(compare(before, graded.grade))
     if not write:
         facts = RunFacts(before.started, before.duration_s)
-        after = adjust(make_result(graded.grade, graded.recordings, facts))
-        return Regraded(Done(entry, after, fresh=True), adjust(before), changes)
+        after = make_result(graded.grade, graded.recordings, facts)
+        return Regraded(Done(entry, after, fresh=True), before, changes)
     version = (before.assignment.sha256, before.assignment.location)
     if changes or version != (loaded.sha256, loaded.location):
         keep_earlier(folder / RESULT_FILE)
