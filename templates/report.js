@@ -1,6 +1,6 @@
 "use strict";
-// The report is whole without this: it adds the replay, opens what a link points at, and
-// nothing else. It reads the page's own data and loads nothing from elsewhere.
+// The report is whole without this: it adds the replay, marks in the contents what is being read,
+// opens what a link points at, and nothing else. It reads the page's own data and loads nothing from elsewhere.
 (() => {
   const SVG = "http://www.w3.org/2000/svg";
   const DIGITS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
@@ -80,83 +80,99 @@
     }
   }
 
-  // The picture of one run.
-  class Side {
-    constructor(parent, name, run, box) {
+  // Each robot's name, and the class of its marks in the one map.
+  const ROLES = {
+    student: { name: "This submission", class: "of-student" },
+    reference: { name: "Reference", class: "of-reference" },
+    before: { name: "Last attempt", class: "of-before" },
+  };
+
+  // A robot in the map: its way, what it has gone of it, itself.
+  class Robot {
+    constructor(world, run, role) {
       this.run = run;
-      const figure = make(parent, "figure", { class: "side" });
-      const values = run.data.values.join(", ");
-      make(figure, "figcaption", {}, values ? `${name} (${values})` : name);
-      const [width, height] = [box.right - box.left, box.top - box.bottom];
-      const svg = make(figure, "svg", {
-        viewBox: `${box.left} ${-box.top} ${width} ${height}`, class: "plan", role: "img",
-      });
-      this.svg = svg;
-      this.name = name;
-      const world = make(svg, "g", { transform: "scale(1 -1)" });
-      for (const wall of run.data.walls) {
-        const [x1, y1, x2, y2, radius] = wall.map((value) => value / 1000);
-        make(world, "line", radius
-          ? { x1, y1, x2: x2 + 1e-4, y2, class: "thing", "stroke-width": 2 * radius }
-          : { x1, y1, x2, y2, class: "wall" });
-      }
-      this.movers = run.data.moving.map((thing) => thing.radius === null
-        ? make(world, "rect", {
-            x: -thing.size[0] / 2000, y: -thing.size[1] / 2000,
-            width: thing.size[0] / 1000, height: thing.size[1] / 1000, class: "mover",
-          })
-        : make(world, "circle", { r: thing.radius / 1000, class: "mover" }));
-      for (const goal of run.goals) this.goal(world, goal, Math.max(width, height));
-      make(world, "path", { d: this.way(run.x.length), class: "way to-come" });
-      this.beams = make(world, "path", { class: "beams" });
-      this.gone = make(world, "path", { class: "way" });
-      this.robot = make(world, "g");
+      this.group = make(world, "g", { class: role.class });
+      make(this.group, "path", { d: this.way(run.x.length), class: "way to-come" });
+      this.gone = make(this.group, "path", { class: "way" });
+      this.body = make(this.group, "g");
       const radius = run.data.radius / 1000;
-      make(this.robot, "circle", { r: radius, class: "robot" });
-      make(this.robot, "line", { x1: 0, y1: 0, x2: radius, y2: 0, class: "robot nose" });
-      this.cross = make(world, "path", {
-        d: `M${-radius} ${-radius}L${radius} ${radius}M${-radius} ${radius}L${radius} ${-radius}`, class: "out",
-      });
-      this.chart(figure);
-      this.readout = make(figure, "p", { class: "readout" });
-      this.log = make(figure, "ol", { class: "log said-so-far" });
-    }
-    goal(world, { x, y, yaw, radius }, size) {
-      make(world, "circle", { cx: x, cy: y, r: radius, class: "target" });
-      const [dx, dy] = [1.5 * radius * Math.cos(yaw), 1.5 * radius * Math.sin(yaw)];
-      make(world, "line", { x1: x, y1: y, x2: x + dx, y2: y + dy, class: "target-heading" });
-      const text = make(this.svg, "text", { x, y: -(y + 1.2 * radius), "text-anchor": "middle", class: "lane" }, "goal");
-      // In metres, as all of the picture is.
-      text.style.fontSize = `${0.04 * size}px`;
-      text.style.strokeWidth = `${0.012 * size}px`;
-      text.style.vectorEffect = "none";
+      make(this.body, "circle", { r: radius, class: "robot" });
+      make(this.body, "line", { x1: 0, y1: 0, x2: radius, y2: 0, class: "robot nose" });
     }
     way(count) {
       let path = "";
       for (let i = 0; i < count; i++) path += `${i ? "L" : "M"}${this.run.x[i].toFixed(3)} ${this.run.y[i].toFixed(3)}`;
       return path;
     }
-    chart(figure) {
-      const { run } = this;
-      const svg = make(figure, "svg", {
-        viewBox: "0 0 300 64", class: "chart", preserveAspectRatio: "none", "aria-hidden": "true",
-      });
-      [[run.cv, run.v], [run.cw, run.w]].forEach(([command, real], row) => {
-        const most = Math.max(0.02, ...command.map(Math.abs), ...real.map(Math.abs)) * 1.1;
-        const point = (value, i) => `${(300 * i / (run.x.length - 1)).toFixed(1)} ${(16 + 32 * row - 14 * value / most).toFixed(1)}`;
-        make(svg, "line", { x1: 0, x2: 300, y1: 16 + 32 * row, y2: 16 + 32 * row, class: "grid" });
-        make(svg, "path", { d: "M" + command.map(point).join("L"), class: "command" });
-        make(svg, "path", { d: "M" + real.map(point).join("L"), class: "true" });
-      });
-      this.cursor = make(svg, "line", { y1: 0, y2: 64, class: "cursor" });
-    }
     show(time) {
+      const now = this.run.at(time);
+      this.body.setAttribute("transform", `translate(${now.x} ${now.y}) rotate(${now.yaw * 180 / Math.PI})`);
+      this.gone.setAttribute("d", this.way(now.index + 1));
+      return now;
+    }
+  }
+
+  // The map with all robots.
+  class Plan {
+    constructor(parent, runs, box) {
+      const figure = make(parent, "figure", { class: "side" });
+      const [width, height] = [box.right - box.left, box.top - box.bottom];
+      const svg = make(figure, "svg", {
+        viewBox: `${box.left} ${-box.top} ${width} ${height}`, class: "plan", role: "img",
+      });
+      this.svg = svg;
+      this.run = runs.student;
+      const world = make(svg, "g", { transform: "scale(1 -1)" });
+      for (const [key, run] of Object.entries(runs)) this.walls(world, run, ROLES[key].class);
+      this.movers = this.run.data.moving.map((thing) => thing.radius === null
+        ? make(world, "rect", {
+            x: -thing.size[0] / 2000, y: -thing.size[1] / 2000,
+            width: thing.size[0] / 1000, height: thing.size[1] / 1000, class: "mover",
+          })
+        : make(world, "circle", { r: thing.radius / 1000, class: "mover" }));
+      for (const [key, run] of Object.entries(runs)) {
+        if (!this.differs(run, "goals")) continue;
+        for (const goal of run.goals) this.goal(world, goal, Math.max(width, height), ROLES[key].class);
+      }
+      this.beams = make(world, "path", { class: "beams" });
+      // The student's own robot lies above the others.
+      this.robots = Object.fromEntries(
+        Object.keys(runs).reverse().map((key) => [key, new Robot(world, runs[key], ROLES[key])]));
+      const radius = this.run.data.radius / 1000;
+      this.cross = make(world, "path", {
+        d: `M${-radius} ${-radius}L${radius} ${radius}M${-radius} ${radius}L${radius} ${-radius}`, class: "out",
+      });
+    }
+    // Whether another run has other things in its world than the student's own, as random values make.
+    differs(run, what) {
+      return run === this.run || JSON.stringify(run.data[what]) !== JSON.stringify(this.run.data[what]);
+    }
+    walls(world, run, role) {
+      if (!this.differs(run, "walls")) return;
+      for (const wall of run.data.walls) {
+        const [x1, y1, x2, y2, radius] = wall.map((value) => value / 1000);
+        make(world, "line", radius
+          ? { x1, y1, x2: x2 + 1e-4, y2, class: `thing ${role}`, "stroke-width": 2 * radius }
+          : { x1, y1, x2, y2, class: `wall ${role}` });
+      }
+    }
+    goal(world, { x, y, yaw, radius }, size, role) {
+      make(world, "circle", { cx: x, cy: y, r: radius, class: `target ${role}` });
+      const [dx, dy] = [1.5 * radius * Math.cos(yaw), 1.5 * radius * Math.sin(yaw)];
+      make(world, "line", { x1: x, y1: y, x2: x + dx, y2: y + dy, class: `target-heading ${role}` });
+      if (role !== ROLES.student.class) return;
+      const text = make(this.svg, "text", { x, y: -(y + 1.2 * radius), "text-anchor": "middle", class: "lane" }, "goal");
+      // In metres, as all of the picture is.
+      text.style.fontSize = `${0.04 * size}px`;
+      text.style.strokeWidth = `${0.012 * size}px`;
+      text.style.vectorEffect = "none";
+    }
+    show(time, times) {
       const { run } = this;
+      for (const [key, robot] of Object.entries(this.robots)) robot.show(times[key]);
       const now = run.at(time);
-      this.robot.setAttribute("transform", `translate(${now.x} ${now.y}) rotate(${now.yaw * 180 / Math.PI})`);
       this.cross.setAttribute("transform", `translate(${now.x} ${now.y})`);
       this.cross.setAttribute("visibility", run.touches(time) ? "visible" : "hidden");
-      this.gone.setAttribute("d", this.way(now.index + 1));
       const [lx, ly, turned] = run.data.lidar.map((value) => value / 1000);
       const [cos, sin] = [Math.cos(now.yaw), Math.sin(now.yaw)];
       const [ex, ey] = [now.x + cos * lx - sin * ly, now.y + sin * lx + cos * ly];
@@ -169,59 +185,132 @@
         this.movers[i].setAttribute("visibility", place ? "visible" : "hidden");
         if (place) this.movers[i].setAttribute("transform", `translate(${place[0] / 1000} ${place[1] / 1000}) rotate(${place[2] * 0.18 / Math.PI})`);
       });
-      const x = 300 * clamp((time - run.begin) / (run.end - run.begin), 0, 1);
-      this.cursor.setAttribute("x1", x);
-      this.cursor.setAttribute("x2", x);
-      const over = time > run.end + 0.05 ? " The run has ended." : "";
-      const away = run.goals.map((goal) =>
-        ` ${Math.hypot(now.x - goal.x, now.y - goal.y).toFixed(2)} m from the goal (dashed: within ${goal.within}).`).join("");
-      this.readout.textContent =
-        `Commanded ${now.cv.toFixed(2)} m/s, ${now.cw.toFixed(2)} rad/s; true ${now.v.toFixed(2)} m/s, ${now.w.toFixed(2)} rad/s.` +
-        (run.touches(time) ? " It touches something." : "") + away + over;
-      this.svg.setAttribute("aria-label", `${this.name}: robot at x ${now.x.toFixed(2)} m, y ${now.y.toFixed(2)} m, heading ${Math.round(now.yaw * 180 / Math.PI)}°`);
-      const lines = run.data.log.filter(([stamp]) => stamp <= time).slice(-4);
-      this.log.replaceChildren();
-      for (const [stamp, text] of lines) make(this.log, "li", {}, `${stamp.toFixed(2)} s  ${text}`);
-      this.log.hidden = !lines.length;
+      this.svg.setAttribute("aria-label", `Robot at x ${now.x.toFixed(2)} m, y ${now.y.toFixed(2)} m, heading ${Math.round(now.yaw * 180 / Math.PI)}°`);
+    }
+  }
+
+  // A speed over time: with its axes, the limit of the robot, and the same of the other runs.
+  const [LEFT, TOP, HIGH, BELOW] = [44, 24, 64, 20];
+  class Chart {
+    constructor(parent, title, names, limit, runs, shifts, begin, end) {
+      const width = clamp(parent.clientWidth, 280, 720), bottom = TOP + HIGH;
+      const svg = make(parent, "svg", { viewBox: `0 0 ${width} ${bottom + BELOW}`, class: "chart", "aria-hidden": "true" });
+      const all = Object.values(runs).flatMap((run) => names.flatMap((name) => run[name])).filter((value) => Math.abs(value) < 1e3);
+      const [low, high] = [Math.min(0, ...all), Math.max(0, ...all)];
+      const limits = [limit, -limit].filter((value) => value > 0 ? high > 0.3 * limit : low < -0.3 * limit);
+      const most = Math.max(high, ...limits, 0.02), least = Math.min(low, ...limits);
+      this.x = (time) => LEFT + (width - LEFT - 8) * clamp((time - begin) / (end - begin), 0, 1);
+      const y = (value) => TOP + HIGH * (most - clamp(value, least, most)) / (most - least);
+      make(svg, "text", { x: 0, y: 10 }, title);
+      for (const value of new Set([0, ...limits.length ? limits : [most]])) {
+        make(svg, "line", { x1: LEFT, x2: width - 8, y1: y(value), y2: y(value), class: limits.includes(value) ? "limit" : "grid" });
+        make(svg, "text", { x: LEFT - 5, y: y(value) + 4, "text-anchor": "end" }, `${Number(value.toPrecision(2))}`);
+      }
+      const every = [0.5, 1, 2, 5, 10, 20, 60].find((step) => (end - begin) / step <= width / 60) || 120;
+      make(svg, "line", { x1: LEFT, x2: width - 8, y1: bottom, y2: bottom, class: "axis" });
+      for (let time = Math.ceil(begin / every) * every; time <= end; time += every) {
+        make(svg, "line", { x1: this.x(time), x2: this.x(time), y1: bottom, y2: bottom + 4, class: "axis" });
+        make(svg, "text", { x: this.x(time), y: bottom + 15, "text-anchor": "middle" }, `${time} s`);
+      }
+      this.curves = Object.entries(runs).reverse().flatMap(([key, run]) => names.filter((_, i) => i || key === "student").map((name) => {
+        const points = run[name].map((value, i) => `${this.x(run.begin + i * run.data.step - shifts[key]).toFixed(1)} ${y(value).toFixed(1)}`);
+        return [key, make(svg, "path", { d: `M${points.join("L")}`, class: `${name === names[0] ? "command" : "true"} ${ROLES[key].class}` })];
+      }));
+      this.cursor = make(svg, "line", { y1: TOP, y2: bottom, class: "cursor" });
+    }
+    show(time) {
+      for (const name of ["x1", "x2"]) this.cursor.setAttribute(name, this.x(time));
     }
   }
 
   class Player {
     constructor(root) {
       this.root = root;
+      root.hidden = false;
       const data = JSON.parse(document.getElementById(`data-${root.dataset.scenario}`).textContent);
-      const runs = [new Run(data.student)];
-      if (data.reference) {
-        const reference = new Run(data.reference);
-        // Both clocks start with the simulation: the later launch of one is not a later drive.
-        this.shift = reference.begin - runs[0].begin;
-        runs.push(reference);
-      }
-      const boxes = runs.map((run) => run.box());
+      this.runs = Object.fromEntries(Object.keys(ROLES).filter((key) => data[key]).map((key) => [key, new Run(data[key])]));
+      const { student } = this.runs;
+      // All clocks start with the simulation: the later launch of one is not a later drive.
+      this.shifts = Object.fromEntries(Object.entries(this.runs).map(([key, run]) => [key, run.begin - student.begin]));
+      const boxes = Object.values(this.runs).map((run) => run.box());
       const box = {
         left: Math.min(...boxes.map((b) => b.left)), right: Math.max(...boxes.map((b) => b.right)),
         bottom: Math.min(...boxes.map((b) => b.bottom)), top: Math.max(...boxes.map((b) => b.top)),
       };
+      this.begin = student.begin;
+      this.end = Math.max(...Object.entries(this.runs).map(([key, run]) => run.end - this.shifts[key]));
       const sides = make(root, "div", { class: "sides" });
-      this.sides = runs.map((run, i) => new Side(sides, i ? "Reference" : "This submission", run, box));
-      this.begin = runs[0].begin;
-      this.end = Math.max(runs[0].end, runs[1] ? runs[1].end - this.shift : 0);
-      this.slider = root.querySelector("input");
+      const left = make(sides, "div", { class: "side" });
+      this.plan = new Plan(left, this.runs, box);
+      this.legend(left);
+      const charts = make(sides, "div", { class: "side" });
+      const [linear, angular] = student.data.limits.map((value) => value / 1000);
+      const chart = (...args) => new Chart(charts, ...args, this.runs, this.shifts, this.begin, this.end);
+      this.charts = [
+        chart("forward speed (m/s)", ["cv", "v"], linear), chart("rate of turn (rad/s)", ["cw", "w"], angular)];
+      make(charts, "p", { class: "soft hint" }, "Solid: true speed. Dashed: commanded. Dotted: limit of the robot.");
+      this.readout = make(charts, "p", { class: "readout" });
+      this.log = make(charts, "ol", { class: "log said-so-far" });
+      this.slider = root.querySelector("input[type=range]");
       this.output = root.querySelector("output");
-      this.button = root.querySelector("button");
+      this.button = root.querySelector(".play");
+      this.speed = root.querySelector(".speed");
       this.slider.min = this.begin.toFixed(1);
       this.slider.max = this.end.toFixed(1);
       this.slider.addEventListener("input", () => { this.stop(); this.show(Number(this.slider.value)); });
-      this.button.addEventListener("click", () => (this.playing ? this.stop() : this.play()));
-      root.hidden = false;
+      this.button.addEventListener("click", () => this.toggle());
+      for (const button of root.querySelectorAll(".step")) {
+        button.addEventListener("click", () => this.step(Number(button.dataset.frames)));
+      }
       this.show(this.begin);
+    }
+    // What the robots in the map are, and switches for those of other runs.
+    legend(parent) {
+      const list = make(parent, "ul", { class: "legend" });
+      for (const [key, run] of Object.entries(this.runs)) {
+        const { name, class: role } = ROLES[key];
+        const item = make(make(list, "li"), key === "student" ? "span" : "label");
+        if (key !== "student") {
+          const box = make(item, "input", { type: "checkbox" });
+          box.checked = true;
+          box.addEventListener("change", () => {
+            const shown = box.checked ? "visible" : "hidden";
+            for (const mark of this.root.querySelectorAll(`.plan .${role}, .chart .${role}`)) mark.setAttribute("visibility", shown);
+          });
+        }
+        const sample = make(item, "svg", { viewBox: "0 0 28 8", width: 28, height: 8, "aria-hidden": "true" });
+        make(sample, "line", { x1: 0, x2: 28, y1: 4, y2: 4, class: "way" });
+        sample.setAttribute("class", role);
+        const values = run.data.values.join(", ");
+        item.append(values ? ` ${name} (${values})` : ` ${name}`);
+      }
     }
     show(time) {
       this.time = clamp(time, this.begin, this.end);
       this.slider.value = this.time.toFixed(1);
       this.slider.setAttribute("aria-valuetext", `${this.time.toFixed(1)} s after launch`);
       this.output.textContent = `${this.time.toFixed(1)} s`;
-      this.sides.forEach((side, i) => side.show(this.time + (i ? this.shift : 0)));
+      this.plan.show(this.time, Object.fromEntries(Object.keys(this.runs).map((key) => [key, this.time + this.shifts[key]])));
+      for (const chart of this.charts) chart.show(this.time);
+      const { student } = this.runs;
+      const now = student.at(this.time);
+      const away = student.goals.map((goal) =>
+        ` ${Math.hypot(now.x - goal.x, now.y - goal.y).toFixed(2)} m from the goal (dashed: within ${goal.within}).`).join("");
+      this.readout.textContent =
+        `Commanded ${now.cv.toFixed(2)} m/s, ${now.cw.toFixed(2)} rad/s; true ${now.v.toFixed(2)} m/s, ${now.w.toFixed(2)} rad/s.` +
+        (student.touches(this.time) ? " It touches something." : "") + away +
+        (this.time > student.end + 0.05 ? " The run has ended." : "");
+      const lines = student.data.log.filter(([stamp]) => stamp <= this.time).slice(-4);
+      this.log.replaceChildren();
+      for (const [stamp, text] of lines) make(this.log, "li", {}, `${stamp.toFixed(2)} s  ${text}`);
+      this.log.hidden = !lines.length;
+    }
+    step(frames) {
+      this.stop();
+      this.show(this.time + frames * this.runs.student.data.step);
+    }
+    toggle() {
+      if (this.playing) this.stop(); else this.play();
     }
     play() {
       if (this.time >= this.end - 0.05) this.show(this.begin);
@@ -233,7 +322,7 @@
         due += (now - last) / 1000;
         last = now;
         // Who asked for less motion gets stills, two a second.
-        if (due >= (calm.matches ? 0.5 : 0)) { this.show(this.time + due); due = 0; }
+        if (due >= (calm.matches ? 0.5 : 0)) { this.show(this.time + due * Number(this.speed.value)); due = 0; }
         if (this.time >= this.end) this.stop();
         else requestAnimationFrame(frame);
       };
@@ -245,17 +334,26 @@
     }
   }
 
-  const players = new Map();
-  const ready = (root) => {
-    const name = root.dataset.scenario;
-    if (!players.has(name)) players.set(name, new Player(root));
-    return players.get(name);
+  const players = new Map([...document.querySelectorAll(".replay")].map((root) => [root.dataset.scenario, new Player(root)]));
+  // The replay that keys are for: the one with the focus, or else one in sight.
+  const inSight = () => {
+    const focused = document.activeElement && document.activeElement.closest(".replay");
+    const seen = [...players.values()].filter(({ root }) => {
+      const { top, bottom } = root.getBoundingClientRect();
+      return Math.min(bottom, innerHeight) - Math.max(top, 0) > 0.5 * Math.min(bottom - top, innerHeight);
+    });
+    return focused ? players.get(focused.dataset.scenario) : seen.find((one) => one.playing) || seen[0];
   };
-  for (const root of document.querySelectorAll(".replay")) {
-    const card = root.closest("details");
-    if (!card || card.open) ready(root);
-    else card.addEventListener("toggle", () => card.open && ready(root), { once: true });
-  }
+  addEventListener("keydown", (event) => {
+    const own = { " ": (player) => player.toggle(), ",": (player) => player.step(-1), ".": (player) => player.step(1) }[event.key];
+    if (!own || event.ctrlKey || event.metaKey || event.altKey) return;
+    // What Space operates by itself keeps it.
+    if (event.key === " " && event.target.closest("button:not(.step), summary, input[type=checkbox], select")) return;
+    const player = inSight();
+    if (!player) return;
+    event.preventDefault();
+    own(player);
+  });
 
   const reveal = () => {
     const target = location.hash && document.getElementById(decodeURIComponent(location.hash.slice(1)));
@@ -268,22 +366,37 @@
 
   document.addEventListener("click", (event) => {
     const link = event.target.closest("a[data-time]");
-    if (!link) return;
-    const card = document.getElementById(link.hash.slice(1));
-    if (card && card.tagName === "DETAILS") card.open = true;
-    const root = card && card.querySelector(".replay");
-    if (!root) return;
+    const player = link && players.get(link.hash.slice("#what-".length));
+    if (!player) return;
     event.preventDefault();
-    const player = ready(root);
     player.stop();
     player.show(Number(link.dataset.time));
-    root.scrollIntoView({ block: "center" });
+    player.root.scrollIntoView({ block: "center" });
     player.slider.focus({ preventScroll: true });
   });
 
+  // The contents name the section, and the check, that is being read.
+  const nav = document.querySelector(".contents");
+  const links = [...nav.querySelectorAll("a")].map((link) => [link, document.getElementById(link.hash.slice(1))]);
+  const follow = () => {
+    const above = links.filter(([, place]) => place.offsetParent && place.getBoundingClientRect().top < 0.3 * innerHeight);
+    for (const group of [true, false]) {
+      const ofKind = (all) => all.filter(([link]) => link.classList.contains("contents-group") === group);
+      const current = ofKind(above).pop();
+      for (const [link] of ofKind(links)) {
+        const is = Boolean(current) && link === current[0];
+        if (is && group && !link.ariaCurrent) nav.scrollTo({ left: link.offsetLeft - 16 });
+        link.ariaCurrent = is ? "true" : null;
+      }
+    }
+  };
+  addEventListener("scroll", follow, { passive: true });
+  addEventListener("resize", follow);
+  follow();
+
   // Shown in the page of a review: its keys work here too.
   if (parent !== window) addEventListener("keydown", (event) => {
-    if (event.key.length > 1 || event.ctrlKey || event.metaKey || event.altKey || event.target.matches("input")) return;
+    if (event.defaultPrevented || event.key.length > 1 || event.ctrlKey || event.metaKey || event.altKey || event.target.matches("input, select")) return;
     parent.postMessage({ key: event.key }, "*");
   });
 })();

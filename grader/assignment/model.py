@@ -374,7 +374,11 @@ class CheckSpec(Model):
     requires: tuple[Id, ...] = Field(
         (), description="Checks that must pass; otherwise this check is skipped."
     )
-    hint: str = Field("", description="What to try if the check fails, in the author's words.")
+    hint: str | tuple[str, ...] = Field(
+        "",
+        description="What to try if the check fails, in the author's words; or steps in a list, "
+        "from a nudge to nearly the answer, of which a student asks for each after the first.",
+    )
     visibility: Visibility = Field(Visibility.VISIBLE, description="When students see the check.")
 
     @model_validator(mode="after")
@@ -384,6 +388,12 @@ class CheckSpec(Model):
         if self.to is not None and self.to <= self.from_:
             raise ValueError("'to' is not later than 'from'")
         return self
+
+    @property
+    def hints(self) -> tuple[str, ...]:
+        """The steps of the hint; none where there is no hint."""
+        steps = (self.hint,) if isinstance(self.hint, str) else self.hint
+        return tuple(filter(None, steps))
 
     @property
     def window(self) -> Window | None:

@@ -7,7 +7,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from grader.batch.files import RESULT_FILE
-from grader.batch.ledger import EARLIER, keep_earlier
+from grader.batch.last_attempt import EARLIER
+from grader.batch.ledger import keep_earlier
 from grader.errors import RosgradeError
 from grader.report.model.class_result import for_class
 from grader.report.model.result import read_result, result_json

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from grader import __version__
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
+from grader.batch.last_attempt import keep_replays, replays_before
 from grader.errors import UsageError
 from grader.report.files import write_whole
 from grader.report.formats.foxglove import LAYOUT_FILE, render_layout
@@ -17,6 +18,7 @@ from grader.report.model.facts import Clock, RunFacts
 from grader.report.model.result import make_result, result_json
 from grader.report.model.result_model import Result
 from grader.report.model.student import VISIBLE_ONLY, for_student
+from grader.submission.kept_source import SOURCE_FOLDER, read_source
 
 REPORT_FILE = "report.html"
 STUDENT_FILE = "student-report.html"
@@ -31,11 +33,13 @@ def write_graded(
     clock: Clock,
     json_file: Path | None = None,
     amended: Callable[[Result], Result] = lambda result: result,
+    root: Path | None = None,
 ) -> Result:
     """Write report and result of a submission.
 
     Args:
         amended: Adds to the result what is not in the grade, such as earlier attempts.
+        root: The submission where the reader of the report has it; see :func:`write_report`.
     """
     first = next(iter(graded.recordings.values()), None)
     facts = RunFacts(
@@ -47,7 +51,9 @@ def write_graded(
         runs=graded.runs,
     )
     result = amended(make_result(graded.grade, graded.recordings, facts))
-    write_report(graded, folder, result)
+    if root is not None:
+        keep_replays(folder, graded)
+    write_report(graded, folder, result, root=root)
     # Last, so that the report beside a result always has the same grade.
     for file in (folder / RESULT_FILE, json_file):
         if file is not None:
@@ -56,33 +62,40 @@ def write_graded(
 
 
 def write_report(
-    graded: Graded, folder: Path, result: Result, visible: frozenset[str] = VISIBLE_ONLY
+    graded: Graded,
+    folder: Path,
+    result: Result,
+    visible: frozenset[str] = VISIBLE_ONLY,
+    root: Path | None = None,
 ) -> None:
     """Write ``report.html``, and a Foxglove layout beside the recordings.
 
     Where checks are hidden, the copy that a student may see is written too; ``visible`` are the
-    visibilities in it.
+    visibilities in it. Of a submission that is a folder, ``root``, the report links the files.
     """
     if graded.recordings and (folder / RECORDINGS_FOLDER).is_dir():
         layout = render_layout(graded.recordings.values())
         write_whole(folder / RECORDINGS_FOLDER / LAYOUT_FILE, layout)
-    whole = render_report(graded.grade, result, graded.recordings, graded.references)
-    write_whole(folder / REPORT_FILE, whole)
+    source = read_source(folder / SOURCE_FOLDER).files
+    before = replays_before(folder, result.submission.sha256)
+    shown = (graded.recordings, graded.references, before, source)
+    root = root.resolve() if root is not None and root.is_dir() else None
+    write_whole(folder / REPORT_FILE, render_report(graded.grade, result, *shown, root))
     copy, file = for_student(result, visible), folder / STUDENT_FILE
     if copy is result:
         file.unlink(missing_ok=True)
     else:
-        text = render_report(graded.grade, copy, graded.recordings, graded.references)
-        write_whole(file, text)
+        write_whole(file, render_report(graded.grade, copy, *shown))
 
 
 def refuse_foreign(folder: Path, *, keep: bool) -> None:
-    """Let no report replace recordings, or an install space, that are not of an earlier report."""
+    """Let no report replace a folder of its name that is not of an earlier report."""
     recordings = folder / RECORDINGS_FOLDER
     foreign = any(recordings.glob("*.mcap")) and not (recordings / SUBMISSION_FILE).is_file()
-    install = folder / INSTALL_FOLDER
-    if foreign or (keep and install.exists() and not (folder / RESULT_FILE).is_file()):
-        other = recordings if foreign else install
+    others = [recordings] if foreign else []
+    if not (folder / RESULT_FILE).is_file():
+        others += [folder / name for name in (SOURCE_FOLDER, *([INSTALL_FOLDER] if keep else []))]
+    for other in filter(Path.exists, others):
         raise UsageError(f"{other}: does not belong to a report, so it stays; use another folder")
 
 

@@ -16,6 +16,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from grader.batch.files import RESULT_FILE
+from grader.batch.last_attempt import EARLIER
 from grader.errors import RosgradeError, UsageError, machine_fault
 from grader.report.files import check_folder, folder_name, sync, write_whole
 from grader.report.model.class_result import for_class
@@ -26,7 +27,6 @@ BATCH_FILE = "batch.json"
 SUBMISSIONS = "submissions"
 _PARTIAL = ".partial"
 _LOCK = ".lock"
-EARLIER = "earlier"
 _REPLACED = "#replaced"
 """Suffix of a result's folder while another one replaces it; no key has such a folder."""
 

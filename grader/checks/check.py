@@ -49,6 +49,8 @@ class Parameters(Model):
     """After such disturbances a failure must happen twice to count."""
     only: ClassVar[str] = ""
     """The one language that it can read, or nothing if it is the same for all."""
+    about: ClassVar[tuple[str, ...]] = ("publisher", "subscription", "node")
+    """What it judges of all that a program declares: a failure shows where that is created."""
     asks: ClassVar[str] = ""
     """What is asked for, in the words of the handout, such as ``the node `{self.name}```."""
 

@@ -110,6 +110,7 @@ def check(
             from grader.batch.grading import RECORDINGS_FOLDER, Grading
             from grader.report.files import check_folder
             from grader.submission.intake.locate import check_path
+            from grader.submission.kept_source import SOURCE_FOLDER, read_source
 
             whole = chosen_names(load_assignment(assignment), chosen)
             shown = whole if hidden else visible_part(whole)
@@ -124,6 +125,7 @@ def check(
                     report / RECORDINGS_FOLDER,
                     progress.say,
                     on_output=partial(progress.output, "build"),
+                    source_folder=report / SOURCE_FOLDER,
                 )
             from grader.batch.attempts import with_history
             from grader.batch.files import keep_install, write_graded
@@ -137,9 +139,9 @@ def check(
         from grader.ros2_command import absence_note
 
         history = partial(with_history, report)
-        result = write_graded(graded, report, clock, json_file, history)
-        console = output_console()
-        print_grade(console, graded.grade.assignment.title, result)
+        result = write_graded(graded, report, clock, json_file, history, submission)
+        console, source = output_console(), read_source(report / SOURCE_FOLDER).files
+        print_grade(console, graded.grade.assignment.title, result, source)
         say(f"Report: {page}")
         note = absence_note(" ".join(f"{one.hint} {one.author_hint}" for one in result.checks))
         if note:
@@ -174,7 +176,7 @@ def _while_it_starts(narrate: Narrate) -> Narrate:
 
 
 def _get_ready() -> None:
-    for module in ("grader.batch.attempts", "grader.report.text.terminal"):
+    for module in ("grader.batch.attempts", "grader.report.text.terminal", "rich.syntax"):
         import_module(module)
     from grader.recording import mcap_reader
     from grader.report.html import page

@@ -161,6 +161,7 @@ class _Work:
 
     def grade(self) -> Graded:
         from grader.batch.grading import RECORDINGS_FOLDER
+        from grader.submission.kept_source import SOURCE_FOLDER
 
         assert self.grading is not None
         if self.problem is not None:
@@ -171,6 +172,7 @@ class _Work:
             self.report / RECORDINGS_FOLDER,
             self.progress.say,
             on_output=partial(self.progress.output, "build"),
+            source_folder=self.report / SOURCE_FOLDER,
         )
 
     def tell_early(self, record: SubmissionRecord, recordings: Mapping[str, Recording]) -> None:
@@ -213,6 +215,7 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
     from grader.report.text.explanation import score
     from grader.report.text.last_save import what_changed
     from grader.report.text.terminal import print_changes, print_grade
+    from grader.submission.kept_source import SOURCE_FOLDER, read_source
 
     clock = Clock()
     with ExitStack() as shown:
@@ -233,7 +236,10 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
                 page.show(text=f"not graded: {event.problem}", title=f"! {title}", is_old=False)
             else:
                 history = partial(with_history, work.report)
-                result = write_graded(event.graded, work.report, clock, amended=history)
+                result = write_graded(
+                    event.graded, work.report, clock, amended=history, root=work.submission
+                )
+                source = read_source(work.report / SOURCE_FOLDER).files
                 console.rule(f"{time.strftime('%H:%M:%S')}, after {clock.elapsed_s:.1f} s")
                 points = score(result)
                 changed = what_changed(work.before, result) if work.before is not None else ""
@@ -244,9 +250,9 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
                     (result.known_score, result.known_max_score),
                 )
                 if work.before is None:
-                    print_grade(console, title, result)
+                    print_grade(console, title, result, source)
                 else:
-                    print_changes(console, work.before, result, page.state.scores)
+                    print_changes(console, work.before, result, page.state.scores, source)
                 work.before = result
                 work.runner.get_ready()
             work.progress.say(f"watching {work.submission}; Ctrl-C ends")

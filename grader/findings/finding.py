@@ -136,6 +136,8 @@ class Evidence:
     Attributes:
         moments: Times in the recording.
         places: Places in the student's files.
+        origins: Where the student's program creates what the finding is about; the verdict does
+            not depend on it.
         log: Lines of output that matter, as printed.
         plots: Series to draw.
         tables: Small tables.
@@ -152,6 +154,7 @@ class Evidence:
     spans: tuple[Span, ...] = ()
     cases: tuple[Cases, ...] = ()
     comparisons: tuple[Comparison, ...] = ()
+    origins: tuple[SourceError, ...] = ()
 
 
 @dataclass(frozen=True)

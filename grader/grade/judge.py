@@ -23,6 +23,7 @@ from grader.findings.wording import percent
 from grader.grade.language import finding_in_cpp, in_cpp, is_cpp
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
 from grader.grade.naming import named
+from grader.grade.origins import with_origins
 from grader.grade.runtime_imports import with_runtime_imports
 from grader.grade.windowed import judged_in
 from grader.recording.model import Ending, Recording
@@ -86,7 +87,7 @@ def grade(
             scenarios=tuple(scenario.id for scenario in loaded.scenarios_of(bound[name])),
             findings=findings,
             waits_for=roots,
-            hint=in_cpp(spec.hint) if speaks_cpp else spec.hint,
+            hints=tuple(map(in_cpp, spec.hints)) if speaks_cpp else spec.hints,
             credit=credit,
             put_right=put_right and status is Status.FAILED,
         )
@@ -247,6 +248,7 @@ def _judge(
         if failed and isinstance(subject, Recording):
             doubtful = is_doubtful(subject, bound.parameters.doubt)
             finding = replace(finding, disturbed=doubtful or finding.disturbed)
+            finding = with_origins(finding, bound.parameters, subject)
     except Exception as error:
         # Any exception of a check is a bug in it, and must not cost the student points.
         trace = "".join(traceback.format_exception(error))

@@ -53,7 +53,7 @@ class CheckResult:
     scenarios: tuple[str, ...]
     findings: tuple[ScenarioFinding, ...]
     waits_for: tuple[str, ...] = ()
-    hint: str = ""
+    hints: tuple[str, ...] = ()
     put_right: bool = False
     credit: float = 0.0
 

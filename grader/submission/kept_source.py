@@ -21,6 +21,8 @@ _MOST_NAMED = 200
 _LONGEST_PATH = 1024
 # No file of a submission has such a path: see `leftovers.TOOL_FOLDERS`.
 _LEFT_OUT = "rosgrade-report/left-out.txt"
+# So that neither colcon nor rosgrade takes the copy for packages of the workspace around it.
+_IGNORE = "COLCON_IGNORE"
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ def keep_source(root: Path, folder: Path) -> None:
         else:
             _write(folder / file.path, data)
             room, count = room - len(data), count + 1
+    _write(folder / _IGNORE, b"")
     if left_out:
         more = len(left_out[_MOST_NAMED:])
         named = [*sorted(left_out)[:_MOST_NAMED], *([f"… and {more} more"] if more else [])]
@@ -69,6 +72,7 @@ def read_source(folder: Path) -> KeptSource:
         if file.is_file() and not file.is_symlink()
     }
     left_out = found.pop(_LEFT_OUT, None)
+    found.pop(_IGNORE, None)
     return KeptSource(
         {shown(path): _text(file) for path, file in found.items()},
         tuple(_text(left_out).splitlines()) if left_out else (),

@@ -25,6 +25,7 @@ VIEWS = [
     ("not_built", 1280, "dark"),
     ("not_graded", 390, "dark"),
 ]
+SLIDER = ".replay input[type=range]"
 pytestmark = pytest.mark.slow
 
 
@@ -65,6 +66,7 @@ def test_all_is_there_without_javascript(look, pages):
     page = found.page
     assert page.get_by_role("heading", name="Fix this first").is_visible()
     assert page.get_by_text("Path of the robot in the scenario drive").count()
+    page.locator(".fold summary", has_text="1 check passed").click()
     page.locator("#check-speed summary").click()
     assert page.locator("#check-speed .observed").is_visible()
     assert page.locator(".replay").is_hidden()
@@ -72,23 +74,40 @@ def test_all_is_there_without_javascript(look, pages):
 
 
 class TestReplay:
-    def test_it_shows_submission_and_reference_at_the_time_of_the_slider(self, look, pages):
+    def test_it_shows_what_the_robot_saw_at_the_time_of_the_slider(self, look, pages):
         page = look(pages["gallery"]).page
-        sides = page.locator(".replay .side")
-        assert sides.count() == 2
-        robot = sides.nth(0).locator("svg.plan")
-        before = robot.get_attribute("aria-label")
-        slider = page.locator(".replay input")
+        plan = page.locator(".replay svg.plan")
+        before = plan.get_attribute("aria-label")
+        slider = page.locator(SLIDER)
         slider.focus()
         for _ in range(20):
             page.keyboard.press("ArrowRight")
         time = f"{float(slider.input_value()):.1f} s after launch"
         assert slider.get_attribute("aria-valuetext") == time
-        assert robot.get_attribute("aria-label") != before
-        assert "heading 0°" in robot.get_attribute("aria-label")
-        assert sides.nth(0).locator(".beams").get_attribute("d").count("L") > 5
+        assert plan.get_attribute("aria-label") != before
+        assert "heading 0°" in plan.get_attribute("aria-label")
+        assert plan.locator(".beams").get_attribute("d").count("L") > 5
 
-    def test_the_goal_is_drawn_and_named_on_both_sides(self, look):
+    def test_reference_and_last_attempt_are_ghosts_in_the_same_map(self, look):
+        found = look(gallery().html(reference(), before=reference()))
+        page = found.page
+        page.locator(SLIDER).focus()
+        page.keyboard.press("End")
+        at = {
+            role: page.locator(f".replay .plan {role} circle.robot").evaluate(
+                "(robot) => robot.getBoundingClientRect().right"
+            )
+            for role in (".of-student", ".of-reference", ".of-before")
+        }
+        mine, theirs, before = at.values()
+        assert mine > theirs + 5 and theirs == before
+        page.get_by_label("Reference").uncheck()
+        assert page.locator(".replay .plan .of-reference").is_hidden()
+        assert page.locator(".replay .plan .of-before").is_visible()
+        found.keep("replay-ghosts", full_page=True)
+        assert found.complaints == []
+
+    def test_the_goal_is_drawn_and_named(self, look):
         sample = gallery()
         goal = {"goal": ["0.4", "-0.2", "90 deg"], "position": "8 cm"}
         assignment = sample.grade.assignment
@@ -98,63 +117,94 @@ class TestReplay:
         )
         grade = replace(sample.grade, assignment=assignment.model_copy(update={"checks": checks}))
         found = look(replace(sample, grade=grade).html(reference()))
-        sides = found.page.locator(".replay .side")
-        for number in range(2):
-            side = sides.nth(number)
-            circle = side.locator("svg.plan circle.target")
-            place = [circle.get_attribute(name) for name in ("cx", "cy", "r")]
-            assert place == ["0.4", "-0.2", "0.08"]
-            name, plan = side.locator("svg.plan text"), side.locator("svg.plan")
-            assert name.text_content() == "goal"
-            inner, outer = name.bounding_box(), plan.bounding_box()
-            assert 6 < inner["height"] < 40
-            assert outer["x"] <= inner["x"] and outer["y"] <= inner["y"]
-            assert inner["y"] < circle.bounding_box()["y"] + 2
-            assert (
-                "m from the goal (dashed: within 8 cm)" in side.locator(".readout").text_content()
-            )
-        found.page.locator(".replay").evaluate("(root) => root.scrollIntoView()")
+        replay = found.page.locator(".replay")
+        plan, circle = replay.locator("svg.plan"), replay.locator("svg.plan circle.target")
+        place = [circle.get_attribute(name) for name in ("cx", "cy", "r")]
+        assert place == ["0.4", "-0.2", "0.08"]
+        name = plan.locator("text")
+        assert name.text_content() == "goal"
+        inner, outer = name.bounding_box(), plan.bounding_box()
+        assert 6 < inner["height"] < 40
+        assert outer["x"] <= inner["x"] and outer["y"] <= inner["y"]
+        assert inner["y"] < circle.bounding_box()["y"] + 2
+        told = replay.locator(".readout").text_content()
+        assert "m from the goal (dashed: within 8 cm)" in told
+        replay.evaluate("(root) => root.scrollIntoView()")
         found.keep("replay-goal")
         assert found.complaints == []
 
-    def test_at_the_end_one_has_touched_the_wall_and_the_other_has_stopped(self, look, pages):
+    def test_the_readout_tells_that_it_touches_the_wall_and_what_was_printed(self, look, pages):
         found = look(pages["gallery"])
         page = found.page
-        page.locator(".replay input").focus()
+        page.locator(SLIDER).focus()
         page.keyboard.press("End")
-        mine, theirs = page.locator(".replay .readout").all_text_contents()
-        assert "It touches something." in mine and "Commanded 0.10 m/s" in mine
-        assert "Commanded 0.00 m/s" in theirs and "true 0.00 m/s" in theirs
-        said = page.locator(".replay .said-so-far").first.text_content()
-        assert said.count("Front is clear") == 1
-        page.locator(".replay").scroll_into_view_if_needed()
-        found.keep("replay")
+        told = page.locator(".replay .readout").text_content()
+        assert "It touches something." in told and "Commanded 0.10 m/s" in told
+        assert page.locator(".replay .said-so-far").text_content().count("Front is clear") == 1
         assert found.complaints == []
+
+    def test_the_speeds_have_axes_and_the_limit_of_the_robot(self, look, pages):
+        page = look(pages["gallery"]).page
+        chart = page.locator(".replay .chart").first
+        assert chart.locator(".limit").count() == 1
+        assert {"forward speed (m/s)", "0.22", "0", "2 s"} <= set(
+            chart.locator("text").all_text_contents()
+        )
+
+    def test_space_and_frames_work_wherever_the_focus_is(self, look, pages):
+        page = look(pages["gallery"]).page
+        slider = page.locator(SLIDER)
+        page.locator(".replay").scroll_into_view_if_needed()
+        begin = float(slider.input_value())
+        page.keyboard.press(".")
+        page.keyboard.press(".")
+        page.keyboard.press(",")
+        assert float(slider.input_value()) == pytest.approx(begin + 0.1, abs=0.01)
+        for focused in ("body", SLIDER, ".replay .step"):
+            page.locator(focused).first.evaluate("(one) => one.focus()")
+            page.keyboard.press("Space")
+            assert page.get_by_role("button", name="Pause").is_visible(), focused
+            page.keyboard.press("Space")
+            assert page.get_by_role("button", name="Play").is_visible(), focused
+
+    def test_it_plays_at_four_times_the_speed(self, look, pages):
+        page = look(pages["gallery"]).page
+        page.get_by_label("Speed", exact=True).select_option("4")
+        ran = page.evaluate(
+            """async () => {
+              const slider = document.querySelector('.replay input[type=range]');
+              const [time, began] = [Number(slider.value), performance.now()];
+              document.querySelector('.replay .play').click();
+              while (performance.now() - began < 400) await new Promise(requestAnimationFrame);
+              return (Number(slider.value) - time) / (performance.now() - began) * 1000;
+            }"""
+        )
+        assert 2.0 < ran < 5.0
 
     def test_a_time_in_a_finding_leads_to_that_time(self, look, pages):
         page = look(pages["gallery"]).page
         link = page.locator("#check-touch a.time")
         time_s = float(link.get_attribute("data-time"))
         link.click()
-        assert abs(float(page.locator(".replay input").input_value()) - time_s) < 0.06
+        assert abs(float(page.locator(SLIDER).input_value()) - time_s) < 0.06
         assert page.evaluate("document.activeElement.type") == "range"
 
     def test_it_plays_and_pauses(self, look, pages):
         page = look(pages["gallery"]).page
         button = page.get_by_role("button", name="Play")
-        slider = page.locator(".replay input")
+        slider = page.locator(SLIDER)
         begin = float(slider.input_value())
         button.click()
         page.wait_for_function(
-            "(begin) => Number(document.querySelector('.replay input').value) > begin + 0.3",
-            arg=begin,
+            "([slider, begin]) => Number(document.querySelector(slider).value) > begin + 0.3",
+            arg=[SLIDER, begin],
         )
         page.get_by_role("button", name="Pause").click()
         assert page.get_by_role("button", name="Play").is_visible()
 
     def test_who_asked_for_less_motion_gets_stills(self, look, pages):
         page = look(pages["gallery"], reduced_motion="reduce").page
-        begin = page.locator(".replay input").input_value()
+        begin = page.locator(SLIDER).input_value()
         page.evaluate(
             """() => {
               window.seen = [];
@@ -176,6 +226,27 @@ def test_a_link_to_a_check_opens_it(look, pages):
     page.evaluate("location.hash = '#check-speed'")
     page.wait_for_function("() => document.getElementById('check-speed').open")
     assert page.locator("#check-speed .observed").is_visible()
+
+
+def test_what_failed_can_be_shown_alone(look, pages):
+    page = look(pages["gallery"], java_script_enabled=False).page
+    page.get_by_label("Show only what failed").check()
+    assert page.locator("#check-touch").is_visible()
+    assert page.locator("#check-stops").is_hidden()
+    assert page.locator(".fold", has_text="1 check passed").is_hidden()
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_the_contents_name_the_section_that_is_read(look, pages, width):
+    page = look(pages["gallery"], width).page
+    for name in ("A wall is ahead", "It publishes"):
+        page.get_by_role("heading", name=name, exact=True).evaluate("(one) => one.scrollIntoView()")
+        page.wait_for_function(
+            "(name) => document.querySelector('.contents-group[aria-current]')"
+            "?.textContent === name",
+            arg=name,
+        )
+        assert page.locator(".contents-group[aria-current]").is_visible()
 
 
 def test_everything_can_be_reached_by_the_keyboard(look, pages):
@@ -236,7 +307,7 @@ def test_a_hostile_log_line_in_a_replay_is_text(look):
     recordings = {**sample.recordings, "drive": replace(run, log=log)}
     html = replace(sample, recordings=recordings).html()
     found = look(html)
-    found.page.locator(".replay input").focus()
+    found.page.locator(SLIDER).focus()
     found.page.keyboard.press("End")
     assert attack in found.page.locator(".replay .said-so-far").first.text_content()
     assert found.page.evaluate("window.hacked") is None and found.requests == []

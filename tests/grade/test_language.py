@@ -181,7 +181,7 @@ def test_findings_and_hints_of_the_author_are_in_the_language_of_the_package() -
     ):
         run = {"listen": make_recording(submission=record)}
         result = grade(loaded, record, run).result("node")
-        assert (result.decisive.finding.hint, result.hint) == expected
+        assert (result.decisive.finding.hint, *result.hints) == expected
 
 
 def test_a_check_that_reads_python_takes_no_points_from_students_of_cpp() -> None:

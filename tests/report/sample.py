@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any
 
 from rich.console import Console
@@ -15,7 +16,7 @@ from grader.grade import Grade, grade
 from grader.recording.event import Breach, Disturbance
 from grader.recording.model import NS, Call, LogLine, Message, Node, Owner, Process, Recording
 from grader.report.html.replay import Replay
-from grader.report.html.report import NO_REFERENCE, render_report
+from grader.report.html.report import NO_REPLAYS, render_report
 from grader.report.model.facts import RunFacts
 from grader.report.model.result import make_result
 from grader.report.model.result_model import AdjustmentPart, AttemptPart, CommentPart, Result
@@ -70,14 +71,19 @@ class Sample:
         made = make_result(self.grade, self.recordings, self.facts)
         return made.model_copy(update=dict(self.added))
 
-    def html(self, references: Mapping[str, Replay] = NO_REFERENCE) -> str:
-        return render_report(self.grade, self.result, self.recordings, references)
+    def html(self, references: Mapping[str, Replay] = NO_REPLAYS, **options: Any) -> str:
+        return render_report(self.grade, self.result, self.recordings, references, **options)
 
-    def printed(self, width: int = 80, **options: Any) -> str:
+    def printed(
+        self,
+        width: int = 80,
+        source: Mapping[str, str] = MappingProxyType({}),
+        **options: Any,
+    ) -> str:
         """What a terminal of that width shows, without the spaces at the ends of lines."""
         stream = io.StringIO()
         console = Console(file=stream, width=width, highlight=False, emoji=False, **options)
-        print_grade(console, self.grade.assignment.title, self.result)
+        print_grade(console, self.grade.assignment.title, self.result, source)
         return "\n".join(line.rstrip() for line in stream.getvalue().split("\n"))
 
 

@@ -59,7 +59,7 @@ def test_each_format_shows_the_final_score_and_every_line_of_it(name):
 
 @pytest.mark.parametrize("name", ["terminal", "markdown", "github", "gradescope"])
 def test_points_that_a_person_has_not_given_yet_are_named(name):
-    assert f"4 of 5 points; {WAITS}" in formats(sample(waits=True))[name]
+    assert f"4 of 8 points so far; {WAITS}" in formats(sample(waits=True))[name]
 
 
 def test_a_report_marks_the_words_of_a_person():

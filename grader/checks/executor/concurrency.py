@@ -42,6 +42,7 @@ _SAME_PERIOD = 0.05
 class Overlap(Parameters):
     """Parameters of executor.overlap."""
 
+    about = ("timer", "subscription")
     callbacks: tuple[str, ...] = Field(
         min_length=1, description=f"{_CALLBACKS} With `log`, the words for it in lines of the log."
     )
@@ -170,6 +171,7 @@ def _hint(recording: Recording, runs: Sequence[Run], *, together: bool) -> str:
 class ExecutorKind(Parameters):
     """Parameters of executor.kind."""
 
+    about = ("node",)
     executor: Literal["SingleThreadedExecutor", "MultiThreadedExecutor"] = Field(
         description="Kind of the executor that spins."
     )

@@ -46,6 +46,7 @@ _HINT = (
 class Responsive(Parameters):
     """Parameters of executor.responsive."""
 
+    about = ("timer", "subscription")
     doubt = Doubt.ANSWER_MISSED
 
     within: Duration = Field(1.0, description="Longest time for an answer.")
@@ -301,6 +302,7 @@ def _evidence(recording: Recording, groups: list[_Answers]) -> Evidence:
 class Timer(Parameters):
     """Parameters of executor.timer."""
 
+    about = ("timer", "publisher")
     doubt = Doubt.ANSWER_MISSED
 
     topic: TopicName = Field(description="Topic on which the callback of a timer publishes.")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from itertools import accumulate, pairwise
+from operator import sub
 
 from pydantic import Field, model_validator
 
@@ -14,7 +15,7 @@ from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.missed_heading import why_not_aligned
 from grader.diagnosis.motion.no_motion import approach, why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted, why_off_course, why_unsteered
-from grader.findings.finding import Evidence, Finding
+from grader.findings.finding import Evidence, Finding, Plot
 from grader.findings.first_seen import until_the_end
 from grader.findings.wording import percent
 from grader.measure.motion.approach import Approach
@@ -25,6 +26,8 @@ from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 from grader.spec.quantity import Angle, Duration, PositiveLength, Ratio
 from grader.spec.unit import format_duration
+
+_MOST_POINTS = 400
 
 
 class Reaches(GoalParameters):
@@ -233,46 +236,64 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     if arrival is None:
         cause = why_not_there(run, parameters.position)
         return (cause or Cause("never near the goal")).finding(expected)
-    past_m = _past_m(run, arrival)
-    beyond_rad = _beyond_rad(run, parameters.position)
-    seen, plots = [], []
+    past_m, beyond_rad = _past_m(run, arrival), _beyond_rad(run, parameters.position)
+    seen, plots, moments = [], [], []
     if most_m is not None:
-        seen.append(f"{metres(past_m)} past the goal")
-        plots.append(run.distance_plot)
+        far = max(past_m, key=past_m.__getitem__)
+        seen.append(f"{metres(past_m[far])} past the goal")
+        moments.append((past_m[far] > most_m, seen[-1], far))
+        shown = {time_ns: value * 100.0 for time_ns, value in past_m.items()}
+        plots.append(_plot(run, "Past the goal, once near it", "past (cm)", shown, most_m * 100.0))
     if most_rad is not None:
-        seen.append(f"{degrees(beyond_rad)} beyond its heading")
-        plots.append(run.heading_plot)
+        far = max(beyond_rad, key=beyond_rad.__getitem__)
+        seen.append(f"{degrees(beyond_rad[far])} beyond its heading")
+        moments.append((beyond_rad[far] > most_rad, seen[-1], far))
+        shown = {time_ns: math.degrees(value) for time_ns, value in beyond_rad.items()}
+        limit = math.degrees(most_rad)
+        plots.append(_plot(run, "Beyond the goal's heading", "beyond (°)", shown, limit))
+    off = [(label, time_ns) for is_off, label, time_ns in moments if is_off]
     evidence = Evidence(plots=tuple(plots))
-    if (most_m is None or past_m <= most_m) and (most_rad is None or beyond_rad <= most_rad):
+    if not off:
         return Finding.passed(expected, " and ".join(seen), evidence)
     cause = why_off_course(recording) or Cause(
         " and ".join(seen),
         "Compute linear.x as a gain times the distance: then the robot slows down before the goal. "
         "Make the gain smaller, so that linear.x is below its limit before the robot arrives.",
-        evidence_at(recording, "at the goal", run.truth[arrival].time_ns, *evidence.plots),
+        evidence_at(recording, *off[0], *evidence.plots),
     )
     return cause.finding(expected)
 
 
-def _past_m(run: Approach, arrival: int) -> float:
-    """The largest growth of the distance after the arrival."""
-    nearest_m, past_m = math.inf, 0.0
-    for step in run.truth[arrival:]:
-        distance_m = run.distance_m(step)
-        nearest_m = min(nearest_m, distance_m)
-        past_m = max(past_m, distance_m - nearest_m)
-    return past_m
+def _plot(run: Approach, title: str, label: str, shown: dict[int, float], most: float) -> Plot:
+    """Values by time with the largest that is allowed; the largest of them is always drawn."""
+    values = list(shown.items())
+    largest = max(values, key=lambda one: one[1])
+    kept = sorted({*values[:: max(1, len(values) // _MOST_POINTS)], largest})
+    times_s = tuple(run.recording.since_launch_s(time_ns) for time_ns, _ in kept)
+    off = tuple(value for _, value in kept)
+    return Plot(title, "time since launch (s)", label, times_s, off, (-math.inf, most))
 
 
-def _beyond_rad(run: Approach, position_m: float) -> float:
-    """How far the heading went to the other side of the goal's after driving had ended."""
+def _past_m(run: Approach, arrival: int) -> dict[int, float]:
+    """How far the distance has grown again since it was least, by time, from the arrival on."""
+    steps = run.truth[arrival:]
+    distances = [run.distance_m(step) for step in steps]
+    grown = map(sub, distances, accumulate(distances, min))
+    return {step.time_ns: past_m for step, past_m in zip(steps, grown, strict=True)}
+
+
+def _beyond_rad(run: Approach, position_m: float) -> dict[int, float]:
+    """How far beyond the goal's heading it has turned, by time, from when driving had ended.
+
+    Negative on the side that it comes from; only the last step, with 0, where it crosses nothing.
+    """
     driven = run.driven(position_m)
-    if driven is None:
-        return 0.0
-    errors = [run.heading_error_rad(step) for step in run.truth[driven:]]
+    steps = run.truth[driven:] if driven is not None else ()
+    errors = [run.heading_error_rad(step) for step in steps]
     for index, (before, after) in enumerate(pairwise(errors), start=1):
         # Through half a turn the sign changes as well.
         if before * after < 0.0 and abs(before) < math.pi / 2.0:
             side = math.copysign(1.0, before)
-            return max(-side * error for error in errors[index:])
-    return 0.0
+            crossed = zip(steps[index - 1 :], errors[index - 1 :], strict=True)
+            return {step.time_ns: -side * error for step, error in crossed}
+    return {run.truth[-1].time_ns: 0.0}

@@ -59,6 +59,7 @@ _CLOCK_HINT = "Publish at the right time, and do not change the clock of the pro
 class Period(Parameters):
     """Parameters of timing.period."""
 
+    about = ("timer", "publisher")
     needs = (Recorded(),)
 
     topic: TopicName = Field(description="Fully qualified topic name.")
@@ -209,6 +210,7 @@ def _evidence(
 class Rate(Parameters):
     """Parameters of timing.rate."""
 
+    about = ("timer", "publisher")
     needs = (Recorded(),)
 
     topic: TopicName = Field(description="Fully qualified topic name.")

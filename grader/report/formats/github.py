@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from grader.findings.finding import Status
 from grader.report.formats.markdown import render_markdown
+from grader.report.model.excerpt import places
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
 from grader.report.text import explanation
@@ -93,7 +94,7 @@ def command(name: str, message: str, **properties: str) -> str:
 
 def _annotation(check: CheckPart, result: Result, level: str, prefix: str | None) -> str:
     properties: dict[str, str] = {}
-    place = next(iter(check.evidence.places), None)
+    place = next(iter(places(check)), None)
     if place is not None and prefix is not None:
         properties["file"] = one_line(prefix + place.file)
         if place.line:

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 
 from grader.findings.finding import Status
 from grader.report.formats.options import FormatOptions
+from grader.report.model.excerpt import places
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
 from grader.report.text import additions, explanation
@@ -107,7 +108,7 @@ def first_to_fix(result: Result) -> list[str]:
     first = next((check for check in result.checks if check.id == result.first_to_fix), None)
     if first is None:
         return []
-    where = "".join(f" ({literal(explanation.spot(one))})" for one in first.evidence.places[:1])
+    where = "".join(f" ({literal(explanation.spot(one))})" for one in places(first)[:1])
     return ["", f"**Fix this first:** {prose(first.title)}{where}"]
 
 

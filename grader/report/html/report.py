@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from pathlib import Path
 
 from markupsafe import Markup
 
@@ -25,12 +26,16 @@ from grader.report.html.page import render_page
 from grader.report.html.qos_table import pairs
 from grader.report.html.replay import Replay, embedded, make_replay, with_goals
 from grader.report.html.sections import Section, make_sections
+from grader.report.html.shown_source import ShownSource
+from grader.report.model.excerpt import places
 from grader.report.model.output import shorten
 from grader.report.model.result_model import Result
 from grader.report.model.target import targets
+from grader.report.text import explanation
 from grader.submission.record import BuildRecord
 
-NO_REFERENCE: Mapping[str, Replay] = {}
+NO_REPLAYS: Mapping[str, Replay] = {}
+NO_SOURCE: Mapping[str, str] = {}
 CONTEXT = 6
 """Lines of a build log that are shown around the student's own."""
 MOST_PLACES = 3
@@ -41,7 +46,10 @@ def render_report(
     grade: Grade,
     result: Result,
     recordings: Mapping[str, Recording],
-    references: Mapping[str, Replay] = NO_REFERENCE,
+    references: Mapping[str, Replay] = NO_REPLAYS,
+    before: Mapping[str, Replay] = NO_REPLAYS,
+    source: Mapping[str, str] = NO_SOURCE,
+    root: Path | None = None,
 ) -> str:
     """Render the report of one submission.
 
@@ -49,6 +57,9 @@ def render_report(
         grade: The whole grade.
         result: Its result or the student's copy of it: nothing else of the checks is shown.
         recordings: By scenario id; may lack scenarios that were not run.
+        references: Runs of the reference by scenario id, ``before`` those of the attempt before.
+        source: Texts of the submission by path.
+        root: Its folder on the reader's own machine, for links that open an editor, or None.
     """
     assignment = grade.assignment
     sections = make_sections(grade, result, recordings)
@@ -69,12 +80,15 @@ def render_report(
         titles={check.id: check.title for check in result.checks},
         sections=sections,
         faults=_faults(result),
-        replays=_replays(grade, sections, references),
+        replays=_replays(grade, sections, references, before),
         runs=runs,
         shown_runs={run.scenario for run in runs},
         files={run.id: run.recording for run in result.scenarios},
         remarks={run.id: run.remarks for run in result.scenarios},
         gallery=Gallery(),
+        source=ShownSource(source, root),
+        places=places,
+        same_as=explanation.same_as(result),
         SIGNS=SIGNS,
         align=align,
         build_lines=build_lines,
@@ -109,7 +123,10 @@ def _faults(result: Result) -> list[str]:
 
 
 def _replays(
-    grade: Grade, sections: list[Section], references: Mapping[str, Replay]
+    grade: Grade,
+    sections: list[Section],
+    references: Mapping[str, Replay],
+    before: Mapping[str, Replay],
 ) -> dict[str, Markup]:
     found: dict[str, Markup] = {}
     for section in sections:
@@ -117,11 +134,11 @@ def _replays(
             continue
         name, own = section.scenario.id, make_replay(section.recording, section.scenario)
         if own is not None:
-            both = {"student": own, "reference": references.get(name)}
+            all_ = {"student": own, "reference": references.get(name), "before": before.get(name)}
             found[name] = embedded(
                 {
-                    side: with_goals(replay, grade.assignment, name) if replay else None
-                    for side, replay in both.items()
+                    role: with_goals(replay, grade.assignment, name) if replay else None
+                    for role, replay in all_.items()
                 }
             )
     return found

@@ -24,6 +24,10 @@ class Section:
     recording: Recording | None = None
     findings: tuple[FindingPart, ...] = ()
 
+    def of(self, *statuses: Status) -> tuple[CheckPart, ...]:
+        """Its checks of these statuses, in the author's order."""
+        return tuple(check for check in self.checks if check.status in statuses)
+
     @property
     def lost(self) -> bool:
         """Whether something was lost in the run, or a limit reached."""
@@ -57,7 +61,9 @@ class Section:
 def make_sections(
     grade: Grade, result: Result, recordings: Mapping[str, Recording]
 ) -> list[Section]:
-    """Group the checks of a result; a section without anything to show is left out.
+    """Group the checks of a result; sections in which all passed come last.
+
+    A section without anything to show is left out.
 
     Args:
         grade: The whole grade; of checks that are not in the result nothing is shown.
@@ -86,4 +92,7 @@ def make_sections(
         )
         checks = of(scenario.id)
         sections.append(Section(f"run-{scenario.id}", title, checks, scenario, recording, found))
-    return [section for section in sections if section.checks or section.recording]
+    shown = [section for section in sections if section.checks or section.recording]
+    return sorted(
+        shown, key=lambda one: not one.lost and len(one.checks) == len(one.of(Status.PASSED))
+    )

@@ -21,6 +21,7 @@ _CHECK = _FINDING | {
     "max_points",
     "visibility",
     "author_hint",
+    "further_hints",
     "waits_for",
 }
 GRADE: dict[str, Any] = {

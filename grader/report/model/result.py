@@ -110,7 +110,8 @@ def _check(result: CheckResult) -> model.CheckPart:
         points=result.points,
         max_points=result.max_points,
         visibility=result.visibility.value,
-        author_hint=result.hint if missed else "",
+        author_hint="".join(result.hints[:1]) if missed else "",
+        further_hints=result.hints[1:] if missed else (),
         waits_for=result.waits_for,
         other_scenarios=tuple(
             model.FindingPart(**_finding(item)) for item in result.findings if item is not decisive

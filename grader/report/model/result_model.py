@@ -116,7 +116,7 @@ class CheckPart(FindingPart):
     """A check: its finding in the scenario that decided, and in the others.
 
     ``waits_for`` names the checks to correct first where this one was skipped, ``author_hint``
-    is the instructor's own hint to a check that did not pass.
+    is the instructor's own hint to a check that did not pass, ``further_hints`` its next steps.
     """
 
     id: str
@@ -127,6 +127,7 @@ class CheckPart(FindingPart):
     author_hint: str
     waits_for: tuple[str, ...]
     other_scenarios: tuple[FindingPart, ...]
+    further_hints: tuple[str, ...] = ()
 
     @property
     def findings(self) -> tuple[FindingPart, ...]:

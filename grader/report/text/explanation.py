@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from typing import NamedTuple
 
 from grader.findings.finding import Status
 from grader.findings.wording import counted, listing
 from grader.grade import model as grades
 from grader.grade.model import total
+from grader.report.model.excerpt import places as places_of
 from grader.report.model.result_model import CheckPart, FindingPart, Result
 from grader.report.text import additions
 from grader.report.text.words import ADVICE, counted_points, cut, number
@@ -38,9 +39,7 @@ def explain(check: CheckPart, result: Result) -> list[Row]:
     for texts, items in same_advice.items():
         rows += _seen(items, several=len(check.findings) > 1)
         rows += [Row(ADVICE[min(index, 1)], one_line(text)) for index, text in enumerate(texts)]
-        places = dict.fromkeys(
-            one_line(str(place)) for item in items for place in item.evidence.places
-        )
+        places = dict.fromkeys(one_line(str(place)) for item in items for place in places_of(item))
         rows += [Row("where", place) for place in places]
         log = next((item.evidence.log for item in items if item.evidence.log), ())
         if log:
@@ -136,6 +135,14 @@ def waiting(result: Result, check: CheckPart) -> str:
     return f"{counted(count, 'other check')} {verb} for it." if count else ""
 
 
+def same_as(result: Result) -> dict[str, CheckPart]:
+    """Failed checks that name the same mistake as one before them, by id: the first that does."""
+    first: dict[Hashable, str] = {}
+    reasons = {name: first.setdefault(reason, name) for name, reason in result.reasons.items()}
+    checks = {check.id: check for check in result.checks}
+    return {name: checks[other] for name, other in reasons.items() if name != other}
+
+
 def only_shown(result: Result) -> frozenset[str]:
     """Ids of the checks without points that did not pass, and that nothing else waits for."""
     mild = [
@@ -151,8 +158,8 @@ def score(result: Result) -> str:
     if result.known_score is None:
         return "Not graded"
     waits = additions.waiting(result)
-    points = f"{number(result.known_score)} of {counted_points(result.known_max_score)}"
-    return f"{points}; {waits}" if waits else points
+    points = f"{number(result.known_score)} of {counted_points(result.final_max_score)}"
+    return f"{points} so far; {waits}" if waits else points
 
 
 def headline(result: Result) -> str:

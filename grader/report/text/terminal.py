@@ -6,7 +6,8 @@ cleaned and wrapped in a :class:`rich.text.Text`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from rich.cells import cell_len
 from rich.console import Console
@@ -14,10 +15,13 @@ from rich.table import Table
 from rich.text import Text
 
 from grader.findings.finding import Status
+from grader.findings.wording import counted
+from grader.report.model.excerpt import excerpt, places
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.text import additions, explanation, last_save
 from grader.report.text.words import STATUS, number
-from grader.safe_text import clean, one_line
+from grader.safe_text import clean, one_line, visible
+from grader.submission.record import SourceError
 
 _STYLE = {
     Status.PASSED: "green",
@@ -33,32 +37,49 @@ _READABLE = 100
 """Columns beyond which lines of prose get hard to read."""
 _INDENT = 12
 _LOG_LINES = 8
+_NO_SOURCE: Mapping[str, str] = MappingProxyType({})
 
 
-def print_grade(console: Console, title: str, result: Result) -> None:
+def print_grade(
+    console: Console,
+    title: str,
+    result: Result,
+    source: Mapping[str, str] = _NO_SOURCE,
+) -> None:
     """Print a grade.
 
     Args:
         console: Where to; its width, colours and encoding are respected.
         title: Of the assignment.
+        source: Texts of the submission by path.
     """
     submission = _line(console, result.submission.id)
     console.print(Text.assemble((_line(console, title), "bold"), "   ", (submission, "dim")))
     console.print()
     console.print(_table(console, result))
+    same = explanation.same_as(result)
     for check in (*result.of(Status.FAILED), *result.of(Status.ERROR)):
-        _explain(console, result, check)
+        if check.id in same:
+            _head(console, check)
+            console.print(_hanging(console, "observed", f"the same as “{same[check.id].title}”"))
+        else:
+            _explain(console, result, check, source)
     _conclude(console, result)
 
 
 def print_changes(
-    console: Console, before: Result, after: Result, scores: Sequence[float | None] = ()
+    console: Console,
+    before: Result,
+    after: Result,
+    scores: Sequence[float | None] = (),
+    source: Mapping[str, str] = _NO_SOURCE,
 ) -> None:
     """Print in one line what changed since an earlier grade, and what to fix now.
 
     Args:
         console: Where to; its width, colours and encoding are respected.
         scores: Since watching began; None where there was no grade.
+        source: Texts of the submission by path.
     """
     changed = last_save.what_changed(before, after)
     if console.options.ascii_only:
@@ -68,7 +89,7 @@ def print_changes(
     console.print(Text.assemble(("Since your last save: ", "bold"), _line(console, changed)))
     first = [check for check in after.checks if check.id == after.first_to_fix]
     for check in first or after.of(Status.ERROR)[:1]:
-        _explain(console, after, check)
+        _explain(console, after, check, source)
     _conclude(console, after, before)
 
 
@@ -85,6 +106,7 @@ def _table(console: Console, result: Result) -> Table:
         # It gets the width that is left over, and takes none from the others.
         table.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
     titles = {check.id: check.title for check in result.checks}
+    told: set[tuple[str, ...]] = set()
     for check in result.checks:
         row = [
             _status(console, check.status),
@@ -94,6 +116,9 @@ def _table(console: Console, result: Result) -> Table:
         if wide:
             roots = ", ".join(titles[root] for root in check.waits_for)
             short = f"waits for {roots}" if roots else check.observed
+            if roots and check.waits_for in told:
+                short = ""  # The same cause is told once.
+            told.add(check.waits_for)
             row.append(Text(_line(console, short), "dim", overflow="ellipsis"))
         table.add_row(*row)
     return table
@@ -105,11 +130,15 @@ def _status(console: Console, status: Status) -> Text:
     return Text(f"{symbol} {words.word}", _STYLE[status])
 
 
-def _explain(console: Console, result: Result, check: CheckPart) -> None:
-    """Say why points were lost, or why there is no verdict."""
+def _head(console: Console, check: CheckPart) -> None:
     console.print()
     title = (_line(console, check.title), "bold")
     console.print(Text.assemble(_status(console, check.status), "  ", title))
+
+
+def _explain(console: Console, result: Result, check: CheckPart, source: Mapping[str, str]) -> None:
+    """Say why points were lost, or why there is no verdict."""
+    _head(console, check)
     for row in explanation.explain(check, result):
         text = row.text
         if row.name == "printed":
@@ -117,6 +146,31 @@ def _explain(console: Console, result: Result, check: CheckPart) -> None:
             lines = [line for line in text.splitlines() if line.strip(" ^~")]
             text = "\n".join(lines[-_LOG_LINES:])
         console.print(_hanging(console, row.name, text))
+    if check.further_hints:
+        count = counted(len(check.further_hints), "more step")
+        console.print(_hanging(console, "hints", f"{count} in the report"))
+    for place in places(check)[:1]:
+        _print_source(console, place, source)
+
+
+def _print_source(console: Console, place: SourceError, source: Mapping[str, str]) -> None:
+    """Print the lines around a place with their numbers, in colours; the one meant has a mark."""
+    from rich.syntax import Syntax
+
+    found = excerpt(place, source)
+    if found is not None:
+        code = _encodable(console, visible("\n".join(found.texts)))
+        lexer = Syntax.guess_lexer(place.file, code)
+        shown = Syntax(
+            code,
+            lexer,
+            theme="ansi_dark",
+            background_color="default",
+            line_numbers=True,
+            start_line=found.first,
+            highlight_lines=set() if console.options.ascii_only else {found.line},
+        )
+        console.print(shown)
 
 
 def _hanging(console: Console, name: str, text: str) -> Text:
@@ -140,8 +194,8 @@ def _conclude(console: Console, result: Result, before: Result | None = None) ->
     console.print()
     for first in result.checks:
         if first.id == result.first_to_fix:
-            places = "".join(f" ({explanation.spot(one)})" for one in first.evidence.places[:1])
-            text = f"{first.title}{places}. {explanation.waiting(result, first)}".rstrip()
+            where = "".join(f" ({explanation.spot(one)})" for one in places(first)[:1])
+            text = f"{first.title}{where}. {explanation.waiting(result, first)}".rstrip()
             console.print(Text.assemble(("Fix this first: ", "bold"), _line(console, text)))
     if not result.graded:
         text = f"Not graded. {explanation.headline(result)}"

@@ -10,6 +10,7 @@ import sys
 
 from rosgrade_report import (  # type: ignore[import-not-found]
     HELD_TOPICS,
+    INSTALL,
     LEAST_THREADS,
     MIDDLEWARE,
     SEEN_FD,
@@ -58,6 +59,14 @@ def _group(group: Any, node: Any) -> dict[str, Any]:
     return {"type": type(chosen).__name__, "id": id(chosen)}
 
 
+def _created_at() -> dict[str, Any]:
+    """File and line of the student's program that creates something now, if any."""
+    frame: Any = sys._getframe()
+    while frame is not None and not frame.f_code.co_filename.startswith(f"{INSTALL}/"):
+        frame = frame.f_back
+    return {"file": frame.f_code.co_filename, "line": frame.f_lineno} if frame and INSTALL else {}
+
+
 def _callback_name(callback: Any) -> str:
     return str(getattr(callback, "__qualname__", type(callback).__name__))
 
@@ -74,6 +83,7 @@ def _endpoint(kind: str, node: Any, endpoint: Any, **more: Any) -> None:
         topic=endpoint.topic_name,
         type=_type_name(endpoint.msg_type),
         **_qos(endpoint.qos_profile),
+        **_created_at(),
         **more,
     )
 
@@ -194,7 +204,7 @@ def _patch_node(module: Any) -> None:
 
     def made(node: Any, _: Any) -> None:
         _nodes.append(True)
-        report("node", node=_full_name(node))
+        report("node", node=_full_name(node), **_created_at())
 
     def published(node: Any, publisher: Any) -> None:
         _endpoint("publisher", node, publisher)
@@ -208,6 +218,7 @@ def _patch_node(module: Any) -> None:
             period_s=timer.timer_period_ns / 1e9,
             callback=_callback_name(timer.callback),
             group=_group(timer.callback_group, node),
+            **_created_at(),
         )
 
     def subscribed(node: Any, subscription: Any) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -12,6 +13,8 @@ if TYPE_CHECKING:
 FD = int(os.environ.get("ROSGRADE_TRACER_FD", "-1"))
 SEEN_FD = int(os.environ.get("ROSGRADE_SEEN_FD", "-1"))
 HELD_TOPICS = frozenset(filter(None, os.environ.get("ROSGRADE_HOLD", "").split(":")))
+# As ROS installs programs: PREFIX/lib/PACKAGE/PROGRAM.
+INSTALL = os.path.dirname(os.path.dirname(os.path.dirname("".join(sys.orig_argv[1:2]))))
 LEAST_THREADS = 4
 THRESHOLDS = gc.get_threshold()
 _PREFIXES = ("ROS_", "RMW_", "FASTDDS_", "FASTRTPS_", "CYCLONEDDS_")

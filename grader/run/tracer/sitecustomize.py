@@ -24,6 +24,7 @@ import sys
 
 from rosgrade_report import (  # type: ignore[import-not-found]
     FD,
+    INSTALL,
     LEAST_THREADS,
     PIPE,
     SEEN_FD,
@@ -170,13 +171,13 @@ class _Finder:
 def _note_import(name: str) -> None:
     """Report where the student's own code imports what is not of Python, unless it can fail."""
     root = name.partition(".")[0]
-    if root in sys.stdlib_module_names or root in _imported or not _INSTALL:
+    if root in sys.stdlib_module_names or root in _imported or not INSTALL:
         return
     frame = sys._getframe()
     # Of what is executed from a text, the file is that of the code that executes it.
     while _passes_on(frame.f_code.co_filename):
         frame = frame.f_back  # type: ignore[assignment]
-    if frame.f_code.co_filename.startswith(f"{_INSTALL}/"):
+    if frame.f_code.co_filename.startswith(f"{INSTALL}/"):
         _imported.add(root)
         if not _is_guarded(frame):
             file = frame.f_code.co_filename
@@ -209,8 +210,6 @@ def _importing_module(import_module: Any) -> Any:
 
 
 _imported = {"rosgrade_rclpy"}
-# As ROS installs programs: PREFIX/lib/PACKAGE/PROGRAM.
-_INSTALL = os.path.dirname(os.path.dirname(os.path.dirname("".join(sys.orig_argv[1:2]))))
 
 
 # A child that did not inherit the pipe has the variable, but not what it names.

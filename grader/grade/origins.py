@@ -1,0 +1,52 @@
+"""Where the student's program creates what a finding is about: its publisher, its timer.
+
+A process declares these places itself, so no verdict may depend on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
+
+from grader.checks.check import Parameters
+from grader.diagnosis.process.raised import submission_path
+from grader.findings.finding import Finding
+from grader.recording.model import Recording
+from grader.submission.record import SourceError
+
+_MOST = 3
+_LONGEST_NAME = 200
+# What a declaration is called by.
+_NAMES = {"publisher": "topic", "subscription": "topic", "node": "node", "timer": "callback"}
+
+
+def with_origins(finding: Finding, parameters: Parameters, recording: Recording) -> Finding:
+    """A finding that names no place, with the places of what it is about, as far as known.
+
+    That is what the check names among its parameters, or what the finding says was observed.
+    """
+    if finding.evidence.places:
+        return finding
+    places = dict.fromkeys(_places(finding.observed, parameters, recording))
+    evidence = replace(finding.evidence, origins=tuple(islice(places, _MOST)))
+    return replace(finding, evidence=evidence)
+
+
+def _places(seen: str, parameters: Parameters, recording: Recording) -> Iterator[SourceError]:
+    named = {value for _, value in parameters if isinstance(value, str)}
+    kinds = [kind for kind in parameters.about if kind in named] or parameters.about
+    declared = {kind: recording.declared(kind) for kind in kinds}
+    timers = declared.pop("timer", ())
+    found = [
+        one
+        for kind, items in declared.items()
+        for one in items
+        if (name := str(one.data.get(_NAMES[kind]))) in named or f"`{name}`" in seen
+    ]
+    nodes = {one.data.get("node") for one in found}
+    for one in [*(one for one in timers if not nodes or one.data.get("node") in nodes), *found]:
+        path = submission_path(str(one.data.get("file")), recording.submission)
+        if path and isinstance(line := one.data.get("line"), int):
+            name = str(one.data.get(_NAMES[one.kind]))[:_LONGEST_NAME]
+            yield SourceError(path, line, f"the {one.kind} {name} is created here")

@@ -1,0 +1,95 @@
+"""Where the student's program creates what a finding is about."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from grader.checks.executor.executor import Timer
+from grader.checks.qos.qos import Depth
+from grader.checks.timing.timing import Period
+from grader.checks.topic.topic import Topic
+from grader.findings.finding import Evidence, Finding
+from grader.grade.model import reason
+from grader.grade.origins import with_origins
+from grader.recording.model import Recording
+from grader.submission.record import PackageRecord, SourceError
+from tests.checks.builder import declared
+from tests.grade.sample import make_recording, make_submission
+
+NODE = "bot_publisher/node.py"
+INSTALLED = f"/ws/install/lib/python3.12/site-packages/{NODE}"
+FAILED = Finding.failed("right", "wrong")
+
+
+def run(**changes: Any) -> Recording:
+    """A run whose node creates a node, two publishers, a subscription and a timer."""
+    at = {"node": "/bot", "file": INSTALLED}
+    things = (
+        declared("node", line=5, **at),
+        declared("publisher", topic="/cmd_vel", line=11, **at),
+        declared("publisher", topic="/status", line=12, **at),
+        declared("subscription", topic="/cmd_vel", line=13, **at),
+        declared("timer", period_s=0.3, callback="Bot.tick", line=14, **at),
+    )
+    package = PackageRecord(
+        "bot_publisher", "src/bot_publisher", files=((NODE, f"src/bot_publisher/{NODE}"),)
+    )
+    submission = make_submission(packages=(package,))
+    return make_recording(submission=submission, **({"declarations": things} | changes))
+
+
+def lines(finding: Finding, parameters: Any, recording: Recording) -> list[int | None]:
+    found = with_origins(finding, parameters, recording).evidence.origins
+    assert all(place.file == f"src/bot_publisher/{NODE}" for place in found)
+    return [place.line for place in found]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "expected"),
+    [
+        (Depth(topic="/cmd_vel", kind="publisher", depth=10), [11]),
+        (Depth(topic="/cmd_vel", kind="subscription", depth=10), [13]),
+        (Period(topic="/cmd_vel", period="300 ms"), [14, 11]),
+        (Timer(topic="/cmd_vel"), [14, 11]),
+        (Topic(topic="/cmd_vel"), [11, 13]),
+        (Topic(topic="/other"), []),
+    ],
+)
+def test_what_a_check_is_about_is_shown_where_it_is_created(parameters, expected):
+    assert lines(FAILED, parameters, run()) == expected
+
+
+def test_a_wrong_name_that_was_observed_is_shown_too():
+    seen = Finding.failed("a publisher on `/state`", "publishes on `/status` instead")
+    parameters = Topic(topic="/state")
+    assert lines(seen, parameters, run()) == [12]
+
+
+def test_a_place_of_the_finding_itself_stands_alone():
+    place = SourceError("src/bot_publisher/setup.py", 3, "here")
+    own = Finding.failed("right", "wrong", "", Evidence(places=(place,)))
+    assert with_origins(own, Topic(topic="/cmd_vel"), run()) is own
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        {},
+        {"file": 7, "line": 1},
+        {"file": INSTALLED, "line": "1"},
+        {"file": "/etc/passwd", "line": 1},
+    ],
+)
+def test_what_a_process_declares_of_itself_is_read_as_hostile(data):
+    told = (declared("publisher", topic="/cmd_vel", node="/bot", **data),)
+    recording = run(declarations=told)
+    assert lines(FAILED, Topic(topic="/cmd_vel"), recording) == []
+
+
+def test_they_do_not_make_two_mistakes_one():
+    parameters = Topic(topic="/cmd_vel")
+    found = with_origins(FAILED, parameters, run())
+    assert found.evidence.origins
+    assert reason("a", "run", found.observed, found.evidence) == "a"
