@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 
@@ -62,7 +63,7 @@ def with_history(folder: Path, result: Result) -> Result:
         if replaced.submission.sha256 != result.submission.sha256:
             slim = for_class(replaced).model_copy(update={"attempts": ()})
             keep_earlier(file, result_json(slim))
-    files = _earlier(folder)
+    files = sorted((folder / EARLIER).glob("result-*.json"))
     for old in files[:-MOST_KEPT]:
         old.unlink(missing_ok=True)
     alike = [one for one in _read(files[-MOST_KEPT:]) if _kind(one) == _kind(result)]
@@ -85,16 +86,8 @@ def _kind(result: Result) -> tuple[str, frozenset[str]]:
     return result.assignment.id, frozenset(check.id for check in result.checks)
 
 
-def _earlier(folder: Path) -> list[Path]:
-    return sorted((folder / EARLIER).glob("result-*.json"))
-
-
-def _read(files: Sequence[Path]) -> list[Result]:
+def _read(files: Sequence[Path]) -> Iterator[Result]:
     """Results of files; one that is missing or damaged is no attempt."""
-    found = []
     for file in files:
-        try:
-            found.append(read_result(file))
-        except RosgradeError:
-            continue
-    return found
+        with suppress(RosgradeError):
+            yield read_result(file)

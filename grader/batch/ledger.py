@@ -187,11 +187,8 @@ class Ledger:
 
     def whole_result(self, key: str) -> Result | None:
         """A row's result as it was written; None where there is none or it is damaged."""
-        file = self.folder(key) / RESULT_FILE
-        if not file.is_file():
-            return None
         try:
-            return read_result(file)
+            return read_result(self.folder(key) / RESULT_FILE)
         except RosgradeError:
             return None
 

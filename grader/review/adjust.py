@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from grader.errors import UsageError
 from grader.findings.finding import Status
@@ -16,7 +16,6 @@ def adjusted(
     result: Result,
     review: StudentReview,
     of_class: ClassReview,
-    course_adjustments: Sequence[AdjustmentPart] = (),
 ) -> Result:
     """A result with the points, comments and deductions as they are written down now.
 
@@ -26,9 +25,6 @@ def adjusted(
 
     A forgiven check gets back what it lost itself. A check that waited for it gets nothing: it was
     never judged, and would perhaps have failed.
-
-    Args:
-        course_adjustments: Lines of the rules of the course, ``late`` and ``attempts``.
 
     Raises:
         UsageError: A manual item has more points than it can give.
@@ -41,7 +37,7 @@ def adjusted(
     comments = (CommentPart(**one.model_dump()) for one in review.comments)
     return result.model_copy(
         update={
-            "adjustments": (*manual, *_forgiven(result, of_class), *course_adjustments),
+            "adjustments": (*manual, *_forgiven(result, of_class)),
             "comments": tuple(comments),
         }
     )
