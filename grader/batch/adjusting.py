@@ -4,33 +4,43 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import datetime, timezone
-from functools import partial
+from functools import cached_property
+from pathlib import Path
 
+from grader.batch.attempts import attempts_of
 from grader.batch.batch import Done
-from grader.batch.course_rules import ClassRules
-from grader.batch.ledger import Ledger
-from grader.report.model.result_model import Result
+from grader.batch.ledger import BATCH_FILE, Entry, Ledger
+from grader.course.attempts import Attempt, Ruled, ruled
+from grader.course.late import HandInTime
+from grader.course.load import Course, load_course
+from grader.errors import UsageError
+from grader.report.model.result_model import AttemptPart, Result
+from grader.report.model.student import VISIBLE_ONLY
 from grader.review.adjust import adjusted
+from grader.review.model import ClassReview
 from grader.review.store import ReviewStore
 
 
 class ClassAdjustments:
-    """What is written down about a class now; a call gives a result with it."""
+    """What is written down about a class now; a call gives a result with it.
+
+    It replaces what the result has of it, so doing it twice is the same as once. Without rules of
+    a course the last attempt counts.
+    """
 
     def __init__(self, ledger: Ledger, now: datetime | None = None) -> None:
-        """Read what is about the whole class.
+        """Read the rows, and the rules where the batch has some.
 
         Args:
             now: For what students may see by now; by default the clock of this machine.
-
-        Raises:
-            RosgradeError: A file that a person wrote cannot be read.
         """
+        self._ledger, self._written = ledger, ledger.read()
+        self._entries = {entry.key: entry for entry in self._written.entries}
         self._store = ReviewStore(ledger.out)
         self._now = now or datetime.now(timezone.utc)
-        self._of_class = self._store.of_class().content
-        self._rules = ClassRules(ledger)
-        self._entries = self._rules.entries
+        file, assignment = self._written.course, self._written.assignment
+        self._course = _load(Path(file), ledger.out, assignment) if file else None
+        self._spent: dict[str, int] = {}
 
     def __call__(self, result: Result) -> Result:
         """A result of the class with all that is added to it."""
@@ -43,21 +53,122 @@ class ClassAdjustments:
         result, notes = self._with_notes(row.result)
         return replace(row, entry=row.entry.with_problem(*notes), result=result)
 
-    def _with_notes(self, result: Result) -> tuple[Result, tuple[str, ...]]:
-        key = result.submission.id
-        entry = self._entries.get(key)
-        review = self._store.student(entry.review_key if entry is not None else key).content
-        reviewed = partial(adjusted, review=review, of_class=self._of_class)
-        return self._rules.applied(entry, result, reviewed) if entry else (reviewed(result), ())
-
     @property
     def visible(self) -> frozenset[str]:
         """Which checks the students may see now, by their visibility."""
-        return self._rules.visible(self._now)
+        if self._course is None:
+            return VISIBLE_ONLY
+        return self._course.visible(self._written.assignment, self._now)
 
     def vanished(self) -> tuple[str, ...]:
-        """Students with a review that no row of the class uses; every review is read for it."""
+        """Students with a review that no row of the class uses; every review is read for it.
+
+        Raises:
+            RosgradeError: One that a person wrote cannot be read.
+        """
+        _ = self._of_class
         keys = {entry.review_key for entry in self._entries.values()}
         for key in keys:
             self._store.student(key)
         return self._store.vanished(keys)
+
+    def _with_notes(self, result: Result) -> tuple[Result, tuple[str, ...]]:
+        """A result with all that is added, and notes for the instructor."""
+        entry = self._entries.get(result.submission.id)
+        if entry is None:
+            return self._reviewed(result, result.submission.id), ()
+        attempts = [
+            replace(each, result=self._reviewed(each.result, entry.review_key))
+            for each in self._attempts(entry, result)
+        ]
+        found = self._ruled(entry, attempts)
+        parts: tuple[AttemptPart, ...] = ()
+        if len(attempts) > 1:
+            times = [each.time.at for each in attempts]
+            parts = attempts_of([each.result for each in attempts], times, found.counts)
+        whole = attempts[-1].result
+        update = {"attempts": parts, "adjustments": (*whole.adjustments, *found.lines)}
+        return whole.model_copy(update=update), found.notes
+
+    def _reviewed(self, result: Result, key: str) -> Result:
+        return adjusted(result, self._store.student(key).content, self._of_class)
+
+    @cached_property
+    def _of_class(self) -> ClassReview:
+        return self._store.of_class().content
+
+    def _ruled(self, entry: Entry, attempts: list[Attempt]) -> Ruled:
+        if self._course is None or entry.attempt_of:
+            return Ruled(len(attempts) - 1)
+        rules = self._course.rules(self._written.assignment, entry.key)
+        tokens = 0
+        if rules.tokens and any(each.time.is_late(rules) for each in attempts):
+            spent = sum(one.spent(entry.key) for one in self._before)
+            tokens = max(0, rules.tokens.each - spent)
+        return ruled(attempts, rules, tokens)
+
+    def spent(self, key: str) -> int:
+        """Late tokens that a student used in this class."""
+        if key not in self._spent:
+            entry, result = self._entries.get(key), self._ledger.result(key)
+            self._spent[key] = 0
+            if entry is not None and result is not None:
+                self._spent[key] = self._ruled(entry, self._attempts(entry, result)).tokens
+        return self._spent[key]
+
+    @cached_property
+    def _before(self) -> list[ClassAdjustments]:
+        """The classes of assignments that were due before this one, as far as they are known."""
+        found: list[ClassAdjustments] = []
+        course, assignment = self._course, self._written.assignment
+        for folder in course.results_before(assignment) if course is not None else ():
+            if (folder / BATCH_FILE).is_file():
+                one = ClassAdjustments(Ledger(folder))
+                one._before = list(found)
+                found.append(one)
+        return found
+
+    @cached_property
+    def _earlier(self) -> dict[str, list[Entry]]:
+        """The earlier attempts of each row, first to last: 10 comes after 9."""
+        found: dict[str, list[Entry]] = {}
+        for entry in sorted(self._written.entries, key=lambda one: (len(one.key), one.key)):
+            if entry.attempt_of:
+                found.setdefault(entry.attempt_of, []).append(entry)
+        return found
+
+    def _attempts(self, entry: Entry, result: Result) -> list[Attempt]:
+        """All attempts that are graded, the current one last."""
+        graded = ((one, self._ledger.result(one.key)) for one in self._earlier.get(entry.key, ()))
+        same = [
+            (one, other) for one, other in graded if other and other.submission.sha256 == one.sha256
+        ]
+        return [
+            Attempt(
+                found,
+                HandInTime(one.handed_in, one.handed_in_from, one.late, found.started),
+            )
+            for one, found in (*same, (entry, result))
+        ]
+
+
+def course_of(out: Path, named: Path | None, assignment: str) -> Course | None:
+    """The rules for a batch: those that are named, else those that it was graded with before."""
+    try:
+        place = named or Ledger(out).read().course
+    except UsageError:
+        # There is no batch yet, or its file is damaged and is written again from the class.
+        return None
+    return _load(Path(place), out, assignment) if place is not None else None
+
+
+def _load(file: Path, out: Path, assignment: str) -> Course:
+    if not file.is_file():
+        raise UsageError(
+            f"{file}: does not exist, and the rules of {out} lie there. Put it back, or name "
+            "another place with `rosgrade batch ... --course FILE`"
+        )
+    found = load_course(file)
+    # Refuse rules of other assignments at once.
+    found.rules(assignment)
+    return found

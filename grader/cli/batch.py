@@ -67,10 +67,9 @@ def batch(
     with 0 if every submission was graded, whatever the grades, and with 3 if one was not.
     """
     from grader.assignment.load import load_assignment
-    from grader.batch.adjusting import ClassAdjustments
+    from grader.batch.adjusting import ClassAdjustments, course_of
     from grader.batch.batch import Batch
     from grader.batch.class_files import GRADES_FILE, write_class
-    from grader.batch.course_rules import course_of
     from grader.batch.executor import DaskExecutor, ExecutorLost, LocalExecutor
     from grader.batch.groups import strangers
     from grader.batch.ledger import Ledger

@@ -15,10 +15,10 @@ from pathlib import Path
 import pytest
 
 from grader.assignment.load import LoadedAssignment, load_assignment
+from grader.batch.adjusting import course_of
 from grader.batch.batch import Batch, Done
 from grader.batch.class_files import read_class, standing, write_class
 from grader.batch.class_regrading import regrade_class
-from grader.batch.course_rules import course_of
 from grader.batch.files import REPORT_FILE, RESULT_FILE, STUDENT_FILE, write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.batch.groups import strangers
