@@ -262,7 +262,18 @@
       for (const button of root.querySelectorAll(".step")) {
         button.addEventListener("click", () => this.step(Number(button.dataset.frames)));
       }
+      root.querySelector(".save").addEventListener("click", () => this.save());
       this.show(this.begin);
+    }
+    async save() {
+      const time = this.time;
+      this.stop();
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(await animated(this));
+      link.download = `${this.root.dataset.scenario}.png`;
+      link.click();
+      URL.revokeObjectURL(link.href);
+      this.show(time);
     }
     // What the robots in the map are, and switches for those of other runs.
     legend(parent) {
@@ -334,6 +345,105 @@
     }
   }
 
+  // A picture of the map at a time, as an APNG has it: https://www.w3.org/TR/png-3/
+  const WIDTH = 480, MOST_FRAMES = 150;
+  const paint = (svg, canvas) => {
+    const context = canvas.getContext("2d", { alpha: false });
+    const scale = canvas.width / svg.clientWidth;
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.fillStyle = getComputedStyle(svg).backgroundColor;
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    for (const mark of svg.querySelectorAll("line, circle, rect, path, text")) {
+      const style = getComputedStyle(mark);
+      if (style.visibility === "hidden") continue;
+      const number = (name) => Number(mark.getAttribute(name) || 0);
+      const matrix = new DOMMatrix().scale(scale).multiply(mark.getCTM());
+      context.globalAlpha = Number(style.opacity);
+      if (mark.tagName === "text") {
+        context.setTransform(matrix);
+        context.font = `600 ${style.fontSize} sans-serif`;
+        context.textAlign = "center";
+        context.fillStyle = style.fill;
+        context.fillText(mark.textContent, number("x"), number("y"));
+        context.setTransform(1, 0, 0, 1, 0, 0);
+        continue;
+      }
+      const shape = new Path2D(mark.tagName === "path" ? mark.getAttribute("d") || "" : "");
+      if (mark.tagName === "circle") shape.arc(number("cx"), number("cy"), number("r"), 0, 7);
+      if (mark.tagName === "rect") shape.rect(number("x"), number("y"), number("width"), number("height"));
+      if (mark.tagName === "line") { shape.moveTo(number("x1"), number("y1")); shape.lineTo(number("x2"), number("y2")); }
+      const placed = new Path2D();
+      placed.addPath(shape, matrix);
+      if (style.fill !== "none") {
+        context.globalAlpha = Number(style.opacity) * Number(style.fillOpacity);
+        context.fillStyle = style.fill;
+        context.fill(placed);
+        context.globalAlpha = Number(style.opacity);
+      }
+      if (style.stroke === "none") continue;
+      const wide = style.vectorEffect === "non-scaling-stroke" ? scale : Math.hypot(matrix.a, matrix.b);
+      context.strokeStyle = style.stroke;
+      context.lineWidth = parseFloat(style.strokeWidth) * wide;
+      [context.lineCap, context.lineJoin] = [style.strokeLinecap, style.strokeLinejoin];
+      context.setLineDash(style.strokeDasharray === "none" ? [] : style.strokeDasharray.split(",").map((dash) => parseFloat(dash) * wide));
+      context.stroke(placed);
+    }
+  };
+  const CRC = Uint32Array.from({ length: 256 }, (_, n) => {
+    for (let bit = 0; bit < 8; bit++) n = n & 1 ? 0xedb88320 ^ (n >>> 1) : n >>> 1;
+    return n;
+  });
+  const chunk = (type, ...parts) => {
+    const data = new Uint8Array(parts.reduce((size, part) => size + part.length, 12));
+    const view = new DataView(data.buffer);
+    view.setUint32(0, data.length - 12);
+    data.set([...type].map((letter) => letter.charCodeAt(0)), 4);
+    let at = 8;
+    for (const part of parts) { data.set(part, at); at += part.length; }
+    let crc = 0xffffffff;
+    for (let i = 4; i < at; i++) crc = CRC[(crc ^ data[i]) & 255] ^ (crc >>> 8);
+    view.setUint32(at, ~crc >>> 0);
+    return data;
+  };
+  const words = (...values) => {
+    const data = new DataView(new ArrayBuffer(4 * values.length));
+    values.forEach((value, i) => data.setUint32(4 * i, value));
+    return new Uint8Array(data.buffer);
+  };
+  // The chunks of a PNG of a canvas: its header, and the parts of its picture.
+  const encoded = async (canvas) => {
+    const blob = await new Promise((done) => canvas.toBlob(done, "image/png"));
+    const data = new Uint8Array(await blob.arrayBuffer());
+    const found = { IHDR: [], IDAT: [] };
+    for (let at = 8; at < data.length;) {
+      const size = new DataView(data.buffer).getUint32(at);
+      const type = String.fromCharCode(...data.subarray(at + 4, at + 8));
+      if (found[type]) found[type].push(data.subarray(at + 8, at + 8 + size));
+      at += size + 12;
+    }
+    return found;
+  };
+  const animated = async (player) => {
+    const svg = player.plan.svg, canvas = document.createElement("canvas");
+    canvas.width = WIDTH;
+    canvas.height = Math.round(WIDTH * svg.clientHeight / svg.clientWidth);
+    const count = Math.min(MOST_FRAMES, Math.ceil((player.end - player.begin) / player.runs.student.data.step) + 1);
+    const step = (player.end - player.begin) / Math.max(1, count - 1), parts = [];
+    let header, number = 0;
+    for (let i = 0; i < count; i++) {
+      player.show(player.begin + i * step);
+      paint(svg, canvas);
+      const png = await encoded(canvas);
+      header = header || png.IHDR[0];
+      const last = i === count - 1 ? 1500 : Math.round(1000 * step);
+      const shown = new Uint8Array([last >> 8, last & 255, 1000 >> 8, 1000 & 255, 0, 0]);
+      parts.push(chunk("fcTL", words(number++, canvas.width, canvas.height, 0, 0), shown));
+      for (const data of png.IDAT) parts.push(i ? chunk("fdAT", words(number++), data) : chunk("IDAT", data));
+    }
+    const begin = new Uint8Array([137, 80, 78, 71, 13, 10, 26, 10]);
+    return new Blob([begin, chunk("IHDR", header), chunk("acTL", words(count, 0)), ...parts, chunk("IEND")], { type: "image/apng" });
+  };
+
   const players = new Map([...document.querySelectorAll(".replay")].map((root) => [root.dataset.scenario, new Player(root)]));
   // The replay that keys are for: the one with the focus, or else one in sight.
   const inSight = () => {
@@ -385,7 +495,7 @@
       const current = ofKind(above).pop();
       for (const [link] of ofKind(links)) {
         const is = Boolean(current) && link === current[0];
-        if (is && group && !link.ariaCurrent) nav.scrollTo({ left: link.offsetLeft - 16 });
+        if (is && !link.ariaCurrent) nav.scrollTo({ left: link.offsetLeft - 16, top: link.offsetTop - 0.4 * nav.clientHeight });
         link.ariaCurrent = is ? "true" : null;
       }
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import zlib
 from dataclasses import replace
 
 import pytest
@@ -41,6 +42,19 @@ def violations(page):
         for rule in found
         for node in rule["nodes"]
     ]
+
+
+def png_chunks(data):
+    """The chunks of a PNG, after their checksums were compared."""
+    assert data.startswith(b"\x89PNG\r\n\x1a\n")
+    found, at = [], 8
+    while at < len(data):
+        size = int.from_bytes(data[at : at + 4], "big")
+        body = data[at + 4 : at + 8 + size]
+        assert zlib.crc32(body) == int.from_bytes(data[at + 8 + size : at + 12 + size], "big")
+        found.append((body[:4], body[4:]))
+        at += 12 + size
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -180,6 +194,24 @@ class TestReplay:
             }"""
         )
         assert 2.0 < ran < 5.0
+
+    def test_it_is_saved_as_an_animation_that_other_programs_can_read(self, look, pages, tmp_path):
+        found = look(pages["gallery"], 390)
+        with found.page.expect_download() as download:
+            found.page.get_by_role("button", name="Save as animation").click()
+        assert download.value.suggested_filename == "drive.png"
+        file = tmp_path / "drive.png"
+        download.value.save_as(file)
+        chunks = png_chunks(file.read_bytes())
+        kinds = [kind for kind, _ in chunks]
+        assert kinds[:3] == [b"IHDR", b"acTL", b"fcTL"] and kinds[-1] == b"IEND"
+        frames = int.from_bytes(dict(chunks)[b"acTL"][:4], "big")
+        assert frames == kinds.count(b"fcTL") > 50
+        numbers = [data[:4] for kind, data in chunks if kind in (b"fcTL", b"fdAT")]
+        assert numbers == [n.to_bytes(4, "big") for n in range(len(numbers))]
+        pictures = {data[4:] for kind, data in chunks if kind == b"fdAT"}
+        assert len(pictures) > 20
+        assert found.complaints == []
 
     def test_a_time_in_a_finding_leads_to_that_time(self, look, pages):
         page = look(pages["gallery"]).page
