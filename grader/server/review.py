@@ -24,8 +24,10 @@ from grader.errors import RosgradeError, UsageError
 from grader.findings.finding import Status
 from grader.report.html.overview import render_overview
 from grader.report.html.page import environment, render_page
+from grader.report.html.shown_source import ShownSource
 from grader.report.html.source_code import code_lines
 from grader.report.model.class_row import ClassRow
+from grader.report.model.excerpt import places
 from grader.review.store import ReviewConflict
 from grader.server.background import Background
 from grader.server.changes import change_cluster, change_student
@@ -34,8 +36,6 @@ from grader.server.reviewed_class import ReviewedClass, ReviewedRow
 
 MOST_CLUSTERS = 60
 MOST_OF_BANK = 30
-AROUND = 4
-"""Lines of source that are shown before and after a place."""
 _SANDBOX = "sandbox allow-scripts allow-downloads allow-popups"
 _FRAMED = {"Content-Security-Policy": f"frame-ancestors 'self'; {_SANDBOX}"}
 _REPORTS = ("report.html", "student-report.html")
@@ -185,11 +185,9 @@ class ReviewServer(LocalServer):
             checks = {one.id: one for one in (result.checks if result else ())}
             if (found := checks.get(check)) is None:
                 continue
-            place = next((one for one in found.evidence.places if one.line), None)
-            text = self._class.source(row).files.get(place.file) if place is not None else None
-            first = max(0, ((place and place.line) or 1) - 1 - AROUND)
-            code = code_lines(place.file, text)[first:] if place and text is not None else []
-            examples.append((row, found, place, first + 1, code[: 2 * AROUND + 1]))
+            source = ShownSource(self._class.source(row).files, None)
+            shown = ((one, source.show(one, "example")[1]) for one in places(found))
+            examples.append((row, found, *next((pair for pair in shown if pair[1]), (None, []))))
         return HTMLResponse(_part("review_example.html.j2", examples=examples))
 
     def _change_cluster(self, _: Request, sent: Any) -> Response:
