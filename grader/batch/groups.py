@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from grader.batch.handed_in import HandedIn
-from grader.course.load import Course, login
+from grader.course.load import Course, written
 from grader.errors import UsageError
 from grader.findings.wording import listing
 from grader.spec.nearest_name import did_you_mean, nearest_or_all
@@ -37,12 +37,12 @@ def _shared(handed: HandedIn, row: HandedIn) -> HandedIn:
 def strangers(rows: Sequence[HandedIn], course: Course) -> Iterator[str]:
     """Students that the rules name and that the class has not, a line each."""
     keys = [row.key for row in rows]
-    known = {login(key) for key in keys}
+    known = {written(key) for key in keys}
     groups = course.spec.groups if isinstance(course.spec.groups, tuple) else ()
     named = [("an extension", one.student) for one in course.spec.extensions]
     named += [("a group", member) for members in groups for member in members]
     for what, name in dict.fromkeys(named):
-        if login(name) not in known:
+        if written(name) not in known:
             nearest = did_you_mean(name, keys)
             yield f"{course.file}: {what} names {name!r}, not in this class.{nearest}"
 
@@ -61,8 +61,8 @@ def _groups(rows: Sequence[HandedIn], course: Course | None) -> list[list[int]]:
             )
         names = [row.columns.get(groups.casefold(), "") for row in rows]
     else:
-        of = {login(member): str(at) for at, members in enumerate(groups) for member in members}
-        names = [of.get(login(row.key), "") for row in rows]
+        of = {written(member): str(at) for at, members in enumerate(groups) for member in members}
+        names = [of.get(written(row.key), "") for row in rows]
     for at, name in enumerate(names):
         if name:
             found.setdefault(name, []).append(at)

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from grader.course.load import written
 from grader.errors import UsageError
 from grader.submission.intake.paths import shown
 
@@ -75,11 +76,6 @@ class Roster:
 
     students: tuple[Student, ...]
     problems: tuple[str, ...] = ()
-
-
-def written(text: str) -> str:
-    """A name as it is compared: case, spaces around it and an accent's encoding do not matter."""
-    return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
 
 
 def resemblance(text: str) -> str:

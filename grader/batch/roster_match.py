@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 
 from grader.batch.handed_in import Entry, HandedIn, row_of, stem_of
-from grader.batch.roster import Roster, Student, name_forms, resemblance, written
+from grader.batch.roster import Roster, Student, name_forms, resemblance
+from grader.course.load import written
 from grader.findings.wording import listing
 from grader.submission.intake.paths import shown
 

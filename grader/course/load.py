@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -51,7 +52,7 @@ class Course:
         one = self.spec.assignments[assignment]
         due = due_of_all = self.instant(one.due)
         for each in self.spec.extensions:
-            if (each.assignment, login(each.student)) == (assignment, login(student)):
+            if (each.assignment, written(each.student)) == (assignment, written(student)):
                 days = timedelta(days=each.days or 0)
                 due = self.instant(each.due) if each.due else due_of_all + days
         return Rules(
@@ -90,9 +91,9 @@ class Course:
         return instant(text, self.spec.time_zone)
 
 
-def login(text: str) -> str:
-    """A student's name as it is compared."""
-    return " ".join(text.casefold().split())
+def written(text: str) -> str:
+    """A name as it is compared: case, spaces around it and an accent's encoding do not matter."""
+    return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
 
 
 def load_course(file: Path) -> Course:
@@ -139,7 +140,7 @@ def _groups(source: Source, spec: CourseFile) -> Mistakes:
     for at, members in enumerate(spec.groups if isinstance(spec.groups, tuple) else ()):
         for number, member in enumerate(members):
             place: Place = ("groups", at, number)
-            first = seen.setdefault(login(member), place)
+            first = seen.setdefault(written(member), place)
             if first != place:
                 yield place, f"{member!r} is in a group already (line {source.line(first)})"
 
@@ -153,7 +154,7 @@ def _extensions(source: Source, spec: CourseFile) -> Mistakes:
             yield ("extensions", at, "assignment"), text
         if (one.due is None) == (one.days is None):
             yield ("extensions", at), "give either `due` or `days`"
-        first = seen.setdefault((login(one.student), one.assignment), at)
+        first = seen.setdefault((written(one.student), one.assignment), at)
         if first != at:
             line = source.line(("extensions", first))
             text = f"{one.student} has an extension for {one.assignment} already (line {line})"

@@ -54,6 +54,11 @@ def test_a_student_has_the_rules_of_the_assignment_and_the_own_extension(tmp_pat
     assert ana.due.isoformat() == "2026-10-14T23:59:00+02:00"
     assert ben.due.isoformat() == "2026-10-12T23:59:00+02:00"
     assert (ana.late, ana.attempts) == (rules.spec.late, rules.spec.attempts)
+    # As a Mac writes the accent, and as a keyboard does.
+    accent = course(
+        tmp_path, WHOLE.replace("student: ana", "student: jose\N{COMBINING ACUTE ACCENT}")
+    )
+    assert accent.rules("timed_publisher", "Jos\N{LATIN SMALL LETTER E WITH ACUTE}").due == ana.due
     # The clocks were changed on the day before the due time.
     assert rules.rules("qos", "ana").due.isoformat() == "2026-10-28T23:59:00+01:00"
     assert rules.rules("qos", "ben").late == rules.spec.assignments["qos"].late
