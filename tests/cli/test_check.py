@@ -127,6 +127,41 @@ def test_a_crash_is_shown_with_the_student_s_file_and_line(
     assert "NameError" in ended.stdout
     line = (submission / NODE).read_text().splitlines().index("        print(undefined)") + 1
     assert f"{NODE}:{line}" in ended.stdout
+    assert f"❱ {line}     print(undefined)" in ended.stdout
+    report = tmp_path / "rosgrade-report"
+    address = f'href="vscode://file{submission.resolve()}/{NODE}:{line}"'
+    assert address in (report / "report.html").read_text(encoding="utf-8")
+    # As it was graded, also when it is rendered for others.
+    assert (report / "source" / NODE).read_text() == (submission / NODE).read_text()
+    rosgrade("report", "rosgrade-report")
+    again = (report / "report.html").read_text(encoding="utf-8")
+    assert "vscode://" not in again and 'class="is-meant"' in again
+
+
+def test_a_finding_shows_where_the_program_creates_what_it_is_about(
+    rosgrade: Rosgrade, tmp_path: Path
+) -> None:
+    submission = copy(tmp_path, "PERIOD_S = 0.3", "PERIOD_S = 0.4")
+    rosgrade("check", "timed_publisher", submission, "--only", "period")
+    (found,) = [one for one in result(tmp_path)["checks"] if one["id"] == "period"]
+    lines = (submission / NODE).read_text().splitlines()
+    origins = [(one["file"], lines[one["line"] - 1]) for one in found["evidence"]["origins"]]
+    assert [file for file, _ in origins] == [NODE, NODE]
+    assert [words.split("(")[0].strip() for _, words in origins] == [
+        "self.timer = self.create_timer",
+        "self.publisher = self.create_publisher",
+    ]
+
+
+def test_a_report_never_replaces_a_folder_of_sources_that_is_not_its_own(
+    rosgrade: Rosgrade, tmp_path: Path
+) -> None:
+    own = tmp_path / "thesis" / "source" / "chapter.tex"
+    own.parent.mkdir(parents=True)
+    own.write_text("mine")
+    ended = rosgrade("check", "timed_publisher", REFERENCE, "--report", "thesis")
+    assert ended.returncode == 2 and "does not belong to a report" in ended.stderr
+    assert own.read_text() == "mine"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

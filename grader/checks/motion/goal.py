@@ -242,8 +242,11 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
         far = max(past_m, key=past_m.__getitem__)
         seen.append(f"{metres(past_m[far])} past the goal")
         moments.append((past_m[far] > most_m, seen[-1], far))
-        shown = {time_ns: value * 100.0 for time_ns, value in past_m.items()}
-        plots.append(_plot(run, "Past the goal, once near it", "past (cm)", shown, most_m * 100.0))
+        # In the unit of the text.
+        unit, factor = ("cm", 100.0) if past_m[far] < 0.1 else ("m", 1.0)
+        shown = {time_ns: value * factor for time_ns, value in past_m.items()}
+        title, limit = "Past the goal, once near it", most_m * factor
+        plots.append(_plot(run, title, f"past ({unit})", shown, limit))
     if most_rad is not None:
         far = max(beyond_rad, key=beyond_rad.__getitem__)
         seen.append(f"{degrees(beyond_rad[far])} beyond its heading")
