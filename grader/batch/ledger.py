@@ -18,7 +18,7 @@ from pathlib import Path
 from grader.batch.files import RESULT_FILE
 from grader.batch.last_attempt import EARLIER
 from grader.errors import RosgradeError, UsageError, machine_fault
-from grader.report.files import check_folder, folder_name, sync, write_whole
+from grader.report.files import check_folder, file_version, folder_name, sync, write_whole
 from grader.report.model.class_result import for_class
 from grader.report.model.result import read_result
 from grader.report.model.result_model import Result
@@ -95,7 +95,7 @@ class Ledger:
     def __init__(self, out: Path) -> None:
         """Name the folder; nothing is made yet."""
         self.out = out
-        self._results: dict[str, tuple[tuple[int, ...], Result | None]] = {}
+        self._results: dict[str, tuple[object, Result | None]] = {}
 
     @contextmanager
     def opened(self) -> Iterator[Ledger]:
@@ -174,12 +174,8 @@ class Ledger:
 
         It lacks plots, logs and figures: to write a result again, read :meth:`whole_result`.
         """
-        try:
-            state = (self.folder(key) / RESULT_FILE).stat()
-        except OSError:
-            return None
         # Read once for all that ask.
-        version = (state.st_ino, state.st_mtime_ns, state.st_size)
+        version = file_version(self.folder(key) / RESULT_FILE)
         if key not in self._results or self._results[key][0] != version:
             whole = self.whole_result(key)
             self._results[key] = version, for_class(whole) if whole is not None else None

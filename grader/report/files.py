@@ -81,6 +81,15 @@ def write_whole(file: Path, content: str | bytes, *, durable: bool = False) -> N
         raise machine_fault(error, file) or refusal from error
 
 
+def file_version(file: Path) -> object:
+    """What is another one for each version of a file; None where there is none."""
+    try:
+        known = file.stat()
+    except OSError:
+        return None
+    return known.st_ino, known.st_size, known.st_mtime_ns
+
+
 def sync(path: Path) -> None:
     """Make a written file, or the renames in a folder, survive a power cut."""
     descriptor = os.open(path, os.O_RDONLY)

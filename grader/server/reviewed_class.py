@@ -14,7 +14,7 @@ from grader.batch.files import RESULT_FILE
 from grader.batch.ledger import BATCH_FILE, Entry, Ledger
 from grader.batch.regrading import load_used
 from grader.errors import RosgradeError, UsageError
-from grader.report.files import folder_name
+from grader.report.files import file_version, folder_name
 from grader.report.model.class_row import ClassRow
 from grader.report.model.result_model import AdjustmentPart
 from grader.review.cluster import Cluster, clusters
@@ -56,7 +56,7 @@ class ReviewedClass:
     @property
     def loaded(self) -> LoadedAssignment:
         """The assignment that the class is graded with."""
-        version = _version(self.out / BATCH_FILE)
+        version = file_version(self.out / BATCH_FILE)
         if self._loaded is None or self._loaded[0] != version:
             self._loaded = version, load_used(self.ledger)
         return self._loaded[1]
@@ -69,13 +69,13 @@ class ReviewedClass:
 
     def _rows(self) -> list[ReviewedRow]:
         written, adjust = self.ledger.read(), None
-        course = _version(self.out / written.course) if written.course else None
+        course = file_version(self.out / written.course) if written.course else None
         forgiven = self.store.of_class().content.forgiven
-        shared = (_version(self.out / BATCH_FILE), course, forgiven)
+        shared = (file_version(self.out / BATCH_FILE), course, forgiven)
         found = {}
         for entry in written.entries:
             files = (self.ledger.folder(entry.key) / RESULT_FILE, self.store.file(entry.review_key))
-            version = (*map(_version, files), shared)
+            version = (*map(file_version, files), shared)
             known, read = self._known.get(entry.key, (None, None))
             if read is None or known != version:
                 adjust = adjust or ClassAdjustments(self.ledger)
@@ -114,12 +114,3 @@ class ReviewedClass:
             entry = replace(entry, problem="; ".join(filter(None, (entry.problem, why))))
             saved = Saved(StudentReview(key=entry.review_key), "")
             return replace(done, entry=entry, result=result), saved, why
-
-
-def _version(file: Path) -> object:
-    """What is another one for each version of a file; None where there is none."""
-    try:
-        known = file.stat()
-    except OSError:
-        return None
-    return known.st_ino, known.st_size, known.st_mtime_ns

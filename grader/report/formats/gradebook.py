@@ -121,7 +121,7 @@ def grades_csv(rows: Sequence[ClassRow], zero: Collection[RowStatus] = ()) -> st
                 cell(row.note),
             ]
         )
-    return _csv(table)
+    return csv_text(table)
 
 
 def _column_of(one: AdjustmentPart) -> tuple[str, str]:
@@ -232,10 +232,11 @@ def canvas_csv(
     if not scores:
         raise UsageError("\n".join(["no score could be filled in:", *problems]))
     doubts = tuple(_doubts(export, title, points, max_score))
-    return CanvasFile(_csv(table), scores, tuple(problems), doubts)
+    return CanvasFile(csv_text(table), scores, tuple(problems), doubts)
 
 
-def _csv(rows: Iterable[Sequence[str]]) -> str:
+def csv_text(rows: Iterable[Sequence[str]]) -> str:
+    """Rows as CSV."""
     stream = io.StringIO()
     csv.writer(stream).writerows(rows)
     return stream.getvalue()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import mailbox
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -15,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from grader.report.files import write_whole
-from grader.report.formats.gradebook import cell
+from grader.report.formats.gradebook import cell, csv_text
 from grader.safe_text import clean, one_line
 
 _COLUMNS = ("email", "name", "subject", "body", "report")
@@ -69,11 +67,9 @@ def _message(letter: Letter, sender: Address | None) -> EmailMessage:
 
 def mail_csv(letters: Sequence[Letter]) -> str:
     """The messages as CSV, a row each; no spreadsheet takes a cell for a formula."""
-    stream = io.StringIO()
-    writer = csv.writer(stream)
-    writer.writerow(_COLUMNS)
+    rows: list[Sequence[str]] = [_COLUMNS]
     for letter in letters:
         to, report = letter.to, str(letter.report.resolve())
         short = map(cell, (to.addr_spec, to.display_name, letter.subject))
-        writer.writerow([*short, clean(letter.body), cell(report)])
-    return stream.getvalue()
+        rows.append([*short, clean(letter.body), cell(report)])
+    return csv_text(rows)
