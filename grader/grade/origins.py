@@ -17,8 +17,9 @@ from grader.submission.record import SourceError
 
 _MOST = 3
 _LONGEST_NAME = 200
-# What a declaration is called by.
-_NAMES = {"publisher": "topic", "subscription": "topic", "node": "node", "timer": "callback"}
+# What a declaration is called by, and what it says.
+_NAMES = {"node": "node", "timer": "callback"}
+_WORDS = {"published": "messages on {} are published here"}
 
 
 def with_origins(finding: Finding, parameters: Parameters, recording: Recording) -> Finding:
@@ -35,6 +36,9 @@ def with_origins(finding: Finding, parameters: Parameters, recording: Recording)
 
 def _places(seen: str, parameters: Parameters, recording: Recording) -> Iterator[SourceError]:
     named = {value for _, value in parameters if isinstance(value, str)}
+    if recording.scene and "published" in parameters.about and not hasattr(parameters, "topic"):
+        # About the robot: it does what it is commanded.
+        named.add(recording.scene.command_topic)
     kinds = [kind for kind in parameters.about if kind in named] or parameters.about
     declared = {kind: recording.declared(kind) for kind in kinds}
     timers = declared.pop("timer", ())
@@ -42,11 +46,12 @@ def _places(seen: str, parameters: Parameters, recording: Recording) -> Iterator
         one
         for kind, items in declared.items()
         for one in items
-        if (name := str(one.data.get(_NAMES[kind]))) in named or f"`{name}`" in seen
+        if (name := str(one.data.get(_NAMES.get(kind, "topic")))) in named or f"`{name}`" in seen
     ]
     nodes = {one.data.get("node") for one in found}
     for one in [*(one for one in timers if not nodes or one.data.get("node") in nodes), *found]:
         path = submission_path(str(one.data.get("file")), recording.submission)
         if path and isinstance(line := one.data.get("line"), int):
-            name = str(one.data.get(_NAMES[one.kind]))[:_LONGEST_NAME]
-            yield SourceError(path, line, f"the {one.kind} {name} is created here")
+            name = str(one.data.get(_NAMES.get(one.kind, "topic")))[:_LONGEST_NAME]
+            words = _WORDS.get(one.kind, f"the {one.kind} {{}} is created here")
+            yield SourceError(path, line, words.format(name))

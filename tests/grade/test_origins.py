@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 
 from grader.checks.executor.executor import Timer
+from grader.checks.messages.messages import Count
+from grader.checks.motion.drive import KeepsDriving
 from grader.checks.qos.qos import Depth
 from grader.checks.timing.timing import Period
 from grader.checks.topic.topic import Topic
@@ -17,6 +19,7 @@ from grader.recording.model import Recording
 from grader.submission.record import PackageRecord, SourceError
 from tests.checks.builder import declared
 from tests.grade.sample import make_recording, make_submission
+from tests.report.gallery import ahead_until
 
 NODE = "bot_publisher/node.py"
 INSTALLED = f"/ws/install/lib/python3.12/site-packages/{NODE}"
@@ -31,6 +34,8 @@ def run(**changes: Any) -> Recording:
         declared("publisher", topic="/cmd_vel", line=11, **at),
         declared("publisher", topic="/status", line=12, **at),
         declared("subscription", topic="/cmd_vel", line=13, **at),
+        declared("published", topic="/cmd_vel", number=1, line=21, **at),
+        declared("published", topic="/cmd_vel", number=2, line=21, **at),
         declared("timer", period_s=0.3, callback="Bot.tick", line=14, **at),
     )
     package = PackageRecord(
@@ -55,10 +60,16 @@ def lines(finding: Finding, parameters: Any, recording: Recording) -> list[int |
         (Timer(topic="/cmd_vel"), [14, 11]),
         (Topic(topic="/cmd_vel"), [11, 13]),
         (Topic(topic="/other"), []),
+        (Count(topic="/cmd_vel", at_least=1), [21, 13]),
+        (KeepsDriving(distance="1 m"), []),
     ],
 )
 def test_what_a_check_is_about_is_shown_where_it_is_created(parameters, expected):
     assert lines(FAILED, parameters, run()) == expected
+
+
+def test_a_check_of_the_robot_shows_where_it_is_commanded():
+    assert lines(FAILED, KeepsDriving(distance="1 m"), run(scene=ahead_until(0.2).scene)) == [21]
 
 
 def test_a_wrong_name_that_was_observed_is_shown_too():

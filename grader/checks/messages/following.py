@@ -30,6 +30,7 @@ _NEARLY_ALL = 0.9
 class Follows(Parameters):
     """Parameters of messages.follows."""
 
+    about = ("published", "subscription")
     needs = (Recorded(), Recorded("source"))
 
     topic: TopicName = Field(description="Topic of the messages that are judged.")

@@ -48,6 +48,7 @@ _MOST_FIELDS = 8
 class Count(Parameters):
     """Parameters of messages.count."""
 
+    about = ("published", "subscription")
     needs = (Recorded(), Published())
 
     topic: TopicName = Field(description="Fully qualified topic name.")
@@ -143,6 +144,7 @@ def count(recording: Recording, parameters: Count) -> Finding:
 class Equal(Parameters):
     """Parameters of messages.equal."""
 
+    about = ("published", "subscription")
     needs = (Recorded(),)
 
     topic: TopicName = Field(description="Fully qualified topic name.")
@@ -257,6 +259,7 @@ def _hint(found: tuple[Difference, ...], number: int, right: int, *, compiled: b
 class Series(Parameters):
     """Parameters of messages.sequence."""
 
+    about = ("published", "subscription")
     needs = (Recorded(),)
 
     topic: TopicName = Field(description="Fully qualified topic name.")

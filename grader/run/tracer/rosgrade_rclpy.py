@@ -59,8 +59,8 @@ def _group(group: Any, node: Any) -> dict[str, Any]:
     return {"type": type(chosen).__name__, "id": id(chosen)}
 
 
-def _created_at() -> dict[str, Any]:
-    """File and line of the student's program that creates something now, if any."""
+def _place() -> dict[str, Any]:
+    """File and line of the student's program that does something now, if any."""
     frame: Any = sys._getframe()
     while frame is not None and not frame.f_code.co_filename.startswith(f"{INSTALL}/"):
         frame = frame.f_back
@@ -83,7 +83,7 @@ def _endpoint(kind: str, node: Any, endpoint: Any, **more: Any) -> None:
         topic=endpoint.topic_name,
         type=_type_name(endpoint.msg_type),
         **_qos(endpoint.qos_profile),
-        **_created_at(),
+        **_place(),
         **more,
     )
 
@@ -132,7 +132,8 @@ def _report_messages(publisher: Any) -> None:
     def reported(*args: Any, **kwargs: Any) -> Any:
         number = _messages[topic] = _messages.get(topic, 0) + 1
         if not number & (number - 1):
-            report("published", topic=topic, number=number, in_callback=_is_in_callback())
+            told = {"number": number, "in_callback": _is_in_callback(), **_place()}
+            report("published", topic=topic, **told)
         return publish(*args, **kwargs)
 
     publisher.publish = reported
@@ -204,7 +205,7 @@ def _patch_node(module: Any) -> None:
 
     def made(node: Any, _: Any) -> None:
         _nodes.append(True)
-        report("node", node=_full_name(node), **_created_at())
+        report("node", node=_full_name(node), **_place())
 
     def published(node: Any, publisher: Any) -> None:
         _endpoint("publisher", node, publisher)
@@ -218,7 +219,7 @@ def _patch_node(module: Any) -> None:
             period_s=timer.timer_period_ns / 1e9,
             callback=_callback_name(timer.callback),
             group=_group(timer.callback_group, node),
-            **_created_at(),
+            **_place(),
         )
 
     def subscribed(node: Any, subscription: Any) -> None:
