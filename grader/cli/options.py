@@ -56,6 +56,10 @@ Chosen = Annotated[
         help="Value of a variable of the assignment, such as your group's number; may be repeated.",
     ),
 ]
+Port = Annotated[
+    int,
+    typer.Option(min=0, max=65535, metavar="N", help="Port of the page; 0 means any free port."),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")]
 Verbose = Annotated[
     bool,

@@ -10,15 +10,13 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.options import ClassFolder
+from grader.cli.options import ClassFolder, Port
 from grader.cli.screen.console import open_page, say
 
 
 def review(
     out: ClassFolder,
-    port: Annotated[
-        int, typer.Option(min=0, max=65535, metavar="N", help="Port; 0 means any free port.")
-    ] = 0,
+    port: Port = 0,
     open_browser: Annotated[bool, typer.Option("--open", help="Open it in a browser.")] = False,
     by: Annotated[
         str | None,
@@ -30,14 +28,10 @@ def review(
     Reports with the source beside them, comments, points by a person, and failures with the same
     cause. What is written lies in OUT/review/. Only this machine can open the page.
     """
-    from grader.errors import UsageError
     from grader.server.review import ReviewServer
 
     initials = by or _initials()
-    try:
-        server = ReviewServer(out, initials, port)
-    except OSError as error:
-        raise UsageError(f"--port {port}: {error.strerror}") from error
+    server = ReviewServer(out, initials, port)
     say(f"Review of {out} by {initials}: {server.url}")
     say("Ctrl-C ends")
     if open_browser:

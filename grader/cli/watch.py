@@ -16,6 +16,7 @@ from grader.cli.options import (
     Checks,
     Chosen,
     Hidden,
+    Port,
     Quiet,
     ReportFolder,
     SandboxChoice,
@@ -59,12 +60,7 @@ def watch(
     chosen: Chosen = None,
     hidden: Hidden = False,
     sandbox: SandboxChoice = Choice.AUTO,
-    port: Annotated[
-        int,
-        typer.Option(
-            min=0, max=65535, metavar="N", help="Port of the report page; 0 means any free port."
-        ),
-    ] = 0,
+    port: Port = 0,
     quiet: Quiet = False,
     verbose: Verbose = False,
     open_report: Annotated[
@@ -81,7 +77,6 @@ def watch(
     from grader.assignment.load import load_assignment
     from grader.assignment.selection import select, visible_part
     from grader.batch.files import refuse_foreign
-    from grader.errors import UsageError
     from grader.report.files import check_folder, refuse_inputs
     from grader.run.runner import Runner
     from grader.server.watch import ReportPage
@@ -99,10 +94,7 @@ def watch(
     check_folder(report)
     refuse_foreign(report, keep=False)
     with ExitStack() as stack:
-        try:
-            page = ReportPage(report / "report.html", port)
-        except OSError as error:
-            raise UsageError(f"--port {port}: {error.strerror}") from error
+        page = ReportPage(report / "report.html", port)
         stack.callback(page.close)
         progress = Progress(quiet, verbose, page.show_phase)
         runner = Runner(

@@ -7,6 +7,7 @@ import socket
 import threading
 from typing import TYPE_CHECKING
 
+from grader.errors import UsageError
 from grader.server.guard import Guard
 
 if TYPE_CHECKING:
@@ -22,13 +23,16 @@ class LocalServer:
         """Begin to serve; port 0 takes a free one.
 
         Raises:
-            OSError: The port is taken.
+            UsageError: The port is taken.
         """
         # Imported late: it takes a tenth of a second.
         import uvicorn
 
         self._token = secrets.token_urlsafe(32)
-        self._socket = socket.create_server((ADDRESS, port))
+        try:
+            self._socket = socket.create_server((ADDRESS, port))
+        except OSError as error:
+            raise UsageError(f"--port {port}: {error.strerror}") from error
         self.host = f"{ADDRESS}:{self._socket.getsockname()[1]}"
         """Address and port, as a browser names them in its requests."""
         config = uvicorn.Config(

@@ -48,8 +48,7 @@ class ReviewServer(LocalServer):
         """Begin to serve, and bring the files of the class up to date; port 0 takes a free one.
 
         Raises:
-            UsageError: There is no class in the folder.
-            OSError: The port is taken.
+            UsageError: There is no class in the folder, or the port is taken.
         """
         self._class = ReviewedClass(out, by)
         self._scratch = tempfile.TemporaryDirectory(prefix="rosgrade-review-")
