@@ -39,23 +39,29 @@ from sim.motion import Pose
 
 _MADE = "<!-- Made by `python -m grader.docs` from the code: change it there. -->"
 
-# File of a kind -> heading of a section -> the model that it describes, in the order of reading.
+# Page -> heading of a section -> the model that it describes, in the order of reading.
 _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
-    "assignment": {
+    "assignment-yaml": {
         "The whole file": model.Assignment,
         "variables": variable.Variable,
         "packages": model.Package,
         "scenarios": model.Scenario,
         "launch": model.Launch,
         "record": model.RecordedTopic,
-        **{
-            f"stimuli: {heading}": found
-            for one in stimulus_models()
-            for heading, found in {one.heading or one.key: one, **one.inner}.items()
-        },
         "until": model.Until,
         "limits": limits.LimitOptions,
         "build_limits": limits.BuildLimitOptions,
+        "checks": model.CheckSpec,
+        "checks: after, before, while": window.Phase,
+        "manual": model.ManualItem,
+        "manual: levels": model.Level,
+    },
+    "stimuli": {
+        heading: found
+        for one in stimulus_models()
+        for heading, found in {one.heading or one.key: one, **one.inner}.items()
+    },
+    "robot": {
         "robot": description.RobotOptions,
         "robot: drives": description.Drive,
         "lidar": description.LidarOptions,
@@ -68,10 +74,6 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "topics: scan": description.ScanTopic,
         "topics: clock": description.ClockTopic,
         "topics: tf": description.TransformTopic,
-        "checks": model.CheckSpec,
-        "checks: after, before, while": window.Phase,
-        "manual": model.ManualItem,
-        "manual: levels": model.Level,
     },
     "mutants": {
         "The whole of mutants.yaml": mutant.MutantFile,
@@ -91,7 +93,9 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
     },
 }
 _HEADINGS = {
-    one.__name__: heading for models in _SECTIONS.values() for heading, one in models.items()
+    one.__name__: (f"{page}.md", heading)
+    for page, models in _SECTIONS.items()
+    for heading, one in models.items()
 }
 _EXAMPLES = {
     Dimension.TIME: "300 ms",
@@ -143,8 +147,8 @@ _BOUNDS = {
 }
 
 
-def assignment_markdown() -> str:
-    """The description of ``assignment.yaml``, ``mutants.yaml`` and worlds."""
+def assignment_markdown() -> dict[str, str]:
+    """The description of ``assignment.yaml``, its parts, ``mutants.yaml`` and worlds, by page."""
     quantities = [
         (one.value, ", ".join(f"`{unit}`" for unit in units), f"`{_EXAMPLES[one]}`")
         for one, units in UNITS.items()
@@ -152,15 +156,18 @@ def assignment_markdown() -> str:
     folder = resources.assignments()
     example = folder / "timed_publisher" / "assignment.yaml"
     world = folder / "bot_controller" / "worlds" / "crossing.yaml"
-    return _rendered(
-        "assignment-yaml.md",
-        sections=_SECTIONS,
-        documentation=inspect.getdoc,
-        fields_table=_fields_table,
-        quantities=quantities,
-        example=example.read_text(encoding="utf-8").strip(),
-        world=world.read_text(encoding="utf-8").strip(),
-    )
+    return {
+        f"{page}.md": _rendered(
+            f"{page}.md",
+            sections=sections,
+            documentation=inspect.getdoc,
+            fields_table=_fields_table,
+            quantities=quantities,
+            example=example.read_text(encoding="utf-8").strip(),
+            world=world.read_text(encoding="utf-8").strip(),
+        )
+        for page, sections in _SECTIONS.items()
+    }
 
 
 def checks_markdown() -> dict[str, str]:
@@ -283,8 +290,9 @@ def _value(schema: Mapping[str, Any], definitions: Mapping[str, Any]) -> str:
         return f"{dimension.value}, such as `{_EXAMPLES[dimension]}`"
     if "$ref" in schema:
         name = str(schema["$ref"]).rpartition("/")[2]
-        heading = _HEADINGS.get(name)
-        return f"[{heading}]({_anchor(heading)})" if heading else _value(definitions[name], {})
+        page, heading = _HEADINGS.get(name, ("", ""))
+        link = f"[{heading}]({page}{_anchor(heading)})"
+        return link if heading else _value(definitions[name], {})
     for key in ("anyOf", "oneOf"):
         if key in schema:
             forms = [form for form in schema[key] if form.get("type") != "null"]
@@ -339,7 +347,7 @@ def _table(header: tuple[str, ...], rows: Any) -> str:
 def documents() -> dict[str, str]:
     """Every generated file of ``docs/``, by name."""
     return {
-        "assignment-yaml.md": assignment_markdown(),
+        **assignment_markdown(),
         **checks_markdown(),
         "explanations.md": explanations_markdown(),
         "recording.md": recording_markdown(),

@@ -45,16 +45,16 @@ def test_every_check_is_described_with_all_its_parameters() -> None:
 
 
 def test_links_lead_to_headings() -> None:
-    text = docs.assignment_markdown()
-    outside = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    pages = docs.assignment_markdown()
     headings = {
-        re.sub(r"[^a-z0-9_ -]", "", line.lstrip("# ").lower()).replace(" ", "-")
-        for line in outside.splitlines()
+        f"{name}#{re.sub(r'[^a-z0-9_ -]', '', line.lstrip('# ').lower()).replace(' ', '-')}"
+        for name, text in pages.items()
+        for line in re.sub(r"```.*?```", "", text, flags=re.DOTALL).splitlines()
         if line.startswith("#")
     }
-    links = set(re.findall(r"\]\(#([^)]*)\)", outside))
+    links = {link for text in pages.values() for link in re.findall(r"\]\((\S+\.md#\S*?)\)", text)}
     assert links
-    assert links <= headings
+    assert {link for link in links if link.partition("#")[0] in pages} <= headings
 
 
 def test_a_link_to_a_check_still_leads_to_it() -> None:
@@ -69,14 +69,16 @@ def test_a_value_is_described_in_the_words_of_yaml(catalogue: dict[str, Check]) 
     text = docs.check_markdown(catalogue["timing.period"])
     assert "| `topic` | topic, such as `/cmd_vel` | required |  |" in text
     assert "| `period` | time, such as `300 ms` | required |" in text
-    text = docs.assignment_markdown()
+    text = docs.assignment_markdown()["assignment-yaml.md"]
     assert "| `discovery` | time, such as `300 ms` | `10 s` |" in text
     assert "| `ament_python`, `ament_cmake`, or a list of both | `[ament_python]` |" in text
-    assert "| `launch` | list of [launch](#launch) | required |" in text
+    assert "| `launch` | list of [launch](assignment-yaml.md#launch) | required |" in text
 
 
 def test_the_example_of_an_own_check_works(tmp_path: Path) -> None:
-    (code,) = re.findall(r"```python\n(.*?)```", docs.assignment_markdown(), flags=re.DOTALL)
+    (code,) = re.findall(
+        r"```python\n(.*?)```", docs.assignment_markdown()["assignment-yaml.md"], flags=re.DOTALL
+    )
     (tmp_path / "checks.py").write_text(code)
     check = load_own_check("checks.py:drives_straight", tmp_path)
 
@@ -93,7 +95,9 @@ def test_the_example_of_an_own_check_works(tmp_path: Path) -> None:
 
 def test_the_example_in_the_documentation_is_the_shipped_assignment() -> None:
     file = resources.assignments() / "timed_publisher" / "assignment.yaml"
-    assert file.read_text(encoding="utf-8").strip() in docs.assignment_markdown()
+    assert (
+        file.read_text(encoding="utf-8").strip() in docs.assignment_markdown()["assignment-yaml.md"]
+    )
 
 
 def test_the_page_of_the_recording_describes_every_part_of_it() -> None:

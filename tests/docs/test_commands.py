@@ -16,7 +16,7 @@ ROOT = resources.root()
 INDENTED = re.compile(r"^ {4,}(rosgrade .*)$", re.MULTILINE)
 FENCE = re.compile(r"^( *)```\w*[^\n]*\n(.*?)^\1```", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"`(rosgrade\s[^`]+)`")
-PAGES = ["README.md", *(f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md"))]
+PAGES = ["README.md", *(str(page.relative_to(ROOT)) for page in (ROOT / "docs").rglob("*.md"))]
 
 
 def named(text: str) -> list[str]:
