@@ -109,20 +109,13 @@ def jump(work: Work) -> Iterator[Question]:
 
 def timer(work: Work) -> Iterator[Question]:
     """Another period of a timer."""
-    places = list(work.places(r"\bcreate_(?:wall_)?timer\b"))
     declared = next((found for found in map(timers, work.recordings) if found), ())
-    for index, place in enumerate(places):
-        text, facts = (
-            f"{place.short} creates a timer. What would the report show if its period ",
-            [],
+    facts = [f"a timer calls {code(one.callback)} every {one.period_s:g} s" for one in declared]
+    for place in work.places(r"\bcreate_(?:wall_)?timer\b"):
+        text = (
+            f"{place.short} creates a timer. What would the report show if its period were three "
+            "times as long?"
         )
-        # Only then is it clear which line created which.
-        if len(declared) == len(places):
-            period_s = declared[index].period_s
-            text += f"were {3 * period_s:g} s instead of {period_s:g} s?"
-            facts = [f"it calls {code(declared[index].callback)}"]
-        else:
-            text += "were three times as long?"
         yield Question(text, (str(place), *facts), 1 + 2 * work.is_rare(place))
 
 

@@ -66,7 +66,7 @@ def test_source_alone_gives_three_questions_about_lines_that_are_there() -> None
 
 def test_a_timer_is_asked_about_with_the_period_that_was_recorded() -> None:
     text = asked(recording(declarations=declarations()))
-    assert "were 0.9 s instead of 0.3 s?" in text
+    assert "three times as long?" in text and "every 0.3 s" in text
 
 
 def test_a_value_that_changes_at_once_is_asked_about_with_its_time_and_its_lines() -> None:
