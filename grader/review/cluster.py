@@ -38,11 +38,6 @@ class Cluster:
     forgiven: float = 0.0
 
     @property
-    def keys(self) -> tuple[str, ...]:
-        """The students."""
-        return tuple(self.lost)
-
-    @property
     def at_stake(self) -> float:
         """Points that the class lost by it."""
         return total(self.lost.values())

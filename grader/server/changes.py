@@ -69,7 +69,7 @@ def change_cluster(reviewed: ReviewedClass, sent: Any) -> None:
         raise UsageError("Nobody fails for this cause any more. Load the page again.")
     if sent["do"] == "comment":
         comment = Comment(text=sent["text"], by=reviewed.by)
-        rows = (row for row in reviewed.rows() if row.row.id in found[0].keys)
+        rows = (row for row in reviewed.rows() if row.row.id in found[0].lost)
         for key in dict.fromkeys(row.entry.review_key for row in rows):
             saved = store.student(key)
             if comment.text not in (one.text for one in saved.content.comments):
