@@ -11,7 +11,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 
 from tests.report.gallery import gallery, reference
-from tests.report.sample import everywhere, lost_points, not_built, not_graded
+from tests.report.sample import PLACE, everywhere, lost_points, not_built, not_graded
 
 SAMPLES = {
     "gallery": gallery,
@@ -20,18 +20,23 @@ SAMPLES = {
     "not_graded": not_graded,
 }
 VIEWS = [
+    *(("lost_points", width, "dark") for width in (390, 1280)),
     *(("gallery", width, scheme) for width in (390, 1280) for scheme in ("light", "dark")),
     ("gallery", 1600, "light"),
     ("lost_points", 390, "light"),
     ("not_built", 1280, "dark"),
     ("not_graded", 390, "dark"),
 ]
+# Long lines, in every colour.
+NODE = 10 * (
+    "    # note\n@decorator\ndef name(self):\n    return f'text' + 1.5" + 99 * " + 1" + "\n"
+)
 SLIDER = ".replay input[type=range]"
 pytestmark = pytest.mark.slow
 
 
 def html_of(make):
-    return make().html(reference())
+    return make().html(reference(), source={PLACE.file: NODE})
 
 
 def violations(page):

@@ -459,7 +459,7 @@ class TestMistakes:
         found = judge("motion.overshoot", run, goal=yaml((0.6, 0.0, 0.0)), most="2 cm")
         (plot,), (moment,) = found.evidence.plots, found.evidence.moments
         most = max(plot.y)
-        assert plot.y_label == "past (m)"
+        assert plot.y_label == "past the goal (m)"
         assert found.observed == moment.label == f"{most:.3g} m past the goal"
         assert moment.time_s == plot.x[plot.y.index(most)]
         assert plot.band == (-math.inf, 0.02)

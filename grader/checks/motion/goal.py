@@ -236,25 +236,22 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     if arrival is None:
         cause = why_not_there(run, parameters.position)
         return (cause or Cause("never near the goal")).finding(expected)
-    past_m, beyond_rad = _past_m(run, arrival), _beyond_rad(run, parameters.position)
-    seen, plots, moments = [], [], []
+    off: dict[str, int] = {}
+    seen, plots = [], []
     if most_m is not None:
+        past_m = _past_m(run, arrival)
         far = max(past_m, key=past_m.__getitem__)
         seen.append(f"{metres(past_m[far])} past the goal")
-        moments.append((past_m[far] > most_m, seen[-1], far))
         # In the unit of the text.
         unit, factor = ("cm", 100.0) if past_m[far] < 0.1 else ("m", 1.0)
-        shown = {time_ns: value * factor for time_ns, value in past_m.items()}
-        title, limit = "Past the goal, once near it", most_m * factor
-        plots.append(_plot(run, title, f"past ({unit})", shown, limit))
+        plots.append(_plot(run, f"past the goal ({unit})", past_m, most_m, factor))
+        off |= {seen[-1]: far} if past_m[far] > most_m else {}
     if most_rad is not None:
+        beyond_rad = _beyond_rad(run, parameters.position)
         far = max(beyond_rad, key=beyond_rad.__getitem__)
         seen.append(f"{degrees(beyond_rad[far])} beyond its heading")
-        moments.append((beyond_rad[far] > most_rad, seen[-1], far))
-        shown = {time_ns: math.degrees(value) for time_ns, value in beyond_rad.items()}
-        limit = math.degrees(most_rad)
-        plots.append(_plot(run, "Beyond the goal's heading", "beyond (°)", shown, limit))
-    off = [(label, time_ns) for is_off, label, time_ns in moments if is_off]
+        plots.append(_plot(run, "beyond its heading (°)", beyond_rad, most_rad, math.degrees(1.0)))
+        off |= {seen[-1]: far} if beyond_rad[far] > most_rad else {}
     evidence = Evidence(plots=tuple(plots))
     if not off:
         return Finding.passed(expected, " and ".join(seen), evidence)
@@ -262,19 +259,20 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
         " and ".join(seen),
         "Compute linear.x as a gain times the distance: then the robot slows down before the goal. "
         "Make the gain smaller, so that linear.x is below its limit before the robot arrives.",
-        evidence_at(recording, *off[0], *evidence.plots),
+        evidence_at(recording, *next(iter(off.items())), *evidence.plots),
     )
     return cause.finding(expected)
 
 
-def _plot(run: Approach, title: str, label: str, shown: dict[int, float], most: float) -> Plot:
-    """Values by time with the largest that is allowed; the largest of them is always drawn."""
-    values = list(shown.items())
-    largest = max(values, key=lambda one: one[1])
-    kept = sorted({*values[:: max(1, len(values) // _MOST_POINTS)], largest})
-    times_s = tuple(run.recording.since_launch_s(time_ns) for time_ns, _ in kept)
-    off = tuple(value for _, value in kept)
-    return Plot(title, "time since launch (s)", label, times_s, off, (-math.inf, most))
+def _plot(run: Approach, label: str, off: dict[int, float], most: float, factor: float) -> Plot:
+    """How far it is off by time, with the largest that is allowed; the largest is always drawn."""
+    times = [*off][:: max(1, len(off) // _MOST_POINTS)]
+    times = sorted({*times, max(off, key=off.__getitem__)})
+    x = tuple(map(run.recording.since_launch_s, times))
+    y = tuple(off[time_ns] * factor for time_ns in times)
+    return Plot(
+        f"How far {label}", "time since launch (s)", label, x, y, (-math.inf, most * factor)
+    )
 
 
 def _past_m(run: Approach, arrival: int) -> dict[int, float]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
+from typing import Any
 
 from rich.cells import cell_len
 from rich.console import Console
@@ -37,6 +38,8 @@ _READABLE = 100
 """Columns beyond which lines of prose get hard to read."""
 _INDENT = 12
 _LOG_LINES = 8
+_COLORS = {"theme": "ansi_dark", "background_color": "default"}
+_LOOK: dict[str, Any] = {**_COLORS, "line_numbers": True}
 _NO_SOURCE: Mapping[str, str] = MappingProxyType({})
 
 
@@ -57,13 +60,8 @@ def print_grade(
     console.print(Text.assemble((_line(console, title), "bold"), "   ", (submission, "dim")))
     console.print()
     console.print(_table(console, result))
-    same = explanation.same_as(result)
     for check in (*result.of(Status.FAILED), *result.of(Status.ERROR)):
-        if check.id in same:
-            _head(console, check)
-            console.print(_hanging(console, "observed", f"the same as “{same[check.id].title}”"))
-        else:
-            _explain(console, result, check, source)
+        _explain(console, result, check, source)
     _conclude(console, result)
 
 
@@ -130,15 +128,14 @@ def _status(console: Console, status: Status) -> Text:
     return Text(f"{symbol} {words.word}", _STYLE[status])
 
 
-def _head(console: Console, check: CheckPart) -> None:
+def _explain(console: Console, result: Result, check: CheckPart, source: Mapping[str, str]) -> None:
+    """Say why points were lost, or why there is no verdict."""
     console.print()
     title = (_line(console, check.title), "bold")
     console.print(Text.assemble(_status(console, check.status), "  ", title))
-
-
-def _explain(console: Console, result: Result, check: CheckPart, source: Mapping[str, str]) -> None:
-    """Say why points were lost, or why there is no verdict."""
-    _head(console, check)
+    if same := explanation.same_as(result).get(check.id):
+        console.print(_hanging(console, "observed", f"the same as “{same.title}”"))
+        return
     for row in explanation.explain(check, result):
         text = row.text
         if row.name == "printed":
@@ -161,14 +158,9 @@ def _print_source(console: Console, place: SourceError, source: Mapping[str, str
     if found is not None:
         code = _encodable(console, visible("\n".join(found.texts)))
         lexer = Syntax.guess_lexer(place.file, code)
+        marked = set() if console.options.ascii_only else {found.line}
         shown = Syntax(
-            code,
-            lexer,
-            theme="ansi_dark",
-            background_color="default",
-            line_numbers=True,
-            start_line=found.first,
-            highlight_lines=set() if console.options.ascii_only else {found.line},
+            code, lexer, line_numbers=True, start_line=found.first, highlight_lines=marked, **_LOOK
         )
         console.print(shown)
 
