@@ -28,6 +28,7 @@ from grader.batch.roster import Roster, Student
 from grader.batch.roster_match import matched, unique
 from grader.course.load import Course
 from grader.errors import GraderFault, RosgradeError, SubmissionError, UsageError
+from grader.report.formats.gradebook import DOWNLOAD
 from grader.submission.git import run_git
 from grader.submission.intake.archive import SUFFIXES, unpack
 from grader.submission.intake.members import MIB, ArchiveLimits
@@ -35,11 +36,7 @@ from grader.submission.intake.paths import shown
 from grader.submission.read.manifest import MANIFEST
 
 GRADESCOPE_METADATA = "submission_metadata.yml"
-# How Canvas names what it lets a teacher download: name, perhaps LATE, user, attachment, file.
-_CANVAS = re.compile(
-    r"(?P<name>[^_]+)_(?P<late>LATE_)?(?P<user>\d+)_(?P<attachment>\d+)_(?P<file>.+)", re.DOTALL
-)
-# And Moodle, for a folder of each student or for a single file.
+# How Moodle names what it lets a teacher download: a folder of each student, or a single file.
 _MOODLE = re.compile(r"(?P<name>[^_]+)_\d+_assignsubmission_file_.*", re.DOTALL)
 # What Canvas adds to the name of a file that was handed in again: ws-1.zip.
 _AGAIN = re.compile(r"-\d+(?=(\.tar)?\.[^.]+$)")
@@ -174,7 +171,7 @@ def _entries(
         # Path.resolve() raises at a link that leads to itself.
         if out is not None and os.path.realpath(item) == os.path.realpath(out):
             continue
-        match = _CANVAS.fullmatch(item.name) if item.is_file() else None
+        match = DOWNLOAD.fullmatch(item.name) if item.is_file() else None
         if item.name in metadata:
             yield from _of_gradescope(item, metadata[item.name])
         elif match:

@@ -33,7 +33,9 @@ _DROPPED = re.compile(
 _POINTS_POSSIBLE = "Points Possible"
 _CANVAS_ID = re.compile(r"\((\d+)\)\s*$")
 # How Canvas names what it lets a teacher download: name, perhaps LATE, user, attachment, file.
-DOWNLOAD = re.compile(r"^[^_]+_(?:LATE_)?(\d+)_\d+_")
+DOWNLOAD = re.compile(
+    r"(?P<name>[^_]+)_(?P<late>LATE_)?(?P<user>\d+)_(?P<attachment>\d+)_(?P<file>.+)", re.DOTALL
+)
 # What `rosgrade batch` calls such a submission: name and user.
 _DOWNLOADED = re.compile(r"^([^_]+)_(\d+)$")
 # Canvas adds it to every course.
@@ -337,7 +339,7 @@ def _column(export: CanvasExport, wanted: str) -> str:
 def _students(export: CanvasExport, submission: str) -> list[int]:
     """Rows that a submission may belong to, by the best of what identifies it."""
     download = DOWNLOAD.match(submission)
-    keys = [("ID", download[1])] if download else []
+    keys = [("ID", download["user"])] if download else []
     keys += [(title, submission) for title in ("ID", *_OPTIONAL[:2], "Student")]
     for title, value in keys:
         index = export.identity.index(title) if title in export.identity else None
