@@ -159,9 +159,7 @@ def _print_source(console: Console, place: SourceError, source: Mapping[str, str
         code = _encodable(console, visible("\n".join(found.texts)))
         lexer = Syntax.guess_lexer(place.file, code)
         marked = set() if console.options.ascii_only else {found.line}
-        shown = Syntax(
-            code, lexer, line_numbers=True, start_line=found.first, highlight_lines=marked, **_LOOK
-        )
+        shown = Syntax(code, lexer, start_line=found.first, highlight_lines=marked, **_LOOK)
         console.print(shown)
 
 
