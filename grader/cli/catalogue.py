@@ -99,38 +99,30 @@ def schema(
 
 
 def explain(
-    name: Annotated[str | None, typer.Argument(help="One idea; by default all of them.")] = None,
+    name: Annotated[str, typer.Argument(help="One idea; by default a list of all.")] = "index",
     html: Annotated[
         bool, typer.Option("--html", help="Write the page with its picture, to open in a browser.")
     ] = False,
 ) -> None:
     """Explain an idea of ROS, such as QoS: what a failed check says to read."""
     from rich.markdown import Markdown
-    from rich.table import Table
 
     from grader.errors import UsageError
-    from grader.report import concepts
+    from grader.report.concepts import SCRIPT, STYLE, concepts
     from grader.report.files import write_whole
     from grader.report.html.page import render_page
     from grader.spec.nearest_name import nearest_or_all
 
-    console, pages = output_console(), concepts.concepts()
-    if name is None:
-        table = Table("NAME", "WHAT IT EXPLAINS", box=None, pad_edge=False)
-        for page in pages.values():
-            table.add_row(page.name, page.title)
-        console.print(table)
-        console.print("\nrosgrade explain NAME shows one.")
-        return
-    if name not in pages:
-        raise UsageError(f"nothing to explain is called {name!r}." + nearest_or_all(name, pages))
+    page = concepts().get(name)
+    if page is None:
+        known = nearest_or_all(name, concepts())
+        raise UsageError(f"nothing to explain is called {name!r}.{known}")
     if html:
-        styles = ("report.css", "handout.css", concepts.STYLE)
-        text = render_page("concept.html.j2", styles, concepts.SCRIPT, concept=pages[name])
-        write_whole(Path(f"{name}.html"), text)
+        styles = ("report.css", "handout.css", STYLE)
+        write_whole(Path(f"{name}.html"), render_page("concept.html.j2", styles, SCRIPT, page=page))
         say(f"Page: {name}.html")
         return
-    console.print(Markdown(f"# {pages[name].title}\n\n{pages[name].plain}", hyperlinks=False))
+    output_console().print(Markdown(page.plain, hyperlinks=False))
 
 
 def checks(

@@ -7,10 +7,8 @@ They are ``docs/concepts/*.md``. The site has them, a report carries those that 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from types import MappingProxyType
 
 from markupsafe import Markup
 
@@ -34,9 +32,9 @@ class Concept:
 
     @property
     def plain(self) -> str:
-        """The text for a terminal: a picture is described, HTML is left out."""
-        text = re.sub(r"^<div.*</div>\n+", "", self.text, flags=re.MULTILINE)
-        return _PICTURE_LINE.sub(r"*\1*", text)
+        """The page for a terminal: a picture is described, HTML is left out."""
+        text = _PICTURE_LINE.sub(r"*\1*", re.sub("\n<div.*</div>\n", "", self.text))
+        return f"# {self.title}\n\n{text}"
 
     @property
     def html(self) -> Markup:
@@ -58,12 +56,11 @@ def with_pictures(html: str) -> str:
 
 
 @cache
-def concepts() -> Mapping[str, Concept]:
-    """All pages by their names."""
+def concepts() -> dict[str, Concept]:
+    """All pages by their names; `index` is the list of them."""
     found = {}
     for file in sorted(FOLDER.glob("*.md")):
         title, _, text = file.read_text(encoding="utf-8").partition("\n")
-        if file.stem != "index":
-            title = title.removeprefix("# ")
-            found[file.stem] = Concept(file.stem, title, _LINK.sub(r"\1", text).strip())
-    return MappingProxyType(found)
+        text = _LINK.sub(r"\1", text).strip()
+        found[file.stem] = Concept(file.stem, title.removeprefix("# "), text)
+    return found

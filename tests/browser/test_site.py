@@ -76,6 +76,11 @@ def test_every_page_is_accessible_and_none_is_endless(page: Page, site: Path, ad
             found += [
                 f"{name}, {scheme}: {one['id']} {one['nodes'][0]['html']}" for one in violations
             ]
+    page.set_viewport_size({"width": 390, "height": 900})
+    for name in (".", "concepts/executors", "checks/qos"):
+        page.goto(f"{name}/")
+        found += [f"{name}, 390 px: {one['id']}" for one in Axe().run(page).response["violations"]]
+        assert not page.evaluate("document.documentElement.scrollWidth > innerWidth"), name
     assert not found, "\n".join(found)
     assert not [url for url in asked if not url.startswith(address)]
     assert not complaints

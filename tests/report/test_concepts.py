@@ -5,28 +5,38 @@ from __future__ import annotations
 import re
 
 import pytest
+from typer.testing import CliRunner
 
 from grader.assignment.own_check import all_checks
 from grader.checks.check import NoParameters, Subject, check
+from grader.cli.app import app
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import explanations
+from grader.errors import UsageError
 from grader.findings.finding import Finding
 from grader.report.concepts import FOLDER, concepts
 
+PAGES = set(concepts()) - {"index"}
 NAMED = {entry.concept for entries in explanations().values() for entry in entries}
 NAMED |= {one.concept for one in all_checks().values()}
 
 
+def test_a_misspelt_idea_is_answered_with_the_nearest() -> None:
+    ended = CliRunner().invoke(app, ["explain", "qso"])
+    assert isinstance(ended.exception, UsageError) and "Did you mean 'qos'" in str(ended.exception)
+    assert "best effort" in CliRunner().invoke(app, ["explain", "qos"]).stdout
+
+
 def test_every_named_concept_has_a_page_and_every_page_is_named() -> None:
-    assert NAMED - {""} == set(concepts())
+    assert NAMED - {""} == PAGES
 
 
 def test_the_overview_lists_every_page() -> None:
     overview = (FOLDER / "index.md").read_text(encoding="utf-8")
-    assert set(re.findall(r"\((\w+)\.md\)", overview)) == set(concepts())
+    assert set(re.findall(r"\((\w+)\.md\)", overview)) == PAGES
 
 
-@pytest.mark.parametrize("name", sorted(concepts()))
+@pytest.mark.parametrize("name", sorted(PAGES))
 def test_a_page_has_its_picture_described_and_no_links_that_lead_nowhere(name: str) -> None:
     page = concepts()[name]
     described = re.search(r'<svg role="img" aria-label="([^"]{40,})"', page.html)
