@@ -495,7 +495,7 @@
       const current = ofKind(above).pop();
       for (const [link] of ofKind(links)) {
         const is = Boolean(current) && link === current[0];
-        if (is && !link.ariaCurrent) nav.scrollTo({ left: link.offsetLeft - 16, top: link.offsetTop - 0.4 * nav.clientHeight });
+        if (is && !link.ariaCurrent && link.offsetParent) nav.scrollTo({ left: link.offsetLeft - 16, top: link.offsetTop - 0.4 * nav.clientHeight });
         link.ariaCurrent = is ? "true" : null;
       }
     }
