@@ -21,6 +21,8 @@ pytestmark = pytest.mark.slow
 REPOSITORY = "https://github.com/example/rosgrade"
 # Longest page, in pixels at a width of 1280: longer ones are read by nobody.
 MOST_PIXELS = 16_000
+# What is right is not listed: on a long page the list takes longer than to look.
+ONLY_WRONG = {"resultTypes": ["violations"]}
 
 
 class Quiet(SimpleHTTPRequestHandler):
@@ -70,9 +72,13 @@ def test_every_page_is_accessible_and_none_is_endless(page: Page, site: Path, ad
         height = page.evaluate("document.documentElement.scrollHeight")
         if height > MOST_PIXELS:
             found.append(f"{name}: {height} px")
-        for scheme in ("default", "slate"):
+        # The other scheme has other colours, and nothing else that is new.
+        for scheme, options in (
+            ("default", ONLY_WRONG),
+            ("slate", {**ONLY_WRONG, "runOnly": ["color-contrast"]}),
+        ):
             page.evaluate(f"document.body.dataset.mdColorScheme = '{scheme}'")
-            violations = Axe().run(page).response["violations"]
+            violations = Axe().run(page, options=options).response["violations"]
             found += [
                 f"{name}, {scheme}: {one['id']} {one['nodes'][0]['html']}" for one in violations
             ]
