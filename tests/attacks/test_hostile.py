@@ -617,9 +617,10 @@ def grade_class(folder: Path, members: dict[str, Attack]) -> dict[str, Handed]:
 
 
 def _handed(done: Done, ledger: Ledger) -> Handed:
-    assert done.result is not None, done.entry
+    result = ledger.whole_result(done.entry.key)
+    assert result is not None, done.entry
     page = (ledger.folder(done.entry.key) / REPORT_FILE).read_text(encoding="utf-8")
-    return Handed(done.result, page)
+    return Handed(result, page)
 
 
 def possible(members: dict[str, Attack]) -> dict[str, Attack]:

@@ -35,7 +35,9 @@ def test_every_explanation_stands_once_below_its_symptom() -> None:
         assert (
             len(
                 re.findall(
-                    rf"^- {re.escape(entry.sentence)}( \*\(.+\)\*)?(<br>.*)?$", section, re.M
+                    rf"^- {re.escape(entry.sentence)}( \*\(.+\)\*)?( \[.*)?(<br>.*)?$",
+                    section,
+                    re.M,
                 )
             )
             == 1
