@@ -86,7 +86,7 @@ def _files(ledger: Ledger, key: str) -> dict[str, str]:
 
 
 def _known(loaded: LoadedAssignment) -> set[int]:
-    """Hashes of what counts for nobody: the starter and the reference, in both languages."""
+    """Hashes of what does not count: the starter and the reference, in both languages."""
     known: set[int] = set()
     for language in LANGUAGES:
         # An assignment may be for Python only, or have no reference.

@@ -19,7 +19,7 @@ from grader import resources
 
 pytestmark = pytest.mark.slow
 REPOSITORY = "https://github.com/example/rosgrade"
-# Longest page, in pixels at a width of 1280: longer ones are read by nobody.
+# Longest page, in pixels at a width of 1280: longer ones are hard to read.
 MOST_PIXELS = 16_000
 # What is right is not listed: on a long page the list takes longer than to look.
 ONLY_WRONG = {"resultTypes": ["violations"]}
