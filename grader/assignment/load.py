@@ -149,16 +149,23 @@ def bound_checks(
 def folder_sha256(folder: Path, besides: Path | None = None) -> str:
     """Hash the paths and contents of all files in a folder, hidden ones and caches left out."""
     digest = sha256()
-    for file in sorted(folder.rglob("*"), key=lambda path: path.relative_to(folder).as_posix()):
-        inside = file.relative_to(folder)
-        # Or grading a submission from within an assignment's folder would change the assignment.
-        tools = {"__pycache__", "rosgrade-report"}
-        ignored = any(part.startswith(".") or part in tools for part in inside.parts)
-        if ignored or not file.is_file():
-            continue
-        if besides is not None and file.is_relative_to(besides):
-            continue
-        digest.update(os.fsencode(inside.as_posix()) + f"\0{_sha256(file)}\n".encode())
+    # Or grading a submission from within an assignment's folder would change the assignment.
+    tools = {"__pycache__", "rosgrade-report"}
+    files: dict[str, Path] = {}
+    # Not into what is left out: a grading writes there meanwhile.
+    for root, folders, names in os.walk(folder):
+        here = Path(root)
+        folders[:] = [
+            name
+            for name in folders
+            if not name.startswith(".") and name not in tools and here / name != besides
+        ]
+        for name in names:
+            file = here / name
+            if not name.startswith(".") and name not in tools and file.is_file():
+                files[file.relative_to(folder).as_posix()] = file
+    for inside in sorted(files):
+        digest.update(os.fsencode(inside) + f"\0{_sha256(files[inside])}\n".encode())
     return digest.hexdigest()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import FrozenInstanceError
@@ -351,3 +352,19 @@ def test_the_hash_tells_every_change_of_the_folder_but_caches(
     assert second != first
     (folder / "worlds" / "a.yaml").rename(folder / "worlds" / "b.yaml")
     assert folder_sha256(folder) not in (first, second)
+
+
+def test_the_hash_does_not_look_into_a_report_that_is_being_written(
+    write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = write()
+    first = folder_sha256(folder)
+    (folder / "rosgrade-report" / "source" / "bot").mkdir(parents=True)
+    scandir = os.scandir
+
+    def scan(path: str | Path = ".") -> object:
+        assert "source" not in Path(path).parts
+        return scandir(path)
+
+    monkeypatch.setattr(os, "scandir", scan)
+    assert folder_sha256(folder) == first
