@@ -45,6 +45,8 @@ const follow = async () => {
       main.classList.toggle("is-old", state.is_old);
       at("changed").hidden = !state.changed;
       at("changed").textContent = `Since your last save: ${state.changed}`;
+      at("hints").hidden = state.hints === null;
+      at("hints").textContent = `Your course counts the further hints that you open here: ${state.hints} so far.`;
       list(at("phases"), state.is_old ? doing(state.phases) : []);
       list(at("early"), state.is_old ? state.early : []);
       draw(state.scores, state.most);
@@ -61,4 +63,10 @@ const follow = async () => {
   }
   setTimeout(follow, 500);
 };
+// The report may ask no server for anything: this page around it tells which hints are opened in it.
+frame.addEventListener("load", () => frame.contentDocument.addEventListener("toggle", ({ target }) => {
+  const { check, hint } = target.dataset;
+  if (!target.open || !hint || at("hints").hidden) return;
+  fetch("hints", { method: "POST", body: JSON.stringify({ check, number: Number(hint) }) }).catch(() => {});
+}, true));
 follow();

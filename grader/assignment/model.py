@@ -471,6 +471,11 @@ class Assignment(Model):
     manual: tuple[ManualItem, ...] = Field(
         (), description="What a person judges, in addition to the checks."
     )
+    count_hints: bool = Field(
+        False,
+        description="Whether the page of `rosgrade watch` counts the further steps of hints that a "
+        "student opens, and tells the student so. `hints_opened` in `result.json` has the counts.",
+    )
     points: float | None = Field(
         None, ge=0, description="Sum of the points of all checks. If given, rosgrade verifies it."
     )

@@ -52,7 +52,7 @@ def attempts_of(
 
 
 def with_history(folder: Path, result: Result) -> Result:
-    """A new result with the attempts that were graded in the folder of its report.
+    """A new result with the attempts that were graded in the folder, and the hints opened there.
 
     Of a submission that was graded several times in a row only the last grade is an attempt, and
     what was graded with other checks is none. The result that lies in the folder becomes an
@@ -60,6 +60,8 @@ def with_history(folder: Path, result: Result) -> Result:
     """
     file = folder / RESULT_FILE
     for replaced in _read([file]):
+        if replaced.assignment.id == result.assignment.id:
+            result = result.model_copy(update={"hints_opened": replaced.hints_opened})
         if replaced.submission.sha256 != result.submission.sha256:
             slim = for_class(replaced).model_copy(update={"attempts": ()})
             keep_earlier(file, result_json(slim))

@@ -191,6 +191,14 @@ class _Work:
             return f": {one_line(lines[error.line - 1])}" if error.line else ""
         return ""
 
+    def amended(self, result: Result) -> Result:
+        """A result with earlier attempts, and hints that are counted if the author wants it."""
+        from grader.batch.attempts import with_history
+
+        result = with_history(self.report, result)
+        counts = (result.hints_opened or {}) if self.loaded.assignment.count_hints else None
+        return result.model_copy(update={"hints_opened": counts})
+
     def cancel(self) -> None:
         assert self.grading is not None
         self.runner = self.grading.cancel()
@@ -200,7 +208,6 @@ class _Work:
 
 
 def _follow(work: _Work, page: ReportPage, console: Console) -> None:
-    from grader.batch.attempts import with_history
     from grader.batch.files import write_graded
     from grader.batch.watching import Ended, Step, Watching
     from grader.report.model.facts import Clock
@@ -227,10 +234,10 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
                 print_error(str(event.problem))
                 page.show(text=f"not graded: {event.problem}", title=f"! {title}", is_old=False)
             else:
-                history = partial(with_history, work.report)
-                result = write_graded(
-                    event.graded, work.report, clock, amended=history, root=work.submission
-                )
+                with page.writing:
+                    result = write_graded(
+                        event.graded, work.report, clock, amended=work.amended, root=work.submission
+                    )
                 source = read_source(work.report / SOURCE_FOLDER).files
                 console.rule(f"{time.strftime('%H:%M:%S')}, after {clock.elapsed_s:.1f} s")
                 points = score(result)
@@ -241,6 +248,7 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
                     changed,
                     (result.known_score, result.known_max_score),
                 )
+                page.show_hints(result)
                 if work.before is None:
                     print_grade(console, title, result, source)
                 else:

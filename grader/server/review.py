@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 from markupsafe import Markup
-from pydantic import ValidationError
 from starlette.applications import Starlette
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route
@@ -28,10 +25,10 @@ from grader.report.html.shown_source import ShownSource
 from grader.report.html.source_code import code_lines
 from grader.report.model.class_row import ClassRow
 from grader.report.model.excerpt import places
-from grader.review.store import ReviewConflict
 from grader.server.background import Background
 from grader.server.changes import change_cluster, change_student
 from grader.server.local import LocalServer
+from grader.server.posted import PROBLEMS, posted
 from grader.server.reviewed_class import ReviewedClass, ReviewedRow
 
 MOST_CLUSTERS = 60
@@ -55,18 +52,17 @@ class ReviewServer(LocalServer):
         routes = [
             Route("/", self._overview),
             Route("/clusters", self._clusters),
-            Route("/clusters", _posted(self._change_cluster), methods=["POST"]),
+            Route("/clusters", posted(self._change_cluster), methods=["POST"]),
             Route("/clusters/example", self._example),
             Route("/regrade", self._regrading),
-            Route("/regrade", _posted(self._regrade), methods=["POST"]),
+            Route("/regrade", posted(self._regrade), methods=["POST"]),
             Route("/s/{name}/", self._submission),
             Route("/s/{name}/source", self._source),
-            Route("/s/{name}/review", _posted(self._change), methods=["POST"]),
+            Route("/s/{name}/review", posted(self._change), methods=["POST"]),
             Route("/s/{name}/{file:path}", self._report_file),
             Route(f"/{INSTRUCTOR_FOLDER}/{{file}}", self._instructor_file),
         ]
-        problems: dict[Any, Any] = {RosgradeError: _problem, ValidationError: _problem}
-        super().__init__(Starlette(routes=routes, exception_handlers=problems), port)
+        super().__init__(Starlette(routes=routes, exception_handlers=PROBLEMS), port)
         self._background = Background(self._class)
 
     def close(self) -> None:
@@ -238,25 +234,3 @@ def _page(name: str, **values: Any) -> Response:
 
 def _part(template: str, **values: Any) -> str:
     return environment().get_template(template).render(values)
-
-
-def _posted(answer: Callable[[Request, Any], Response]) -> Callable[[Request], Any]:
-    """An endpoint that reads what a page sent, and answers in a thread: files may be slow."""
-
-    async def endpoint(request: Request) -> Response:
-        try:
-            return await run_in_threadpool(answer, request, await request.json())
-        except ValidationError:
-            raise
-        except (KeyError, TypeError, ValueError) as error:
-            return PlainTextResponse(f"This request makes no sense: {error!r}", 400)
-
-    return endpoint
-
-
-def _problem(_: Request, error: Exception) -> Response:
-    text = str(error)
-    if isinstance(error, ValidationError):
-        first = error.errors()[0]
-        text = f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
-    return PlainTextResponse(text, 409 if isinstance(error, ReviewConflict) else 422)

@@ -17,7 +17,12 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
+from grader.batch.files import RESULT_FILE
+from grader.report.files import write_whole
+from grader.report.model.result import read_result, result_json
+from grader.report.model.result_model import Result
 from grader.server.local import LocalServer
+from grader.server.posted import PROBLEMS, posted
 
 _NOT_YET = "The first report comes soon."
 
@@ -34,6 +39,7 @@ class PageState:
         changed: By the last save, in one line.
         scores: Since watching began; None where there was no grade.
         most: Points that can be had.
+        hints: How many further hints were opened; None where nobody counts.
     """
 
     version: int = 0
@@ -45,6 +51,7 @@ class PageState:
     changed: str = ""
     scores: tuple[float | None, ...] = ()
     most: float = 0.0
+    hints: int | None = None
 
 
 class ReportPage(LocalServer):
@@ -53,14 +60,17 @@ class ReportPage(LocalServer):
     def __init__(self, report: Path, port: int = 0) -> None:
         """Begin to serve a report that need not be there yet; port 0 takes a free one."""
         self.state = PageState()
+        self.writing = threading.Lock()
+        """Held while the result is written: no hint that is opened meanwhile is lost."""
         self._report = report
         self._lock = threading.RLock()
         routes = [
             Route("/", self._outer_page),
             Route("/report.html", self._read_report),
             Route("/state", self._state),
+            Route("/hints", posted(self._open_hint), methods=["POST"]),
         ]
-        super().__init__(Starlette(routes=routes), port)
+        super().__init__(Starlette(routes=routes, exception_handlers=PROBLEMS), port)
 
     def show(self, *, is_new: bool = False, **changes: Any) -> None:
         """Change what every open page shows around the report, which may be a new one."""
@@ -92,6 +102,11 @@ class ReportPage(LocalServer):
             others = {name: one for name, one in self.state.phases.items() if name and scenario}
             self.show(phases={**others, scenario: text})
 
+    def show_hints(self, result: Result) -> None:
+        """Show how many hints were opened, if they are counted."""
+        counts = result.hints_opened
+        self.show(hints=None if counts is None else sum(counts.values()))
+
     def _outer_page(self, _: Request) -> Response:
         from grader.report.html.page import render_page
 
@@ -103,6 +118,21 @@ class ReportPage(LocalServer):
             return HTMLResponse(self._report.read_bytes())
         except OSError:
             return PlainTextResponse(_NOT_YET)
+
+    def _open_hint(self, _: Request, sent: Any) -> Response:
+        """Count a further hint that was opened, by its number from 1."""
+        check, number, file = sent["check"], sent["number"], self._report.with_name(RESULT_FILE)
+        with self.writing:
+            result = read_result(file)
+            counts = result.hints_opened
+            steps = {one.id: range(1, len(one.further_hints) + 1) for one in result.checks}
+            if counts is None or number not in steps.get(check, ()):
+                return PlainTextResponse("There is no such hint, or nobody counts.", 404)
+            counts = {**counts, check: max(number, counts.get(check, 0))}
+            result = result.model_copy(update={"hints_opened": counts})
+            write_whole(file, result_json(result))
+            self.show_hints(result)
+        return PlainTextResponse("counted")
 
     def _state(self, _: Request) -> Response:
         return JSONResponse(asdict(self.state))

@@ -92,3 +92,19 @@ def test_a_students_copy_says_nothing_of_hidden_checks_in_earlier_attempts():
     assert [(one.score, one.max_score) for one in copy.attempts] == [(1.0, 4.0), (4.0, 4.0)]
     assert len(copy.attempts[1].changes) == 1
     assert "secret" not in result_json(copy)
+
+
+def test_a_new_grade_does_not_lose_which_hints_were_opened(tmp_path):
+    counted = result_of("a", 0.5).model_copy(update={"hints_opened": {"period": 2}})
+    graded(tmp_path, counted)
+    assert graded(tmp_path, result_of("b", 0.3)).hints_opened == {"period": 2}
+    assert graded(tmp_path, judged([Told("node")]).result).hints_opened == {"period": 2}
+    assert read_result(tmp_path / RESULT_FILE).hints_opened == {"period": 2}
+
+
+def test_another_assignment_in_the_same_folder_takes_no_counts_over(tmp_path):
+    graded(tmp_path, result_of("a", 0.5).model_copy(update={"hints_opened": {"period": 2}}))
+    other = result_of("a", 0.5)
+    assignment = other.assignment.model_copy(update={"id": "another"})
+    other = other.model_copy(update={"assignment": assignment})
+    assert graded(tmp_path, other).hints_opened is None

@@ -9,9 +9,13 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, expect
 
 from grader.assignment.load import load_assignment
+from grader.batch.files import RESULT_FILE
+from grader.findings.finding import Finding
 from grader.report.html.handout import make_handout, render_handout
+from grader.report.model.result import read_result, result_json
 from grader.server.watch import ReportPage
-from tests.report.sample import full_points, lost_points
+from tests.grade.sample import Told
+from tests.report.sample import full_points, judged, lost_points
 
 pytestmark = pytest.mark.slow
 
@@ -71,6 +75,57 @@ def test_the_page_of_a_watched_submission_follows_by_itself(
         )
         assert not page.evaluate(old) and not page.locator("#phases").is_visible()
         assert Axe().run(page).response["violations"] == []
+        assert complaints == []
+    finally:
+        served.close()
+        context.close()
+
+
+@pytest.mark.parametrize("counts", [True, False])
+def test_hints_open_one_by_one_and_count_only_where_the_page_says_so(
+    chromium: Browser, tmp_path: Path, counts: bool
+) -> None:
+    sample = judged([Told("topic", Finding.failed("a", "b"), hint=["one", "two", "three"])])
+    result = sample.result.model_copy(update={"hints_opened": {} if counts else None})
+    (tmp_path / "report.html").write_text(sample.html(), encoding="utf-8")
+    file = tmp_path / RESULT_FILE
+    file.write_text(result_json(result), encoding="utf-8")
+    served = ReportPage(tmp_path / "report.html")
+    context = chromium.new_context()
+    complaints: list[str] = []
+    try:
+        page = context.new_page()
+        page.on("console", lambda message: complaints.append(message.text))
+        page.goto(served.url)
+        served.show_hints(result)
+        served.show(is_new=True, text="0 of 1 points")
+        said = page.locator("#hints")
+        frame = page.frame_locator("iframe")
+        steps = frame.locator("summary", has_text="Another hint")
+        expect(page.get_by_role("status")).to_have_text("0 of 1 points")
+        expect(steps.nth(1)).not_to_be_visible()
+        steps.first.focus()
+        page.keyboard.press("Enter")
+        expect(frame.get_by_text("two", exact=True)).to_be_visible()
+        if not counts:
+            expect(said).to_be_hidden()
+            assert read_result(file).hints_opened is None
+            return
+        expect(said).to_have_text(
+            "Your course counts the further hints that you open here: 1 so far."
+        )
+        assert read_result(file).hints_opened == {"topic": 1}
+        steps.nth(1).click()
+        expect(said).to_contain_text("2 so far")
+        assert Axe().run(page).response["violations"] == []
+        # The next save shows the report anew; what was opened stays counted.
+        served.show(is_new=True, text="graded again")
+        expect(page.get_by_role("status")).to_have_text("graded again")
+        expect(frame.get_by_text("two", exact=True)).not_to_be_visible()
+        steps.first.click()
+        expect(frame.get_by_text("two", exact=True)).to_be_visible()
+        expect(said).to_contain_text("2 so far")
+        assert read_result(file).hints_opened == {"topic": 2}
         assert complaints == []
     finally:
         served.close()
