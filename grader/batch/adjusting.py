@@ -9,7 +9,7 @@ from pathlib import Path
 
 from grader.batch.attempts import attempts_of
 from grader.batch.batch import Done
-from grader.batch.ledger import BATCH_FILE, Entry, Ledger
+from grader.batch.ledger import Entry, Ledger
 from grader.course.attempts import Attempt, Ruled, ruled
 from grader.course.late import HandInTime
 from grader.course.load import Course, load_course
@@ -40,7 +40,6 @@ class ClassAdjustments:
         self._now = now or datetime.now(timezone.utc)
         file, assignment = self._written.course, self._written.assignment
         self._course = _load(Path(file), ledger.out, assignment) if file else None
-        self._spent: dict[str, int] = {}
 
     def __call__(self, result: Result) -> Result:
         """A result of the class with all that is added to it."""
@@ -100,33 +99,7 @@ class ClassAdjustments:
     def _ruled(self, entry: Entry, attempts: list[Attempt]) -> Ruled:
         if self._course is None or entry.attempt_of:
             return Ruled(len(attempts) - 1)
-        rules = self._course.rules(self._written.assignment, entry.key)
-        tokens = 0
-        if rules.tokens and any(each.time.is_late(rules) for each in attempts):
-            spent = sum(one.spent(entry.key) for one in self._before)
-            tokens = max(0, rules.tokens.each - spent)
-        return ruled(attempts, rules, tokens)
-
-    def spent(self, key: str) -> int:
-        """Late tokens that a student used in this class."""
-        if key not in self._spent:
-            entry, result = self._entries.get(key), self._ledger.result(key)
-            self._spent[key] = 0
-            if entry is not None and result is not None:
-                self._spent[key] = self._ruled(entry, self._attempts(entry, result)).tokens
-        return self._spent[key]
-
-    @cached_property
-    def _before(self) -> list[ClassAdjustments]:
-        """The classes of assignments that were due before this one, as far as they are known."""
-        found: list[ClassAdjustments] = []
-        course, assignment = self._course, self._written.assignment
-        for folder in course.results_before(assignment) if course is not None else ():
-            if (folder / BATCH_FILE).is_file():
-                one = ClassAdjustments(Ledger(folder))
-                one._before = list(found)
-                found.append(one)
-        return found
+        return ruled(attempts, self._course.rules(self._written.assignment, entry.key))
 
     @cached_property
     def _earlier(self) -> dict[str, list[Entry]]:

@@ -7,15 +7,16 @@ from dataclasses import replace
 
 from grader.batch.handed_in import HandedIn
 from grader.course.load import Course, written
-from grader.errors import UsageError
 from grader.findings.wording import listing
-from grader.spec.nearest_name import did_you_mean, nearest_or_all
+from grader.spec.nearest_name import did_you_mean
 
 
 def with_groups(rows: Sequence[HandedIn], course: Course | None) -> list[HandedIn]:
     """Rows in which a group has what the one of them handed in who did."""
     found = list(rows)
-    for members in _groups(rows, course):
+    places = {written(row.key): at for at, row in enumerate(rows)}
+    for group in course.spec.groups if course is not None else ():
+        members = [places[name] for name in map(written, group) if name in places]
         handed = [at for at in members if rows[at].path is not None or rows[at].fault]
         paths = {rows[at].path for at in handed}
         for at in members if len(paths) > 1 else ():
@@ -38,32 +39,9 @@ def strangers(rows: Sequence[HandedIn], course: Course) -> Iterator[str]:
     """Students that the rules name and that the class has not, a line each."""
     keys = [row.key for row in rows]
     known = {written(key) for key in keys}
-    groups = course.spec.groups if isinstance(course.spec.groups, tuple) else ()
     named = [("an extension", one.student) for one in course.spec.extensions]
-    named += [("a group", member) for members in groups for member in members]
+    named += [("a group", member) for members in course.spec.groups for member in members]
     for what, name in dict.fromkeys(named):
         if written(name) not in known:
             nearest = did_you_mean(name, keys)
             yield f"{course.file}: {what} names {name!r}, not in this class.{nearest}"
-
-
-def _groups(rows: Sequence[HandedIn], course: Course | None) -> list[list[int]]:
-    groups = course.spec.groups if course is not None else None
-    if course is None or groups is None:
-        return []
-    found: dict[str, list[int]] = {}
-    if isinstance(groups, str):
-        columns = {name for row in rows for name in row.columns}
-        if groups.casefold() not in columns:
-            nearest = nearest_or_all(groups, sorted(columns))
-            raise UsageError(
-                f"{course.file}: groups: the roster has no column {groups!r}.{nearest}"
-            )
-        names = [row.columns.get(groups.casefold(), "") for row in rows]
-    else:
-        of = {written(member): str(at) for at, members in enumerate(groups) for member in members}
-        names = [of.get(written(row.key), "") for row in rows]
-    for at, name in enumerate(names):
-        if name:
-            found.setdefault(name, []).append(at)
-    return list(found.values())

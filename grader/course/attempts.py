@@ -29,16 +29,14 @@ class Ruled:
         counts: Index of the attempt that counts.
         lines: Of the report, for the result of the last attempt.
         notes: For the instructor.
-        tokens: Late tokens that the attempt takes.
     """
 
     counts: int
     lines: tuple[AdjustmentPart, ...] = ()
     notes: tuple[str, ...] = ()
-    tokens: int = 0
 
 
-def ruled(attempts: Sequence[Attempt], rules: Rules, tokens_left: int = 0) -> Ruled:
+def ruled(attempts: Sequence[Attempt], rules: Rules) -> Ruled:
     """Apply the rules to the attempts of a student, the last of which is the current one."""
     last, current = len(attempts) - 1, attempts[-1].result
     if current.score is None:
@@ -46,7 +44,7 @@ def ruled(attempts: Sequence[Attempt], rules: Rules, tokens_left: int = 0) -> Ru
     rule, most = rules.attempts or Attempts(), current.final_max_score
     scores = [each.result.known_score or 0.0 for each in attempts]
     late = [
-        lateness(each.time, rules, most, score, tokens_left)
+        lateness(each.time, rules, most, score)
         for each, score in zip(attempts, scores, strict=True)
     ]
     same = [
@@ -75,8 +73,5 @@ def ruled(attempts: Sequence[Attempt], rules: Rules, tokens_left: int = 0) -> Ru
         lines.insert(0, line)
     notes = (late[counts].note, _NOT_COMPARED if rules.attempts and len(same) <= last else "")
     return Ruled(
-        counts,
-        tuple(line for line in lines if line is not None),
-        tuple(filter(None, notes)),
-        late[counts].tokens,
+        counts, tuple(line for line in lines if line is not None), tuple(filter(None, notes))
     )

@@ -66,52 +66,40 @@ class Lateness:
 
     Attributes:
         points: Deducted, at least 0.
-        tokens: Late tokens that it takes.
         line: Of the report, or None where there is nothing to say.
         note: For the instructor, where nothing is deducted because the time is in doubt.
         closed: Whether it came after the assignment closed.
     """
 
     points: float = 0.0
-    tokens: int = 0
     line: AdjustmentPart | None = None
     note: str = ""
     closed: bool = False
 
 
-def lateness(
-    handed: HandInTime, rules: Rules, max_score: float, score: float, tokens_left: int = 0
-) -> Lateness:
+def lateness(handed: HandInTime, rules: Rules, max_score: float, score: float) -> Lateness:
     """What lateness costs.
 
     Args:
         max_score: All points of the assignment, of which a percentage is taken.
         score: Points before; no more is deducted.
-        tokens_left: Late tokens that the student still has.
     """
     moment, note = handed.known(rules)
     if moment is None or utc(moment) <= utc(rules.due):
         return Lateness(note=note)
     by, late = utc(moment) - utc(rules.due), rules.late
     closed = rules.closes is not None and utc(moment) > utc(rules.closes)
-    used, points, words = 0, score, f"the assignment closed at {shown_time(rules.closes or moment)}"
+    points, words = score, f"the assignment closed at {shown_time(rules.closes or moment)}"
     if not closed:
         if late is None or by.total_seconds() <= late.grace or late.is_free:
             return Lateness()
-        due = rules.due
-        if rules.tokens is not None:
-            used = min(_begun(due, moment, rules.tokens.worth), tokens_left)
-            due = later(due, used, rules.tokens.worth)
-        is_free = (utc(moment) - utc(due)).total_seconds() <= late.grace
-        count = 0 if is_free else _begun(due, moment, late.per)
+        count = _begun(rules.due, moment, late.per)
         most = max_score if late.at_most is None else points_of(late.at_most, max_score)
         points = min(count * points_of(late.deduct, max_score), most, score)
-        spent = f"{used} late {'token' if used == 1 else 'tokens'} used" if used else ""
         is_share = isinstance(late.deduct, str)
         each = f"{late.deduct} of {max_score:g}" if is_share else f"{late.deduct:g}"
         limit = f", at most {late.at_most}" if late.at_most is not None else ""
-        rule = f"{count} {late.per}{'s' * (count != 1)} × {each} points{limit}"
-        words = "; ".join(filter(None, (spent, rule if count else "")))
+        words = f"{count} {late.per}{'s' * (count != 1)} × {each} points{limit}"
     line = AdjustmentPart(
         kind="late",
         title="Handed in after the end" if closed else f"Late by {shown_length(by)}",
@@ -119,11 +107,11 @@ def lateness(
         reason=f"handed in {shown_time(moment)} by {handed.source}, {shown_length(by)} after the "
         f"due time {shown_time(rules.due)}; {words}",
     )
-    return Lateness(points, used, line, closed=closed)
+    return Lateness(points, line, closed=closed)
 
 
 def _begun(due: datetime, moment: datetime, per: str) -> int:
-    """Days or hours that have begun between a due time and a later time; 0 if it is not later."""
+    """Days or hours that have begun between a due time and a later time."""
     unit = timedelta(days=1) if per == "day" else timedelta(hours=1)
     count = max(0, (utc(moment) - utc(due)) // unit - 1)
     while utc(later(due, count, per)) < utc(moment):

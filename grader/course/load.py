@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import unicodedata
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 
 from grader.assignment.model import Visibility
-from grader.course.instant import instant, utc
-from grader.course.model import Attempts, CourseFile, Late, Tokens
+from grader.course.instant import instant, later
+from grader.course.model import Attempts, CourseFile, Late
 from grader.errors import AssignmentError, UsageError
 from grader.spec.document import Place
 from grader.spec.nearest_name import nearest_or_all
@@ -33,7 +34,6 @@ class Rules:
     due_of_all: datetime
     closes: datetime | None
     late: Late | None
-    tokens: Tokens | None
     attempts: Attempts | None
 
 
@@ -53,22 +53,19 @@ class Course:
         due = due_of_all = self.instant(one.due)
         for each in self.spec.extensions:
             if (each.assignment, written(each.student)) == (assignment, written(student)):
-                days = timedelta(days=each.days or 0)
-                due = self.instant(each.due) if each.due else due_of_all + days
+                if each.due:
+                    due = self.instant(each.due)
+                elif each.tokens and self.spec.tokens:
+                    due = later(due_of_all, each.tokens, self.spec.tokens.worth)
+                else:
+                    due = later(due_of_all, each.days or 0, "day")
         return Rules(
             due=due,
             due_of_all=due_of_all,
             closes=max(self.instant(one.closes), due) if one.closes else None,
             late=one.late or self.spec.late,
-            tokens=self.spec.tokens,
             attempts=one.attempts or self.spec.attempts,
         )
-
-    def results_before(self, assignment: str) -> list[Path]:
-        """Folders of the batches of assignments that are due before another, in this order."""
-        names = sorted(self.spec.assignments, key=lambda one: (utc(self.rules(one).due), one))
-        results = (self.spec.assignments[one].results for one in names[: names.index(assignment)])
-        return [self.file.parent / folder for folder in results if folder is not None]
 
     def visible(self, assignment: str, now: datetime) -> frozenset[str]:
         """Which checks students may see at a time, by their visibility.
@@ -137,7 +134,7 @@ def _contradictions(course: Course) -> Mistakes:
 
 def _groups(source: Source, spec: CourseFile) -> Mistakes:
     seen: dict[str, Place] = {}
-    for at, members in enumerate(spec.groups if isinstance(spec.groups, tuple) else ()):
+    for at, members in enumerate(spec.groups):
         for number, member in enumerate(members):
             place: Place = ("groups", at, number)
             first = seen.setdefault(written(member), place)
@@ -147,13 +144,19 @@ def _groups(source: Source, spec: CourseFile) -> Mistakes:
 
 def _extensions(source: Source, spec: CourseFile) -> Mistakes:
     seen: dict[tuple[str, str], int] = {}
+    used: Counter[str] = Counter()
+    most = spec.tokens.each if spec.tokens is not None else 0
     for at, one in enumerate(spec.extensions):
         if one.assignment not in spec.assignments:
             nearest = nearest_or_all(one.assignment, spec.assignments)
             text = f"no assignment {one.assignment!r} in this file.{nearest}"
             yield ("extensions", at, "assignment"), text
-        if (one.due is None) == (one.days is None):
-            yield ("extensions", at), "give either `due` or `days`"
+        if [one.due, one.days, one.tokens].count(None) != 2:
+            yield ("extensions", at), "give either `due`, `days` or `tokens`"
+        used[written(one.student)] += one.tokens or 0
+        if one.tokens and used[written(one.student)] > most:
+            text = f"{one.student} uses {used[written(one.student)]} of {most} late tokens"
+            yield ("extensions", at, "tokens"), text
         first = seen.setdefault((written(one.student), one.assignment), at)
         if first != at:
             line = source.line(("extensions", first))

@@ -94,7 +94,6 @@ class AssignmentRules(Model):
     published: Time | None = Field(None, description="Shows `after_published` from then on.")
     late: Late | None = None
     attempts: Attempts | None = None
-    results: str | None = Field(None, description="Folder of its batch, beside this file.")
 
 
 class Extension(Model):
@@ -104,6 +103,7 @@ class Extension(Model):
     assignment: Id
     due: Time | None = None
     days: int | None = Field(None, ge=1, le=1000)
+    tokens: int | None = Field(None, ge=1, description="Late tokens that the student uses for it.")
     reason: str = Field("", description="For you; no report shows it.")
 
 
@@ -117,7 +117,5 @@ class CourseFile(Model):
     tokens: Tokens | None = None
     attempts: Attempts | None = None
     assignments: dict[Id, AssignmentRules] = Field(min_length=1)
-    groups: tuple[tuple[Login, ...], ...] | str | None = Field(
-        None, description="Who hands in together: lists of students, or a column of the roster."
-    )
+    groups: tuple[tuple[Login, ...], ...] = Field((), description="Who hands in together.")
     extensions: tuple[Extension, ...] = ()

@@ -32,7 +32,7 @@ def rule(
 ) -> Ruled:
     """Which counts."""
     end = DUE.replace(day=closes) if closes else None
-    return ruled(tried, Rules(DUE, DUE, end, late, None, attempts))
+    return ruled(tried, Rules(DUE, DUE, end, late, attempts))
 
 
 BEST, LAST = Attempts(counts="best"), Attempts(counts="last")

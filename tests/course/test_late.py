@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from grader.course.late import HandInTime, Lateness, lateness
 from grader.course.load import Rules
-from grader.course.model import Late, Tokens
+from grader.course.model import Late
 
 BERLIN = ZoneInfo("Europe/Berlin")
 DUE = datetime(2026, 3, 3, 0, 0, tzinfo=BERLIN)
@@ -30,26 +30,20 @@ dues = st.datetimes(datetime(2026, 1, 1), datetime(2026, 12, 31)).map(
     lambda one: one.replace(second=0, microsecond=0)
 )
 delays = st.timedeltas(timedelta(0), timedelta(days=9))
-tokens = st.builds(Tokens, each=st.just(9), worth=st.sampled_from(["day", "hour"]))
 
 
 def rules_of(
-    due: datetime = DUE,
-    late: Late | None = TEN_PERCENT,
-    closes: datetime | None = None,
-    each: Tokens | None = None,
+    due: datetime = DUE, late: Late | None = TEN_PERCENT, closes: datetime | None = None
 ) -> Rules:
     """Rules without an extension."""
-    return Rules(due, due, closes, late, each, None)
+    return Rules(due, due, closes, late, None)
 
 
-def cost(
-    by: timedelta, rules: Rules, score: float = 8.0, tokens_left: int = 0, **about: bool
-) -> Lateness:
+def cost(by: timedelta, rules: Rules, score: float = 8.0, **about: bool) -> Lateness:
     """What a delay costs, of 10 points."""
     moment = rules.due.astimezone(timezone.utc) + by
     handed = HandInTime(moment.isoformat(), "Gradescope's metadata", **about)
-    return lateness(handed, rules, 10.0, score, tokens_left)
+    return lateness(handed, rules, 10.0, score)
 
 
 def test_a_deduction_says_rule_times_and_source() -> None:
@@ -80,21 +74,12 @@ def test_nothing_is_deducted_in_time_or_in_the_grace_and_never_more_than_there_i
         assert points == 0
 
 
-@given(dues, zones, policies, delays, delays, st.none() | tokens, st.integers(0, 9))
+@given(dues, zones, policies, delays, delays)
 def test_later_never_costs_less(
-    due: datetime,
-    zone: ZoneInfo,
-    late: Late,
-    by: timedelta,
-    more: timedelta,
-    each: Tokens | None,
-    left: int,
+    due: datetime, zone: ZoneInfo, late: Late, by: timedelta, more: timedelta
 ) -> None:
-    rules = rules_of(due.replace(tzinfo=zone), late, each=each)
-    first, then = cost(by, rules, tokens_left=left), cost(by + more, rules, tokens_left=left)
-    assert first.points <= then.points
-    assert first.tokens <= then.tokens <= left
-    assert then.points <= cost(by + more, rules).points
+    rules = rules_of(due.replace(tzinfo=zone), late)
+    assert cost(by, rules).points <= cost(by + more, rules).points
 
 
 @given(delays)
@@ -125,16 +110,6 @@ def test_a_limit_of_the_deduction_is_kept_and_said() -> None:
     assert found.line.reason.endswith("5 days × 10 % of 10 points, at most 25 %")
 
 
-def test_tokens_are_used_before_points_are_lost() -> None:
-    rules = rules_of(each=Tokens(each=3, worth="day"))
-    paid = cost(30 * HOUR, rules, tokens_left=3)
-    assert (paid.points, paid.tokens) == (0, 2)
-    assert paid.line is not None and paid.line.reason.endswith("; 2 late tokens used")
-    half = cost(30 * HOUR, rules, tokens_left=1)
-    assert (half.points, half.tokens) == (1, 1)
-    assert cost(10 * MINUTE, rules, tokens_left=3).tokens == 0
-
-
 def test_after_the_end_nothing_counts() -> None:
     found = cost(3 * DAY, rules_of(closes=DUE + DAY))
     assert (found.points, found.closed) == (8, True)
@@ -159,12 +134,12 @@ def test_nothing_is_deducted_on_a_time_that_is_not_known_for_sure() -> None:
             "marked late by the platform, but handed in 2026-03-01 13:00 Europe/Berlin by the",
         ),
     ):
-        found = lateness(handed, rules, 10.0, 8.0, 3)
-        assert (found.points, found.tokens, found.line) == (0, 0, None)
+        found = lateness(handed, rules, 10.0, 8.0)
+        assert (found.points, found.line) == (0, None)
         assert note in found.note if note else found.note == ""
 
 
 def test_with_an_extension_a_platform_may_call_it_late() -> None:
-    rules = Rules(DUE + 2 * DAY, DUE, None, TEN_PERCENT, None, None)
+    rules = Rules(DUE + 2 * DAY, DUE, None, TEN_PERCENT, None)
     found = cost(-DAY, rules, marked_late=True)
     assert (found.points, found.note) == (0, "")

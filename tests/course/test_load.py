@@ -25,11 +25,11 @@ assignments:
     due: 2026-10-26 23:59
     late: {per: hour, deduct: 0.5}
     attempts: {counts: last before the deadline}
-    results: results/qos
 groups: [[ana, ben], [cai, dora]]
 extensions:
   - {student: ana, assignment: timed_publisher, due: 2026-10-14 23:59, reason: ill}
   - {student: ana, assignment: qos, days: 2}
+  - {student: ben, assignment: qos, tokens: 2}
 """
 
 
@@ -61,6 +61,7 @@ def test_a_student_has_the_rules_of_the_assignment_and_the_own_extension(tmp_pat
     assert accent.rules("timed_publisher", "Jos\N{LATIN SMALL LETTER E WITH ACUTE}").due == ana.due
     # The clocks were changed on the day before the due time.
     assert rules.rules("qos", "ana").due.isoformat() == "2026-10-28T23:59:00+01:00"
+    assert rules.rules("qos", "ben").due == rules.rules("qos", "ana").due
     assert rules.rules("qos", "ben").late == rules.spec.assignments["qos"].late
 
 
@@ -102,27 +103,29 @@ def test_a_student_has_the_rules_of_the_assignment_and_the_own_extension(tmp_pat
         (
             "assignment: qos",
             "assignment: qoss",
-            "course.yaml:16: extensions[1].assignment: no "
+            "course.yaml:15: extensions[1].assignment: no "
             "assignment 'qoss' in this file. Did you mean 'qos'?",
         ),
         (
             "assignment: qos, days: 2",
             "assignment: timed_publisher, days: 2",
-            "course.yaml:16: "
-            "extensions[1]: ana has an extension for timed_publisher already (line 15)",
+            "course.yaml:15: "
+            "extensions[1]: ana has an extension for timed_publisher already (line 14)",
         ),
-        ("days: 2", "days: 2, due: 2026-11-14 23:59", "extensions[1]: give either `due` or `days`"),
-        (", days: 2", "", "extensions[1]: give either `due` or `days`"),
+        ("days: 2", "days: 2, due: 2026-11-14 23:59", "extensions[1]: give either `due`, `days`"),
+        (", days: 2", "", "extensions[1]: give either `due`, `days` or `tokens`"),
+        ("tokens: 2}", "tokens: 4}", "course.yaml:16: extensions[2].tokens: ben uses 4 of 3 late"),
+        ("tokens: {each: 3, worth: day}\n", "", "extensions[2].tokens: ben uses 2 of 0 late"),
         (
             "due: 2026-10-14 23:59",
             "due: 2026-10-10 23:59",
-            "course.yaml:15: extensions[0].due: is "
+            "course.yaml:14: extensions[0].due: is "
             "not later than the due time of all, 2026-10-12 23:59",
         ),
         (
             "[cai, dora]",
             "[cai, Ana]",
-            "course.yaml:13: groups[1][1]: 'Ana' is in a group already (line 13)",
+            "course.yaml:12: groups[1][1]: 'Ana' is in a group already (line 12)",
         ),
         (
             "deduct: 10 %",
