@@ -23,6 +23,7 @@ from grader.assignment.selection import visible_part
 from grader.bootstrap import read_lock
 from grader.course_kit import write_kit
 from grader.errors import UsageError
+from grader.report.concepts import concepts
 from grader.report.html.handout import make_handout
 from grader.spec.document import parse_yaml, write_yaml
 from grader.visible_files import visible_files
@@ -206,6 +207,8 @@ def test_the_readme_speaks_of_this_course(kit: Path) -> None:
     assert text.startswith('# My "course"\n')
     assert "and 2.5 points for 1 more check at grading" in text
     assert "rosgrade start bot_controller work/bot_controller/src" in text
+    (idea,) = re.findall(r"rosgrade explain (\w+)", text)
+    assert idea in concepts()
     for path in re.findall(r"\]\((assignments/\w+)\)", text):
         assert (kit / path / "assignment.yaml").is_file()
 
