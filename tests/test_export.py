@@ -18,6 +18,7 @@ import yaml
 from grader import export
 from grader.assignment.load import load_assignment
 from grader.errors import UsageError
+from grader.starter import rendered
 from tests.assignment.lessons import GOOD, HEAD
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -134,11 +135,8 @@ def test_every_action_runs_on_a_node_that_github_still_has():
         *("action.yml", ".github/workflows/test.yml", "templates/export/github-workflow.yml"),
         "templates/course/workflow.yml.j2",
     )
-    used = [
-        found
-        for file in files
-        for found in re.findall(r"uses: actions/([\w-]+)@v(\d+)\n", (ROOT / file).read_text())
-    ]
+    form = re.compile(r"uses: actions/([\w-]+)(?:/\w+)?@v(\d+)\n")
+    used = [found for file in files for found in form.findall((ROOT / file).read_text())]
     assert {name for name, _ in used} == set(first)
     assert [(name, number) for name, number in used if int(number) < first[name]] == []
 
@@ -156,19 +154,45 @@ def step(name):
 
 
 @pytest.mark.parametrize(
-    ("tag", "ref", "graded"),
+    ("tag", "ref", "event", "graded"),
     [
-        ("", "refs/heads/main", True),
-        ("submit*", "refs/tags/submit-2", True),
-        ("submit*", "refs/tags/draft", False),
-        ("submit*", "refs/heads/submit", False),
+        ("", "refs/heads/main", "push", True),
+        ("submit*", "refs/tags/submit-2", "push", True),
+        ("submit*", "refs/tags/draft", "push", False),
+        ("submit*", "refs/heads/submit", "push", False),
+        ("submit*", "refs/heads/main", "workflow_dispatch", True),
     ],
 )
-def test_the_action_grades_only_the_tags_that_are_wanted(tmp_path, tag, ref, graded):
+def test_the_action_grades_only_the_tags_that_are_wanted(tmp_path, tag, ref, event, graded):
     outputs = tmp_path / "outputs"
-    given = {"TAG": tag, "GITHUB_REF": ref, "GITHUB_OUTPUT": str(outputs)}
+    given = {"TAG": tag, "GITHUB_REF": ref, "GITHUB_EVENT_NAME": event}
+    given["GITHUB_OUTPUT"] = str(outputs)
     subprocess.run(["bash", "-e", "-c", step("begin")], env={**os.environ, **given}, check=True)
     assert ("grade=true" in outputs.read_text()) is graded
+
+
+WORKFLOWS = {
+    "action": (ROOT / "action.yml").read_text(encoding="utf-8"),
+    "course kit": rendered("course/workflow.yml", tag="submit*"),
+}
+
+
+@pytest.mark.parametrize("text", WORKFLOWS.values(), ids=WORKFLOWS)
+def test_what_took_long_is_kept_also_when_points_are_lost(text):
+    # actions/cache keeps something only "if the job completes successfully":
+    # https://docs.github.com/en/actions/reference/workflows-and-actions/dependency-caching
+    data = yaml.safe_load(text)
+    steps = data["runs"]["steps"] if "runs" in data else data["jobs"]["grade"]["steps"]
+    used = [one.get("uses", "").partition("@")[0] for one in steps]
+    assert "actions/cache" not in used
+    restored, saved = (
+        [one["with"]["path"] for one in steps if f"actions/cache/{do}@" in one.get("uses", "")]
+        for do in ("restore", "save")
+    )
+    assert restored == saved and len(saved) == 2
+    (grading,) = (index for index, one in enumerate(steps) if "check " in one.get("run", ""))
+    environment, builds = (index for index, one in enumerate(used) if one == "actions/cache/save")
+    assert environment < grading < builds and "always()" in steps[builds]["if"]
 
 
 def test_the_action_says_how_long_it_took(tmp_path):
