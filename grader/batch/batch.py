@@ -81,19 +81,7 @@ class Batch:
             on_read(row.key)
             given = {name: row.columns.get(column, "") for name, column in columns.items()}
             self._given[row.key] = {name: value for name, value in given.items() if value}
-            team = teams.get(row.key, "")
-            entry = Entry(
-                row.key,
-                row.name,
-                row.late,
-                problem=row.problem,
-                fault=row.fault,
-                email=row.email,
-                team=team,
-                handed_in=row.time[0],
-                handed_in_from=row.time[1],
-                attempt_of=row.attempt_of,
-            )
+            entry: Entry = replace(row, team=teams.get(row.key, ""))
             if row.path is not None:
                 entry = self._identified(replace(entry, source=str(row.path.resolve())), row.path)
                 distinct = entry.sha256 in ("", NO_FILES)

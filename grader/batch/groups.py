@@ -32,7 +32,7 @@ def _shared(handed: HandedIn, row: HandedIn) -> HandedIn:
     """The row of a member who has what another one handed in."""
     parts = [part for part in row.problem.split("; ") if not part.startswith("handed in nothing")]
     shared = replace(row, path=handed.path, fault=handed.fault, problem="; ".join(parts))
-    return replace(shared, late=handed.late, time=handed.time, earlier=handed.earlier)
+    return replace(shared, late=handed.late).at((handed.handed_in, handed.handed_in_from))
 
 
 def strangers(rows: Sequence[HandedIn], course: Course) -> Iterator[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -26,28 +25,16 @@ _GIT_LIMIT_S = 20.0
 def timed(rows: Sequence[HandedIn], staging: Path) -> list[HandedIn]:
     """Rows with their times: the roster is asked first, then platform and names, then git."""
     found = []
-    for row in rows:
-        time, problem = row.time, ""
+    for given in rows:
+        row = given
         text = next((row.columns[name] for name in _COLUMNS if row.columns.get(name)), "")
         try:
-            time = (_iso(text), "the roster") if text else time
+            row = row.at((_iso(text), "the roster")) if text else row
         except ValueError as error:
-            problem = f"when it was handed in is not known: {error}"
-        if row.path is not None and not time[0]:
-            time = _of_commit(row.path, staging / "committed")
-        found.append(replace(row.with_problem(problem), time=time))
-    return found
-
-
-def with_attempts(rows: Sequence[HandedIn], staging: Path) -> list[HandedIn]:
-    """Rows, and one for each earlier attempt, with its time."""
-    found = list(rows)
-    for row in rows:
-        for number, (path, time) in enumerate(row.earlier, start=1):
-            known = time if time[0] else _of_commit(path, staging / "committed")
-            key = f"{row.key} (attempt {number})"
-            attempt = HandedIn(key, path, row.name, columns=row.columns)
-            found.append(replace(attempt, time=known, attempt_of=row.key))
+            row = row.with_problem(f"when it was handed in is not known: {error}")
+        if row.path is not None and not row.handed_in:
+            row = row.at(_of_commit(row.path, staging / "committed"))
+        found.append(row)
     return found
 
 

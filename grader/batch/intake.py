@@ -13,16 +13,14 @@ from typing import Any
 import yaml
 
 from grader.batch.groups import with_groups
-from grader.batch.hand_in_time import NOT_KNOWN, of_metadata, of_name, timed, with_attempts
+from grader.batch.hand_in_time import of_metadata, of_name, timed
 from grader.batch.handed_in import (
     FOREIGN,
-    Entry,
     HandedIn,
-    attempts_in,
     is_ignored,
     only_archive,
-    row_of,
     stem_of,
+    submission_in,
 )
 from grader.batch.roster import Roster, Student
 from grader.batch.roster_match import matched, unique
@@ -60,13 +58,12 @@ def take_in(
     entries = list(_entries(folder, staging, on_left_out, out))
     if not entries:
         raise UsageError(f"{source}: holds no submission; expected one folder or archive for each")
-    rows = matched(entries, roster, on_prefix) if roster else [row_of(item) for item in entries]
+    rows = matched(entries, roster, on_prefix) if roster else entries
     return _complete(rows, staging, course)
 
 
 def _complete(rows: list[HandedIn], staging: Path, course: Course | None) -> list[HandedIn]:
-    own = with_groups(timed(unique(rows), staging), course)
-    return unique(with_attempts(own, staging))
+    return with_groups(timed(unique(rows), staging), course)
 
 
 def take_in_roster(
@@ -95,7 +92,7 @@ def take_in_roster(
 
 
 def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn | None) -> HandedIn:
-    row = HandedIn("", None).of(student)
+    row = HandedIn("").of(student)
     if not student.submission:
         return row.with_problem("handed in nothing")
     if cloned is not None:
@@ -162,7 +159,7 @@ def _manifest_of_one(folder: Path) -> Path | None:
 
 def _entries(
     folder: Path, staging: Path, on_left_out: Callable[[str], None], out: Path | None
-) -> Iterator[Entry]:
+) -> Iterator[HandedIn]:
     metadata = _gradescope(folder / GRADESCOPE_METADATA)
     canvas: dict[str, list[tuple[Path, re.Match[str]]]] = {}
     for item in sorted(folder.iterdir(), key=lambda path: os.fsencode(path.name)):
@@ -180,55 +177,42 @@ def _entries(
             stem = stem_of(item)
             moodle = _MOODLE.fullmatch(stem)
             names = (moodle["name"] if moodle else stem,)
-            attempts = tuple((path, of_name(path.name)) for path in attempts_in(item))
+            row = HandedIn(shown(stem), path=submission_in(item), item=item, names=names)
             # Moodle names the folder, but the student the archive.
-            time = attempts[-1][1] if attempts else of_name("" if moodle else item.name)
-            yield Entry(shown(stem), item, names, time=time, attempts=attempts)
+            yield row if moodle else row.at(of_name(item.name))
         else:
             on_left_out(shown(item.name))
     for files in canvas.values():
         yield _of_canvas(files, staging)
 
 
-def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> Entry:
+def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> HandedIn:
     match = files[0][1]
     named = _names(files)
     path, fault = only_archive(named), ""
-    attempts = _attempts(files) if path is None else ()
-    if attempts:
-        path = attempts[-1]
     if path is None:
         path = staging / f"canvas-{match['user']}"
         fault = _gather(named, path)
-    late = any(one["late"] for _, one in files)
-    return Entry(
+    return HandedIn(
         shown(f"{match['name']}_{match['user']}"),
-        path,
-        (match["user"], match["name"]),
-        late=late,
+        late=any(one["late"] for _, one in files),
         fault=fault,
-        attempts=tuple((each, NOT_KNOWN) for each in attempts),
+        path=None if fault else path,
+        item=path,
+        names=(match["user"], match["name"]),
     )
 
 
-def _attempts(files: list[tuple[Path, re.Match[str]]]) -> tuple[Path, ...]:
-    """The archives, where all are one that was handed in again: ``ws.zip``, ``ws-1.zip``."""
-    numbers: dict[str, dict[int, Path]] = {}
-    for file, named in files:
-        again = _AGAIN.search(named["file"])
-        if named["file"].lower().endswith(SUFFIXES):
-            number = int(again[0][1:]) if again else 0
-            numbers.setdefault(_AGAIN.sub("", named["file"]), {})[number] = file
-    (found, *others) = numbers.values() or ({},)
-    return tuple(found[at] for at in sorted(found)) if len(found) > 1 and not others else ()
-
-
 def _names(files: list[tuple[Path, re.Match[str]]]) -> dict[str, Path]:
-    """Each file under the name that it was handed in with, as far as that tells them apart."""
-    plain = [_AGAIN.sub("", named["file"]) for _, named in files]
+    """Each file under the name that it was handed in with, as far as that tells them apart.
+
+    Of an archive that was handed in several times (``ws.zip``, ``ws-1.zip``) only the last counts.
+    """
+    ordered = sorted(files, key=lambda one: int(one[1]["attachment"]))
+    plain = [_AGAIN.sub("", named["file"]) for _, named in ordered]
     return {
-        name if plain.count(name) == 1 else named["file"]: file
-        for name, (file, named) in zip(plain, files, strict=True)
+        name if plain.count(name) == 1 or name.lower().endswith(SUFFIXES) else named["file"]: file
+        for name, (file, named) in zip(plain, ordered, strict=True)
     }
 
 
@@ -273,14 +257,14 @@ def _gradescope(file: Path) -> Mapping[str, Any]:
     return data if isinstance(data, dict) else {}
 
 
-def _of_gradescope(item: Path, about: Any) -> Iterator[Entry]:
+def _of_gradescope(item: Path, about: Any) -> Iterator[HandedIn]:
     """An exported folder, for each of its team; Gradescope writes keys with a colon in front."""
     submitters = about.get(":submitters") if isinstance(about, dict) else None
     listed = submitters if isinstance(submitters, list) else []
     people = [person for person in listed if isinstance(person, dict)]
-    time = of_metadata(about) if isinstance(about, dict) else NOT_KNOWN
+    time = of_metadata(about if isinstance(about, dict) else {})
     for person in people or [{}]:
         values = (person.get(field) for field in (":sid", ":email", ":name"))
         names = tuple(str(value) for value in values if value) or (item.name,)
-        entry = Entry(shown(names[0]), item, names, shown(str(person.get(":name") or "")))
-        yield replace(entry, time=time)
+        name, path = shown(str(person.get(":name") or "")), submission_in(item)
+        yield HandedIn(shown(names[0]), name=name, path=path, item=item, names=names).at(time)

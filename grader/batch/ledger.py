@@ -11,9 +11,10 @@ import json
 import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, fields, replace
 from datetime import datetime, timezone
 from pathlib import Path
+from typing import TypeVar
 
 from grader.batch.files import RESULT_FILE
 from grader.batch.last_attempt import EARLIER
@@ -27,6 +28,7 @@ BATCH_FILE = "batch.json"
 SUBMISSIONS = "submissions"
 _PARTIAL = ".partial"
 _LOCK = ".lock"
+_E = TypeVar("_E", bound="Entry")
 _REPLACED = "#replaced"
 """Suffix of a result's folder while another one replaces it; no key has such a folder."""
 
@@ -74,7 +76,7 @@ class Entry:
         """Key of the row that was graded for all who handed in the same."""
         return self.same_as or self.key
 
-    def with_problem(self, *problems: str) -> Entry:
+    def with_problem(self: _E, *problems: str) -> _E:
         """The row with more problems."""
         return replace(self, problem="; ".join(filter(None, (self.problem, *problems))))
 
@@ -197,10 +199,11 @@ class Ledger:
         course: str | None = None,
     ) -> None:
         """Write the assignment and the rows."""
+        names = [one.name for one in fields(Entry)]
         data = {
             "assignment": {"id": assignment, "sha256": assignment_sha256, "location": location},
             "course": course,
-            "rows": [asdict(entry) for entry in entries],
+            "rows": [{one: getattr(entry, one) for one in names} for entry in entries],
         }
         write_whole(self.out / BATCH_FILE, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
 
-from grader.batch.handed_in import Entry, HandedIn, row_of, stem_of
+from grader.batch.handed_in import HandedIn, stem_of
 from grader.batch.roster import Roster, Student, name_forms, resemblance
 from grader.course.load import written
 from grader.findings.wording import listing
@@ -21,13 +21,13 @@ _MOST_TWICE = 10
 class _Names:
     """Finds the students of a roster that an entry may belong to."""
 
-    def __init__(self, students: Sequence[Student], entries: Sequence[Entry]) -> None:
+    def __init__(self, students: Sequence[Student], entries: Sequence[HandedIn]) -> None:
         """Collect the names of a class."""
         self._alike: dict[str, list[Student]] = {}
         for student in students:
             for form in student.resembling:
                 self._alike.setdefault(form, []).append(student)
-        self.prefix = self._find_prefix([stem_of(entry.path) for entry in entries])
+        self.prefix = self._find_prefix([stem_of(entry.item) for entry in entries])
 
     def _find_prefix(self, stems: Sequence[str]) -> str:
         """GitHub Classroom's ``<assignment>-``, where both that and logins may hold hyphens.
@@ -53,7 +53,7 @@ class _Names:
             return ""
         return fitting[0]
 
-    def exact(self, entry: Entry) -> set[str]:
+    def exact(self, entry: HandedIn) -> set[str]:
         """Students with exactly its names; several where two of its names contradict each other."""
         keys: set[str] = set()
         for name in entry.names:
@@ -66,14 +66,14 @@ class _Names:
             keys = keys & found or keys | found
         if keys:
             return keys
-        stem = stem_of(entry.path)
+        stem = stem_of(entry.item)
         if self.prefix and stem.startswith(self.prefix):
             return self._by_login(stem.removeprefix(self.prefix))
         return set()
 
-    def alike(self, entry: Entry) -> set[str]:
+    def alike(self, entry: HandedIn) -> set[str]:
         """Students with a name that is written alike, or with which the entry's name ends."""
-        parts = stem_of(entry.path).split("-")[-_MOST_HYPHENS:]
+        parts = stem_of(entry.item).split("-")[-_MOST_HYPHENS:]
         ends = ["-".join(parts[first:]) for first in range(1, len(parts))]
         forms = map(resemblance, (*entry.names, *ends))
         return {student.key for form in forms for student in self._alike.get(form, ())}
@@ -84,7 +84,7 @@ class _Names:
 
 
 def matched(
-    entries: list[Entry], roster: Roster, on_prefix: Callable[[str], None]
+    entries: list[HandedIn], roster: Roster, on_prefix: Callable[[str], None]
 ) -> list[HandedIn]:
     """Give each entry to the student of the roster that it names.
 
@@ -104,19 +104,19 @@ def matched(
     doubtful: dict[str, list[str]] = {}
     for entry in entries:
         # What the roster says itself needs no guess, and a team may have handed in one for all.
-        stated = named.get(entry.path.name, set()) | named.get(stem_of(entry.path), set())
+        stated = named.get(entry.item.name, set()) | named.get(stem_of(entry.item), set())
         keys = stated or names.exact(entry)
         if not stated and len(keys) != 1:
             may_be = sorted(keys or names.alike(entry))
             for key in may_be:
-                doubtful.setdefault(key, []).append(shown(entry.path.name))
-            parts = ["" if keys else "not in the roster"]
-            parts.append(f"may be {listing(may_be, 'or')}" if may_be else "")
-            rows.append(replace(row_of(entry), problem="; ".join(filter(None, parts))))
+                doubtful.setdefault(key, []).append(shown(entry.item.name))
+            why = "" if keys else "not in the roster"
+            theirs = f"may be {listing(may_be, 'or')}" if may_be else ""
+            rows.append(entry.with_problem(why, theirs))
             continue
         for key in sorted(keys):
-            handed.setdefault(key, []).append((len(rows), shown(entry.path.name)))
-            rows.append(row_of(entry).of(students[key]))
+            handed.setdefault(key, []).append((len(rows), shown(entry.item.name)))
+            rows.append(entry.of(students[key]))
     for key, found in handed.items():
         for at, file in found if len(found) > 1 else ():
             others = [other for _, other in found[:_MOST_TWICE] if other != file] or [file]
@@ -125,19 +125,13 @@ def matched(
             rows[at] = rows[at].with_problem(f"{listing(doubtful[key])} may be theirs too")
     for student in roster.students:
         if student.key not in handed:
-            row = _missing(student)
-            if row.key in doubtful:
-                theirs = f"{row.problem}; {listing(doubtful[row.key])} may be theirs"
-                row = replace(row, problem=theirs)
-            rows.append(row)
+            why = "handed in nothing"
+            if student.submission:
+                why += f": {shown(student.submission)} is not among the submissions"
+            other = doubtful.get(student.key)
+            theirs = f"{listing(other)} may be theirs" if other else ""
+            rows.append(HandedIn("").with_problem(why, theirs).of(student))
     return rows
-
-
-def _missing(student: Student) -> HandedIn:
-    why = "handed in nothing"
-    if student.submission:
-        why += f": {shown(student.submission)} is not among the submissions"
-    return HandedIn("", None).of(student).with_problem(why)
 
 
 def unique(rows: list[HandedIn]) -> list[HandedIn]:

@@ -272,7 +272,7 @@ def test_what_is_gone_has_no_grade(course: Class) -> None:
     with course.ledger.opened():
         batch = Batch(course.loaded, course.ledger)
         rows = take_in(course.folder / "class", course.folder)
-        batch.read([*rows, HandedIn("ben", None, problem="handed in nothing")])
+        batch.read([*rows, HandedIn("ben", problem="handed in nothing")])
         done = {item.entry.key: item for item in batch.grade({}, None)}
     assert done["ben"].result is None and done["ana"].result is not None
     assert [folder.name for folder in find_reports(course.ledger.out)] == ["ana", "cai"]

@@ -132,6 +132,15 @@ def test_several_archives_in_canvas_are_unpacked_side_by_side(course: Path, stag
     ]
 
 
+def test_of_an_archive_that_canvas_has_twice_the_last_one_counts(
+    course: Path, staging: Path
+) -> None:
+    for attachment, name in ((99, "ws.zip"), (100, "ws-1.zip")):
+        archive(course / f"lopezana_90211_{attachment}_{name}")
+    (row,) = take_in(course, staging)
+    assert row.path == course / "lopezana_90211_100_ws-1.zip"
+
+
 def test_moodle_s_folders_and_files_are_read(course: Path, staging: Path) -> None:
     ana = course / "Ana Lopez_4711_assignsubmission_file_"
     archive(ana / "my_ws.zip")
