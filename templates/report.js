@@ -329,18 +329,18 @@
       this.button.textContent = "Pause";
       let last = performance.now(), due = 0;
       const frame = (now) => {
-        if (!this.playing) return;
         due += (now - last) / 1000;
         last = now;
         // Who asked for less motion gets stills, two a second.
         if (due >= (calm.matches ? 0.5 : 0)) { this.show(this.time + due * Number(this.speed.value)); due = 0; }
         if (this.time >= this.end) this.stop();
-        else requestAnimationFrame(frame);
+        else this.frame = requestAnimationFrame(frame);
       };
-      requestAnimationFrame(frame);
+      this.frame = requestAnimationFrame(frame);
     }
     stop() {
       this.playing = false;
+      cancelAnimationFrame(this.frame);
       this.button.textContent = "Play";
     }
   }

@@ -63,10 +63,14 @@ const follow = async () => {
   }
   setTimeout(follow, 500);
 };
-// The report may ask no server for anything: this page around it tells which hints are opened in it.
-frame.addEventListener("load", () => frame.contentDocument.addEventListener("toggle", ({ target }) => {
-  const { check, hint } = target.dataset;
-  if (!target.open || !hint || at("hints").hidden) return;
-  fetch("hints", { method: "POST", body: JSON.stringify({ check, number: Number(hint) }) }).catch(() => {});
-}, true));
+frame.addEventListener("load", () => {
+  // Else the keys of the replay do nothing until somebody clicks into the report.
+  if (document.activeElement === document.body) frame.contentWindow.focus();
+  // The report may ask no server for anything: this page around it tells which hints are opened in it.
+  frame.contentDocument.addEventListener("toggle", ({ target }) => {
+    const { check, hint } = target.dataset;
+    if (!target.open || !hint || at("hints").hidden) return;
+    fetch("hints", { method: "POST", body: JSON.stringify({ check, number: Number(hint) }) }).catch(() => {});
+  }, true);
+});
 follow();

@@ -51,6 +51,8 @@ def test_the_page_of_a_watched_submission_follows_by_itself(
         page.goto(served.url)
         frame = page.frame_locator("iframe")
         expect(frame.locator(".score .value")).to_have_text("3.02")
+        # So that the keys of the replay work before anybody clicks.
+        assert page.evaluate("document.activeElement.tagName") == "IFRAME"
         expect(page.get_by_role("status")).to_have_text("grading")
         write(full_points())
         served.show(text="3 of 3 points", title="3 of 3 points: Publish", is_new=True)
