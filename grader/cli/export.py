@@ -13,7 +13,7 @@ from grader.cli.screen.console import print_error, print_warning, say
 from grader.findings.wording import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from grader.report.model.class_row import RowStatus
 
@@ -141,9 +141,7 @@ def canvas(
     zero: ZeroFor = None,
     comments: Annotated[
         Path | None,
-        typer.Option(
-            help='Also write comments: a .zip for "Upload Submissions", a .json for Canvas\' API.'
-        ),
+        typer.Option(help='Also write comments: a zip for "Upload Submissions" in Canvas.'),
     ] = None,
 ) -> None:
     """Fill a Canvas gradebook. Import it in Canvas under Grades.
@@ -156,8 +154,6 @@ def canvas(
     from grader.report.formats.gradebook import canvas_csv, read_canvas
 
     refuse_inputs([output, comments], [canvas, *_read_of(out)])
-    if comments is not None and comments.suffix not in (".zip", ".json"):
-        raise UsageError(f"--comments {comments}: must end with .zip or .json")
     try:
         text = canvas.read_text(encoding="utf-8-sig")
     except OSError as error:
@@ -167,36 +163,31 @@ def canvas(
     export = read_canvas(text, str(canvas))
     filled = canvas_csv(read_class(out), export, column, _statuses(zero))
     write_whole(output, filled.text)
-    say(f"{output}: {len(filled.scores)} scores")
+    say(f"{output}: {len(filled.scored)} scores")
     for doubt in filled.doubts:
         print_warning(doubt)
     problems = list(filled.problems)
     if comments is not None:
-        problems += _write_comments(comments, out, filled.scores)
+        problems += _write_comments(comments, out, filled.scored)
     _end(problems)
 
 
-def _write_comments(file: Path, out: Path, scores: Mapping[str, tuple[str, str]]) -> list[str]:
+def _write_comments(file: Path, out: Path, scored: Sequence[str]) -> list[str]:
     """Write comments for those who have a score; who gets none, and why."""
     from grader.batch.feedback import class_feedback
     from grader.report.files import write_whole
-    from grader.report.formats.canvas_comments import is_download, update_grades, upload_zip
+    from grader.report.formats.canvas_comments import is_download, upload_zip
 
-    given = [one for one in class_feedback(out)[0] if one.entry.key in scores]
-    problems = []
-    if file.suffix == ".json":
-        results = {scores[one.entry.key][0]: one.result for one in given}
-        write_whole(file, update_grades(dict(scores.values()), results))
-        where = "Canvas' API; nothing was sent"
-    else:
-        names = {one.entry.key: Path(one.entry.source).name for one in given}
-        why = "no comment: Canvas takes one only for a zip that was downloaded from it"
-        problems = [f"{key}: {why}" for key, name in names.items() if not is_download(name)]
-        given = [one for one in given if is_download(names[one.entry.key])]
-        texts = {names[one.entry.key]: (one.result, one.report.read_bytes()) for one in given}
-        write_whole(file, upload_zip(texts))
-        where = '"Upload Submissions"'
-    say(f"{file}: {counted(len(given), 'comment')} for {where}")
+    comments, problems = {}, []
+    for one in class_feedback(out)[0]:
+        name = Path(one.entry.source).name
+        if one.entry.key in scored and is_download(name):
+            comments[name] = one.result, one.report.read_bytes()
+        elif one.entry.key in scored:
+            why = "Canvas takes one only for a zip that was downloaded from it"
+            problems.append(f"{one.entry.key}: no comment: {why}")
+    write_whole(file, upload_zip(comments))
+    say(f'{file}: {counted(len(comments), "comment")} for "Upload Submissions"')
     return problems
 
 

@@ -7,7 +7,6 @@ guesses: each question names a moment of a recording or a line of the source.
 from __future__ import annotations
 
 import re
-from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,15 +14,13 @@ from statistics import median
 from typing import Any
 
 from grader.findings.wording import code
-from grader.measure.callback_runs import Run, timed
 from grader.measure.declarations import timers
-from grader.questions.work import FEWEST, Work
-from grader.recording.model import NS, Kind, Recording
+from grader.questions.work import Work
+from grader.recording.model import NS, Recording
 
 QUESTIONS = 3
 _SPECIAL = 4.0
 """How many times as much as usual."""
-_SLOW_S = 0.01
 
 
 @dataclass(frozen=True)
@@ -50,26 +47,6 @@ def ask(work: Work) -> list[Question]:
         if not any(set(one.evidence[:1]) & set(other.evidence) for other in chosen):
             chosen.append(one)
     return chosen[:QUESTIONS]
-
-
-def slow_callback(work: Work) -> Iterator[Question]:
-    """One run of a callback took much longer than the others."""
-    for recording in work.recordings:
-        runs: dict[str, list[Run]] = defaultdict(list)
-        for run in timed(recording):
-            runs[run.callback].append(run)
-        for name, calls in runs.items():
-            usual = median(run.seconds or 0.0 for run in calls)
-            slow = max(calls, key=lambda run: run.seconds or 0.0)
-            long = slow.seconds or 0.0
-            own = long - recording.stolen_s(slow.begin_ns, slow.end_ns or slow.begin_ns)
-            if len(calls) >= FEWEST and own > max(_SPECIAL * usual, _SLOW_S):
-                text = (
-                    f"{_at(recording, slow.begin_ns)}, {code(name)} took {1000 * long:.0f} ms, "
-                    f"otherwise about {1000 * usual:.2g} ms. What was different then?"
-                )
-                method = re.escape(name.rpartition(".")[2])
-                yield Question(text, work.evidence(rf"\b{method}\b"), 5)
 
 
 def pause(work: Work) -> Iterator[Question]:
@@ -132,24 +109,6 @@ def parameter(work: Work) -> Iterator[Question]:
         yield Question(text, tuple(dict.fromkeys((str(place), *uses))), 1 + 2 * work.is_rare(place))
 
 
-def queue(work: Work) -> Iterator[Question]:
-    """Another depth of a queue."""
-    for place in work.places(r"\bcreate_(publisher|subscription)\b"):
-        kind = place.match[1]
-        ends = [
-            f"{code(end.topic)} is {end.qos.reliability} and {end.qos.durability}, "
-            f"{len(recording.carried(end.topic))} messages in {code(recording.scenario)}"
-            for recording in work.recordings[:1]
-            for end in recording.student_endpoints(Kind(kind))
-            if end.topic.rpartition("/")[2] in place.text
-        ]
-        text = (
-            f"{place.short} creates a {kind}. With what QoS? Which messages would be lost if "
-            "its depth were 1, and when?"
-        )
-        yield Question(text, (str(place), *ends), 2 * work.is_rare(place))
-
-
 def line(work: Work) -> Iterator[Question]:
     """A condition; where there is none, any line."""
     conditions = work.places(r"^(?:if|elif|while|\} else if)\b(?! __name__)")
@@ -163,7 +122,7 @@ def line(work: Work) -> Iterator[Question]:
             yield Question(text, (str(place),), weight + 2 * work.is_rare(place))
 
 
-_RULES = (slow_callback, pause, jump, timer, parameter, queue, line)
+_RULES = (pause, jump, timer, parameter, line)
 
 
 def _at(recording: Recording, time_ns: int) -> str:

@@ -11,8 +11,8 @@ from pathlib import PurePosixPath
 from grader.findings.wording import code
 from grader.recording.model import Kind, Message, Recording
 
-FEWEST = 5
-"""Of anything, before something about it can be special."""
+_FEWEST = 5
+"""Messages before something about one of them can be special."""
 _MOST_LINES = 4
 _LONGEST = 160
 _PROGRAMS = (".py", ".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp", ".hxx")
@@ -71,5 +71,5 @@ class Work:
         for recording in self.recordings:
             ends = recording.student_endpoints(Kind.PUBLISHER)
             for topic in sorted({end.topic for end in ends}.difference(_OWN_TOPICS)):
-                if len(recording.on(topic)) > FEWEST:
+                if len(recording.on(topic)) > _FEWEST:
                     yield recording, recording.on(topic)

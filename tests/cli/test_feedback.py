@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import mailbox
 import re
 import zipfile
@@ -157,18 +156,6 @@ def canvas(place: Path) -> Path:
         "Ana,90211,ana,S,\nBen,90212,ben,S,\nGil,90213,gil,S,\n"
     )
     return file
-
-
-def test_comments_for_the_api_of_canvas_go_to_canvas_number(
-    rosgrade: Rosgrade, out: Path, tmp_path: Path
-) -> None:
-    command = ("export", "canvas", out, "--canvas", canvas(tmp_path), "--comments", "c.json")
-    rosgrade(*command, "--zero", "missing")
-    data = json.loads((tmp_path / "c.json").read_text())["grade_data"]
-    assert set(data) == {"90211", "90212", "90213"}
-    assert data["90213"] == {"posted_grade": "0"}
-    assert data["90211"]["posted_grade"] == "4.52"
-    assert "It publishes every 300 ms" in data["90211"]["text_comment"]
 
 
 def test_comments_to_upload_are_called_as_canvas_called_the_downloads(

@@ -15,7 +15,6 @@ from tests.checks.builder import (
     after,
     at,
     declarations,
-    declared,
     every,
     message,
     messages,
@@ -87,17 +86,6 @@ def test_a_pause_is_asked_about_unless_the_machine_made_it() -> None:
     assert "2.5 s after launch, `/cmd_vel` falls silent for 2 s" in asked(run)
     busy = Disturbance(at(4.5), waited_ns=2 * NS, late_ns=0)
     assert "silent" not in asked(replace(run, disturbance=(busy,)))
-
-
-def test_a_callback_that_took_long_once_is_asked_about() -> None:
-    def ran(began_s: float, took_s: float) -> object:
-        times = {"began_ns": at(began_s), "ended_ns": at(began_s + took_s)}
-        return declared("ran", began_s, callback="Bot.tick", serves="0.3 s", **times)
-
-    runs = tuple(ran(0.1 + 0.3 * count, 0.041 if count == 7 else 0.003) for count in range(10))
-    first = asked(recording(declarations=runs)).partition("\n")[0]
-    assert "2.2 s after launch, `Bot.tick` took 41 ms, otherwise about 3 ms." in first
-    assert "`src/bot/bot/node.py:12` is `def tick(self):`" in first
 
 
 def test_what_few_others_have_is_asked_before_what_all_have() -> None:

@@ -111,7 +111,7 @@ def test_canvas_gets_no_score_while_a_person_has_to_give_points():
     )
     ana, ben = sample().result, sample(waits=True).result
     filled = canvas_csv([ClassRow("ana", result=ana), ClassRow("ben", result=ben)], export)
-    assert list(filled.scores) == ["ana"]
+    assert list(filled.scored) == ["ana"]
     assert filled.problems == ("ben: waits for a person (Oral exam), so the cell is left as it is",)
 
 

@@ -63,12 +63,12 @@ class CanvasExport:
 class CanvasFile:
     """A gradebook to import into Canvas.
 
-    ``scores`` are the cells that are filled in, by row id with Canvas' number of the student;
-    ``problems`` name who has no score in it, ``doubts`` what is odd about the column.
+    ``scored`` are the ids of the rows whose score is in it; ``problems`` name who has no score in
+    it, ``doubts`` what is odd about the column.
     """
 
     text: str
-    scores: Mapping[str, tuple[str, str]]
+    scored: tuple[str, ...]
     problems: tuple[str, ...]
     doubts: tuple[str, ...]
 
@@ -207,7 +207,7 @@ def canvas_csv(
         [f"    {_POINTS_POSSIBLE}", *[""] * (len(export.identity) - 1), points],
     ]
     problems: list[str] = []
-    scores: dict[str, tuple[str, str]] = {}
+    scored: list[str] = []
     taken: dict[int, str] = {}
     for who, row, found in _assigned(rows, export):
         if len(found) != 1:
@@ -228,13 +228,13 @@ def canvas_csv(
             name, *rest = export.students[student]
             # Names are free text; the numbers after them are what Canvas matches by.
             table.append([cell(name), *rest[:-1], cell(rest[-1]), number(score)])
-            scores[row.id] = (rest[0], number(score))
+            scored.append(row.id)
         if is_excused or score is not None:
             taken.setdefault(student, who)
-    if not scores:
+    if not scored:
         raise UsageError("\n".join(["no score could be filled in:", *problems]))
     doubts = tuple(_doubts(export, title, points, max_score))
-    return CanvasFile(csv_text(table), scores, tuple(problems), doubts)
+    return CanvasFile(csv_text(table), tuple(scored), tuple(problems), doubts)
 
 
 def csv_text(rows: Iterable[Sequence[str]]) -> str:
