@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import cache, lru_cache
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any
 
 from mcap.reader import make_reader
 from mcap.records import Attachment, Channel, DataEnd, Metadata, Schema
@@ -20,12 +20,10 @@ from pydantic import TypeAdapter
 
 from grader.errors import UsageError
 from grader.recording.interface import FEEDBACK
-from grader.recording.mcap_writer import CHANNELS, FORMAT, JOIN, SENT, TOPIC, RawMessage
+from grader.recording.mcap_writer import FACTS, FORMAT, JOIN, SENT, TOPIC, RawMessage
 from grader.recording.model import Message, Recording
 from grader.submission.record import SubmissionRecord
 
-_FIELDS = get_type_hints(Recording)
-_FACTS: dict[str, type] = {name: get_args(_FIELDS[name])[0] for name in CHANNELS}
 # Types of the primitive fields, and of an array of bytes.
 _PLAIN = frozenset({bool, int, float, str, bytes})
 
@@ -37,7 +35,7 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 def get_ready() -> None:
     """Make what validates the facts; otherwise the first recording waits for it."""
-    for kind in (*_FACTS.values(), Recording):
+    for kind in (*FACTS.values(), Recording):
         _adapter(kind)
 
 
@@ -68,7 +66,7 @@ def _read(stream: Any) -> Recording:
     submission: SubmissionRecord | None = None
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
-    facts: dict[str, list[tuple[int, Any]]] = {name: [] for name in CHANNELS}
+    facts: dict[str, list[tuple[int, Any]]] = {name: [] for name in FACTS}
     messages: defaultdict[str, list[Message]] = defaultdict(list)
     sent: defaultdict[str, list[Message]] = defaultdict(list)
     joined: defaultdict[str, list[Message]] = defaultdict(list)
@@ -90,7 +88,7 @@ def _read(stream: Any) -> Recording:
             channel = channels[record.channel_id]
             name = channel.topic.removeprefix("/rosgrade/")
             if channel.message_encoding == "json" and name in facts:
-                fact = _adapter(_FACTS[name]).validate_json(record.data)
+                fact = _adapter(FACTS[name]).validate_json(record.data)
                 facts[name].append((record.sequence, fact))
             if channel.message_encoding == "json":
                 continue

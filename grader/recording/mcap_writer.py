@@ -11,8 +11,9 @@ import dataclasses
 import json
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from pathlib import Path
+from typing import get_args, get_origin, get_type_hints
 
 from mcap.writer import CompressionType, Writer
 
@@ -24,27 +25,12 @@ JOIN, TOPIC, SENT = "rosgrade_join", "rosgrade_topic", "rosgrade_sent"
 FORMAT = "2"
 """Version of the layout; a reader refuses another one."""
 
-CHANNELS: dict[str, str] = {
-    "nodes": "appeared_ns",
-    "endpoints": "appeared_ns",
-    "processes": "started_ns",
-    "log": "time_ns",
-    "declarations": "time_ns",
-    "calls": "requested_ns",
-    "services": "appeared_ns",
-    "clients": "appeared_ns",
-    "asked": "asked_ns",
-    "goals": "sent_ns",
-    "waits": "began_ns",
-    "joins": "joined_ns",
-    "interventions": "time_ns",
-    "breaches": "time_ns",
-    "disturbance": "time_ns",
-    "truth": "time_ns",
-    "incidents": "time_ns",
+FACTS: dict[str, type] = {
+    name: get_args(kind)[0]
+    for name, kind in get_type_hints(Recording).items()
+    if get_origin(kind) is tuple and is_dataclass(get_args(kind)[0])
 }
-"""Field of the recording -> attribute that dates it, for the facts kept as JSON."""
-
+"""Fields of the recording that are kept as JSON -> class of a fact, which its first time dates."""
 
 _FRAME = (
     *("scenario", "seed", "launched_ns", "matched_ns", "stop_ns", "end_ns", "faults"),
@@ -106,7 +92,8 @@ def write_recording(
 
 def _write_facts(writer: Writer, recording: Recording) -> None:
     schema = writer.register_schema("rosgrade", "jsonschema", b'{"type": "object"}')
-    for name, dated in CHANNELS.items():
+    for name, kind in FACTS.items():
+        dated = next(one.name for one in dataclasses.fields(kind) if one.name.endswith("_ns"))
         facts = getattr(recording, name)
         if facts:
             channel = writer.register_channel(f"/rosgrade/{name}", "json", schema)

@@ -417,13 +417,7 @@ class Recording:
 def to_json(fact: Any) -> bytes:
     """A dataclass of the model as compact JSON."""
     plain = dataclasses.asdict(fact)
-    return json.dumps(plain, default=_plain, separators=(",", ":"), sort_keys=True).encode()
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Enum):
-        return value.value
-    raise TypeError(f"{type(value).__name__} is not a plain value")
+    return json.dumps(plain, separators=(",", ":"), sort_keys=True).encode()
 
 
 def _time_ns(sample: Disturbance) -> int:

@@ -7,8 +7,7 @@ them are measurements: they are never twice the same.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
+from difflib import unified_diff
 from typing import Any
 
 from grader.report.model.result_model import Result
@@ -44,22 +43,9 @@ GRADE: dict[str, Any] = {
 
 def grade_json(result: Result) -> str:
     """The grade of a result as JSON; keys are always in the same order."""
-    grade = result.model_dump(mode="json", by_alias=True, include=GRADE)
-    return json.dumps(grade, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return result.model_dump_json(by_alias=True, include=GRADE, indent=2) + "\n"
 
 
 def differences(one: str, other: str) -> list[str]:
-    """Say what differs between two grades, one line each."""
-    return list(_differences("", json.loads(one), json.loads(other)))
-
-
-def _differences(place: str, one: Any, other: Any) -> Iterator[str]:
-    if isinstance(one, dict) and isinstance(other, dict) and one.keys() == other.keys():
-        for key in one:
-            yield from _differences(f"{place}.{key}".lstrip("."), one[key], other[key])
-    elif isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
-        for number, (left, right) in enumerate(zip(one, other, strict=True)):
-            name = left.get("id", number) if isinstance(left, dict) else number
-            yield from _differences(f"{place}[{name}]", left, right)
-    elif one != other:
-        yield f"{place}: {one!r}, then {other!r}"
+    """The lines that differ between two grades, with the lines around them."""
+    return list(unified_diff(one.splitlines(), other.splitlines(), lineterm=""))

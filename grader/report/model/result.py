@@ -64,8 +64,7 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
 
 def result_json(result: Result) -> str:
     """Write a result as JSON; keys are always in the same order."""
-    data = model.jsonable(result.model_dump(mode="json", by_alias=True))
-    return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return result.model_dump_json(by_alias=True, indent=2) + "\n"
 
 
 def read_result(file: Path) -> Result:

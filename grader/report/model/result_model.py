@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Hashable
 from dataclasses import fields, is_dataclass
 from enum import Enum
@@ -47,19 +46,8 @@ def normalized(value: Any) -> Any:
     return value
 
 
-def jsonable(value: Any) -> Any:
-    """A value in which numbers that JSON does not know (NaN, infinity) are text."""
-    if isinstance(value, dict):
-        return {name: jsonable(item) for name, item in value.items()}
-    if isinstance(value, list):
-        return list(map(jsonable, value))
-    if not isinstance(value, float) or math.isfinite(value):
-        return value
-    return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
-
-
 class ResultSchema(GenerateJsonSchema):
-    """A schema in which a number may be one that JSON does not know."""
+    """A schema in which a number may be one that JSON does not know, as text."""
 
     def float_schema(self, schema: core_schema.FloatSchema) -> JsonSchemaValue:
         """The schema of a number."""
@@ -67,7 +55,7 @@ class ResultSchema(GenerateJsonSchema):
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
 
     @model_validator(mode="before")
     @classmethod
