@@ -48,23 +48,6 @@ ASSIGNMENT = "timed_publisher"
 REGRADED = 50
 OUTPUT = Path("rosgrade-bench.json")
 _FEW = 3
-_PLAIN_TEST = """
-import signal, subprocess, sys
-import rclpy
-from geometry_msgs.msg import Twist
-
-rclpy.init()
-node = rclpy.create_node("plain_test")
-heard = []
-node.create_subscription(Twist, "/cmd_vel", heard.append, 10)
-program = subprocess.Popen(sys.argv[2:])
-while len(heard) < int(sys.argv[1]):
-    rclpy.spin_once(node, timeout_sec=0.1)
-program.send_signal(signal.SIGINT)
-program.wait()
-rclpy.shutdown()
-"""
-"""What a course without an autograder would write; argv: how many messages, the program."""
 
 Samples = defaultdict[str, list[float]]
 """Figures by their names, one of each kind for every run."""
@@ -129,10 +112,7 @@ def _timed(command: list[str], environment: dict[str, str]) -> tuple[float, floa
 
 
 def _batch(samples: Samples, folder: Path, _: int) -> None:
-    """Classes of one and the same submission, in the sandbox where this machine has one.
-
-    The publisher is run by a plain test program besides, and its recording is judged again.
-    """
+    """Classes of one and the same submission, in the sandbox where this machine has one."""
     sandbox, notice = choose(Choice.AUTO, folder / "batch-cache")
     if notice:
         print(notice, file=sys.stderr)
@@ -168,10 +148,6 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
             regrade(loaded, find(folder / name / "0"))
         rate = 60 * REGRADED / (time.monotonic() - began_s)
         samples[f"regrade of {name}: submissions per minute"].append(rate)
-        if name == ASSIGNMENT:
-            plain_s = median(_plain(samples, prepared) for _ in range(10))
-            times = count / wall_s * plain_s
-            samples[f"batch of {name}: times the plain test program's rate"].append(times)
 
 
 def _grade_into(grading: Grading, prepared: Prepared, folder: Path, number: int) -> Iterable[str]:
@@ -211,27 +187,6 @@ def _cell(samples: Samples, folder: Path, _: int) -> None:
                 taken_s.append(runner.cpu_s - before_s)
         # The first run also pays for what the prefork server imports.
         samples[f"cell with a robot {what}: share of a core"].append((taken_s[2] - taken_s[1]) / 10)
-
-
-def _plain(samples: Samples, prepared: Prepared) -> float:
-    """Start the student's program, wait for what the assignment waits for, and stop it.
-
-    Returns:
-        Wall time in seconds.
-    """
-    found = ros.find()
-    (until,) = (one.until for one in load_assignment(ASSIGNMENT).assignment.scenarios)
-    assert prepared.install is not None
-    (program,) = prepared.install.glob("lib/bot_publisher/bot_pub")
-    with lock_domain() as domain:
-        environment = found.environment(os.environ, (prepared.install,))
-        environment["ROS_DOMAIN_ID"] = str(domain.domain_id)
-        wall_s, cpu_s = _timed(
-            [str(found.python), "-c", _PLAIN_TEST, str(until.messages), str(program)], environment
-        )
-    samples["plain test program: wall"].append(wall_s)
-    samples["plain test program: CPU"].append(cpu_s)
-    return wall_s
 
 
 def _simulator(samples: Samples, folder: Path, _: int) -> None:

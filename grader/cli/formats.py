@@ -1,6 +1,6 @@
 """The formats that ``check`` and ``report`` write beside the report, by their options.
 
-A module of :mod:`grader.report.formats` with a function ``render(result, options)`` is a format.
+A module of :mod:`grader.report.formats` with a function ``render(result)`` is a format.
 Its option is its name, and the first line of its docstring is the help.
 """
 
@@ -25,7 +25,6 @@ import typer
 
 from grader.cli.options import file_option
 from grader.report import formats
-from grader.report.formats.options import FormatOptions
 
 if TYPE_CHECKING:
     from grader.report.model.result_model import Result
@@ -147,10 +146,13 @@ class Formats:
         """Write everything that was asked for."""
         from grader.report.files import write_whole
 
-        options = FormatOptions(self.junit_family is JunitFamily.XUNIT1, self.gradescope_metadata)
+        own: dict[str, dict[str, Any]] = {
+            "junit": {"xunit1": self.junit_family is JunitFamily.XUNIT1},
+            "gradescope": {"metadata": self.gradescope_metadata},
+        }
         for name, file in self.files.items():
             module = import_module(f"{formats.__name__}.{name}")
-            write_whole(file, module.render(result, options))
+            write_whole(file, module.render(result, **own.get(name, {})))
         if self.github:
             _tell_github(result, submission, os.environ)
         if self.classroom50:

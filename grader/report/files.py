@@ -1,4 +1,4 @@
-"""Files and new folders, written whole or not at all."""
+"""Files, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ import hashlib
 import os
 import re
 import secrets
-import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from urllib.parse import quote
@@ -167,30 +166,3 @@ def _why(file: Path, error: OSError) -> str:
         return "it is a folder; give a file"
     other = _in_the_way(file.parent) if error.errno in (errno.ENOTDIR, errno.EEXIST) else None
     return f"{other} is not a folder" if other else error.strerror or str(error)
-
-
-def write_folders(place: Path, files: Mapping[str, str]) -> None:
-    """Write new folders full of files under a temporary name, then move them into place.
-
-    Args:
-        place: Where the folders go; made where it is missing.
-        files: Contents by path, with forward slashes; the first part of each is a folder that
-            is not there yet.
-    """
-    check_folder(place)
-    draft = place / f".rosgrade-{secrets.token_hex(4)}"
-    try:
-        try:
-            for path, content in files.items():
-                file = draft / path
-                file.parent.mkdir(parents=True, exist_ok=True)
-                file.write_text(content, encoding="utf-8")
-            for folder in sorted(draft.iterdir()):
-                # Onto an empty folder a rename would succeed.
-                (place / folder.name).mkdir()
-                folder.rename(place / folder.name)
-        finally:
-            shutil.rmtree(draft, ignore_errors=True)
-    except OSError as error:
-        refusal = UsageError(f"{error.filename2 or error.filename}: {error.strerror}")
-        raise machine_fault(error) or refusal from error

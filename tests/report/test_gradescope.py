@@ -10,7 +10,6 @@ from grader.errors import UsageError
 from grader.findings.finding import Finding
 from grader.recording.event import Breach
 from grader.report.formats.gradescope import read_metadata, render, unfinished
-from grader.report.formats.options import FormatOptions
 from tests.assignment.validator import valid
 from tests.grade.sample import Told
 from tests.report.sample import (
@@ -63,7 +62,7 @@ SCHEMA = obj(
 
 
 def rendered(make, **options):
-    return json.loads(render(make().result, FormatOptions(**options)))
+    return json.loads(render(make().result, **options))
 
 
 @pytest.mark.parametrize(
@@ -169,7 +168,7 @@ def test_lateness_is_counted_from_the_submission_and_never_from_now(
     metadata = {"created_at": created, "assignment": {"due_date": due}, "users": users}
     file = tmp_path / "submission_metadata.json"
     file.write_text(json.dumps(metadata))
-    extra = rendered(full_points, gradescope_metadata=file)["extra_data"]
+    extra = rendered(full_points, metadata=file)["extra_data"]
     assert extra["late_s"] == late and extra["created_at"][:10] == created[:10]
 
 

@@ -13,7 +13,6 @@ import xmlschema
 
 from grader.findings.finding import Finding
 from grader.report.formats.junit import render
-from grader.report.formats.options import FormatOptions
 from tests.grade.sample import FAIL, Told
 from tests.report.sample import (
     everywhere,
@@ -42,7 +41,7 @@ def jenkins() -> xmlschema.XMLSchema:
 
 
 def rendered(make, **options):
-    return render(make().result, FormatOptions(**options))
+    return render(make().result, **options)
 
 
 def cases_of(text):

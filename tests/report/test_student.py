@@ -18,7 +18,6 @@ from grader.report.formats import classroom50, github, gradescope, junit
 from grader.report.formats.foxglove import render_layout
 from grader.report.formats.gradebook import grades_csv
 from grader.report.formats.markdown import render_markdown
-from grader.report.formats.options import FormatOptions
 from grader.report.html.report import render_report
 from grader.report.model.class_row import ClassRow
 from grader.report.model.result import result_json
@@ -115,7 +114,7 @@ def formats_of(result):
     """Every text that is made for students from a whole result."""
     copy = for_student(result)
     yield result_json(copy)
-    yield junit.render(copy, FormatOptions(xunit1=True))
+    yield junit.render(copy, xunit1=True)
     yield render_markdown(copy)
     yield grades_csv([ClassRow(copy.submission.id, result=copy)])
     yield from github.annotation_lines(result)

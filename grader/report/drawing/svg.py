@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
 
 from markupsafe import Markup, escape
 
@@ -154,11 +153,6 @@ def fitted(text: str, width: float) -> str:
         return text
     head = (room - 1) // 2
     return f"{text[:head]}…{text[len(text) - (room - 1 - head) :]}"
-
-
-@cache
-def _name(name: str) -> str:
-    return name.rstrip("_").replace("_", "-")
 
 
 def _pixel(value: float) -> str:

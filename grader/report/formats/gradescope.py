@@ -17,7 +17,6 @@ from pydantic import AwareDatetime, BaseModel, ValidationError
 from grader.errors import UsageError
 from grader.findings.finding import Status
 from grader.report.formats import markdown
-from grader.report.formats.options import DEFAULTS, FormatOptions
 from grader.report.model.result import read_json
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
@@ -50,8 +49,12 @@ def unfinished() -> str:
     )
 
 
-def render(result: Result, options: FormatOptions = DEFAULTS) -> str:
-    """The whole file."""
+def render(result: Result, *, metadata: Path | None = None) -> str:
+    """The whole file.
+
+    Args:
+        metadata: Gradescope's ``submission_metadata.json``, or None.
+    """
     copy = for_student(result)
     extra: dict[str, Any] = {
         "graded": result.graded,
@@ -61,10 +64,9 @@ def render(result: Result, options: FormatOptions = DEFAULTS) -> str:
         # Whether there is one is up to Gradescope's container, and staff see it nowhere else.
         "sandbox": result.environment.get("sandbox"),
     }
-    if options.gradescope_metadata is not None:
-        metadata = read_metadata(options.gradescope_metadata)
-        extra["created_at"] = metadata.created_at.isoformat()
-        extra["late_s"] = metadata.late_s
+    if metadata is not None:
+        times = read_metadata(metadata)
+        extra |= {"created_at": times.created_at.isoformat(), "late_s": times.late_s}
     return _json(
         {
             "score": result.known_score if result.known_score is not None else 0,

@@ -15,7 +15,6 @@ import re
 from collections import Counter
 
 from grader.findings.finding import Status
-from grader.report.formats.options import DEFAULTS, FormatOptions
 from grader.report.html.page import environment
 from grader.report.model.result_model import Result
 from grader.report.text import additions, explanation
@@ -25,8 +24,8 @@ _ENDINGS = {Status.FAILED: "failure", Status.ERROR: "error", Status.SKIPPED: "sk
 _TYPES = {"failure": "check", "error": "grader", "skipped": "requirement"}
 
 
-def render(result: Result, options: FormatOptions = DEFAULTS) -> str:
-    """The whole file."""
+def render(result: Result, *, xunit1: bool = False) -> str:
+    """The whole file, in the dialect xunit2 or xunit1."""
     shown = explanation.only_shown(result)
     elements = {
         check.id: "skipped" if check.id in shown else _ENDINGS[check.status]
@@ -45,7 +44,7 @@ def render(result: Result, options: FormatOptions = DEFAULTS) -> str:
         types=_TYPES,
         timestamp=timestamp[0] if timestamp else "",
         properties=_properties(result),
-        xunit1=int(options.xunit1),
+        xunit1=int(xunit1),
         notes=[
             *(line for kind in notes for line in (f"{kind.title}:", *kind.lines)),
             *map(additions.comment_line, result.comments),

@@ -12,7 +12,6 @@ import re
 from collections.abc import Iterator
 
 from grader.findings.finding import Status
-from grader.report.formats.options import FormatOptions
 from grader.report.model.excerpt import places
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
@@ -34,7 +33,7 @@ _CELL_BAR = "\\|"
 _MORE = "… the rest is in the report.\n"
 
 
-def render(result: Result, options: FormatOptions) -> str:
+def render(result: Result) -> str:
     """The whole file, short enough for a comment."""
     return render_markdown(for_student(result), COMMENT_BYTES)
 
