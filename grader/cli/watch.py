@@ -169,6 +169,7 @@ class _Work:
 
     def tell_early(self, record: SubmissionRecord, recordings: Mapping[str, Recording]) -> None:
         """Tell what is certain already: lines that Python cannot read, and what failed last."""
+        from grader.findings.finding import Status
         from grader.grade.early import judge_early
         from grader.report.text.last_save import early_line
 
@@ -177,7 +178,8 @@ class _Work:
             errors = (error for package in record.packages for error in package.syntax_errors)
             known += (f"{error}{self._line(error)}" for error in errors)
         elif self.before is not None and len(recordings) < len(self.loaded.assignment.scenarios):
-            judged = judge_early(self.loaded, record, recordings, self.before.reasons)
+            failed = {check.id for check in self.before.of(Status.FAILED)}
+            judged = judge_early(self.loaded, record, recordings, failed)
             known += map(early_line, judged)
         for text in known:
             if text not in self.page.state.early:

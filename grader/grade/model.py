@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
 from typing import Any
@@ -65,12 +65,6 @@ class CheckResult:
             key=lambda item: abs(item.finding.credit - self.credit),
         )
 
-    @property
-    def reason(self) -> Hashable:
-        """Why it did not pass: equal for checks that name the same mistake."""
-        finding = self.decisive.finding
-        return reason(self.id, self.decisive.scenario, finding.observed, finding.evidence)
-
 
 @dataclass(frozen=True)
 class Grade:
@@ -119,16 +113,6 @@ class Grade:
                 return result
         raise KeyError(check)
 
-    def first_to_fix(self) -> CheckResult | None:
-        """The failed check on which most others depend, or None where none needs a correction."""
-        reasons = {result.id: result.reason for result in self.of(Status.FAILED)}
-        first = first_to_fix(
-            reasons,
-            [result.waits_for for result in self.results],
-            [result.id for result in self.results if not result.max_points],
-        )
-        return self.result(first) if first is not None else None
-
     @property
     def remaps(self) -> dict[str, frozenset[str]]:
         """Rules that put wrong names right, by the scenario that needs them.
@@ -170,50 +154,6 @@ class Grade:
         )
 
 
-def reason(check: str, scenario: str | None, observed: str, evidence: Any) -> Hashable:
-    """Why a check failed: equal for those that name the same mistake.
-
-    That is the same line of the student's code, in any run, or the same text about the same
-    moment of a run. A finding that names neither, or only a file, is a mistake of its own.
-
-    Args:
-        evidence: Of a finding, or of a result that was read from a file.
-    """
-    if evidence.places and all(one.line is not None for one in evidence.places):
-        return tuple((one.file, one.line, one.message) for one in evidence.places)
-    if evidence.moments:
-        return scenario, observed, tuple(moment.time_s for moment in evidence.moments)
-    return check
-
-
-def first_to_fix(
-    reasons: Mapping[str, Hashable],
-    waits: Sequence[Sequence[str]],
-    without_points: Collection[str] = (),
-) -> str | None:
-    """Find the failed check on which most others depend; of equals, the author's first.
-
-    A node that crashed does not stay alive, and has no publisher either: of checks that failed
-    for the same reason the first stands for all, with the checks that wait for any of them. A
-    check without points that no other check waits for need not be corrected.
-
-    Args:
-        reasons: Why each check failed, in the author's order; for the same reason, equal.
-        waits: Of every check the failed ones that it waits for.
-        without_points: Checks that are worth none.
-
-    Returns:
-        The check, or None where none failed that needs a correction.
-    """
-
-    def others(check: str) -> int:
-        same = {name for name, reason in reasons.items() if reason == reasons[check]}
-        return len(same) - 1 + sum(not same.isdisjoint(one) for one in waits)
-
-    shown = only_shown(without_points, waits)
-    return max((check for check in reasons if check not in shown), key=others, default=None)
-
-
 def every_point_judged(checks: Iterable[Any]) -> bool:
     """Whether no check with points ended as an error, or waits for one that did."""
     checks = tuple(checks)
@@ -221,11 +161,6 @@ def every_point_judged(checks: Iterable[Any]) -> bool:
     return not any(
         check.max_points and not errors.isdisjoint((check.id, *check.waits_for)) for check in checks
     )
-
-
-def only_shown(without_points: Collection[str], waits: Iterable[Sequence[str]]) -> frozenset[str]:
-    """Those of the checks without points that nothing else waits for."""
-    return frozenset(without_points).difference(*waits)
 
 
 def points_for(max_points: float, credit: float) -> float:

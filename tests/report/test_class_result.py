@@ -9,6 +9,7 @@ from grader.findings.finding import Evidence
 from grader.report.formats.gradebook import grades_csv
 from grader.report.html.overview import render_overview
 from grader.report.model.class_result import for_class
+from grader.report.model.mistakes import reasons
 from grader.report.model.result import result_json
 from grader.report.model.result_model import Result
 from tests.report.classroom import classroom
@@ -20,8 +21,8 @@ def test_overview_and_gradebook_are_those_of_the_whole_results() -> None:
     kept = [replace(row, result=row.result and for_class(row.result)) for row in rows]
     assert render_overview(kept) == render_overview(rows)
     assert grades_csv(kept) == grades_csv(rows)
-    assert [one.result and one.result.reasons for one in kept] == [
-        one.result and one.result.reasons for one in rows
+    assert [one.result and reasons(one.result.checks) for one in kept] == [
+        one.result and reasons(one.result.checks) for one in rows
     ]
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from grader.findings.finding import Status
 from grader.report.formats.markdown import render_markdown
 from grader.report.model.excerpt import places
+from grader.report.model.mistakes import only_shown
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
 from grader.report.text import explanation
@@ -42,7 +43,7 @@ def annotation_lines(result: Result, prefix: str | None = "") -> tuple[str, ...]
         return (command("warning", explanation.headline(copy), title="Not graded"),)
     failed = [check for check in copy.checks if check.status is Status.FAILED]
     failed.sort(key=lambda check: (check.id != copy.first_to_fix, check.points - check.max_points))
-    shown = explanation.only_shown(copy)
+    shown = only_shown(copy.checks)
     return tuple(
         _annotation(check, copy, "notice" if check.id in shown else "error", prefix)
         for check in failed[:MOST_ANNOTATIONS]

@@ -16,6 +16,7 @@ from collections import Counter
 
 from grader.findings.finding import Status
 from grader.report.html.page import environment
+from grader.report.model.mistakes import only_shown
 from grader.report.model.result_model import Result
 from grader.report.text import additions, explanation
 from grader.report.text.words import number
@@ -26,7 +27,7 @@ _TYPES = {"failure": "check", "error": "grader", "skipped": "requirement"}
 
 def render(result: Result, *, xunit1: bool = False) -> str:
     """The whole file, in the dialect xunit2 or xunit1."""
-    shown = explanation.only_shown(result)
+    shown = only_shown(result.checks)
     elements = {
         check.id: "skipped" if check.id in shown else _ENDINGS[check.status]
         for check in result.checks

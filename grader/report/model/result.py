@@ -15,6 +15,7 @@ from grader.grade.model import CheckResult, Grade, ScenarioFinding
 from grader.recording.model import NS, Recording
 from grader.report.model import result_model as model
 from grader.report.model.facts import RunFacts
+from grader.report.model.mistakes import first_to_fix
 from grader.report.model.remarks import remarks
 from grader.report.model.result_model import SCHEMA, Result
 
@@ -25,7 +26,7 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
     Args:
         recordings: By scenario id; may lack scenarios that were not run.
     """
-    first = grade.first_to_fix()
+    checks = tuple(map(_check, grade.results))
     submission = grade.submission
     return Result(
         schema_=SCHEMA,
@@ -41,8 +42,8 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
         score=grade.score if grade.graded else None,
         max_score=grade.max_score,
         graded=grade.graded,
-        first_to_fix=first.id if first else None,
-        checks=tuple(map(_check, grade.results)),
+        first_to_fix=first_to_fix(checks),
+        checks=checks,
         withheld=model.WithheldPart(checks=grade.withheld.checks, points=grade.withheld.points),
         scenarios=tuple(
             _scenario(recordings[scenario.id], facts)

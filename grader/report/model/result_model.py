@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from typing import Any, Literal
@@ -19,7 +18,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from grader.findings.finding import Evidence, Status
-from grader.grade.model import reason, total
+from grader.grade.model import total
 from grader.safe_text import encodable
 from grader.submission.record import BuildRecord
 
@@ -273,11 +272,3 @@ class Result(_Part):
     def of(self, status: Status) -> tuple[CheckPart, ...]:
         """Checks that ended so, in the author's order."""
         return tuple(check for check in self.checks if check.status is status)
-
-    @property
-    def reasons(self) -> dict[str, Hashable]:
-        """Why each failed check failed, by id: equal for those that name the same mistake."""
-        return {
-            check.id: reason(check.id, check.scenario, check.observed, check.evidence)
-            for check in self.of(Status.FAILED)
-        }

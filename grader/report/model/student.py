@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from grader.assignment.model import Visibility
-from grader.grade.model import every_point_judged, first_to_fix, total
+from grader.grade.model import every_point_judged, total
+from grader.report.model.mistakes import first_to_fix
 from grader.report.model.result_model import AdjustmentPart, CheckPart, Result, WithheldPart
 
 VISIBLE_ONLY = frozenset({Visibility.VISIBLE.value})
@@ -33,6 +34,7 @@ def for_student(result: Result, shown: frozenset[str] = VISIBLE_ONLY) -> Result:
             "score": total(check.points for check in visible) if graded else None,
             "max_score": total(check.max_points for check in visible),
             "graded": graded,
+            "first_to_fix": first_to_fix(visible),
             "checks": tuple(map(_without_traceback, visible)),
             "withheld": WithheldPart(
                 checks=result.withheld.checks + len(hidden),
@@ -48,11 +50,7 @@ def for_student(result: Result, shown: frozenset[str] = VISIBLE_ONLY) -> Result:
         }
     )
     adjustments = (_as_visible(one, copy) for one in copy.adjustments)
-    copy = copy.model_copy(update={"adjustments": tuple(adjustments)})
-    waits = [check.waits_for for check in visible]
-    unpaid = [check.id for check in visible if not check.max_points]
-    first = first_to_fix(copy.reasons, waits, unpaid)
-    return copy.model_copy(update={"first_to_fix": first})
+    return copy.model_copy(update={"adjustments": tuple(adjustments)})
 
 
 def _as_visible(one: AdjustmentPart, copy: Result) -> AdjustmentPart:

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from grader.findings.finding import Status
 from grader.findings.wording import counted, listing
-from grader.grade import model as grades
 from grader.grade.model import total
 from grader.report.model.excerpt import places as places_of
+from grader.report.model.mistakes import others, reasons
 from grader.report.model.result_model import CheckPart, FindingPart, Result
 from grader.report.text import additions
 from grader.report.text.words import ADVICE, counted_points, cut, number
@@ -126,11 +126,9 @@ def points_waiting(check: CheckPart, result: Result) -> str:
 
 def waiting(result: Result, check: CheckPart) -> str:
     """How many other checks a failed one keeps from passing, or nothing."""
-    reasons = result.reasons
-    same = {name for name, reason in reasons.items() if reason == reasons[check.id]}
-    count = len(same) - 1 + sum(not same.isdisjoint(one.waits_for) for one in result.checks)
-    if len(same) > 1:
-        return f"{counted(count, 'other check')} did not pass for the same reason."
+    same, count = others(check.id, result.checks)
+    if same:
+        return f"{counted(same + count, 'other check')} did not pass for the same reason."
     verb = "waits" if count == 1 else "wait"
     return f"{counted(count, 'other check')} {verb} for it." if count else ""
 
@@ -138,19 +136,9 @@ def waiting(result: Result, check: CheckPart) -> str:
 def same_as(result: Result) -> dict[str, CheckPart]:
     """Failed checks that name the same mistake as one before them, by id: the first that does."""
     first: dict[Hashable, str] = {}
-    reasons = {name: first.setdefault(reason, name) for name, reason in result.reasons.items()}
+    found = {name: first.setdefault(why, name) for name, why in reasons(result.checks).items()}
     checks = {check.id: check for check in result.checks}
-    return {name: checks[other] for name, other in reasons.items() if name != other}
-
-
-def only_shown(result: Result) -> frozenset[str]:
-    """Ids of the checks without points that did not pass, and that nothing else waits for."""
-    mild = [
-        check.id
-        for check in result.checks
-        if check.status in (Status.FAILED, Status.ERROR) and not check.max_points
-    ]
-    return grades.only_shown(mild, (check.waits_for for check in result.checks))
+    return {name: checks[other] for name, other in found.items() if name != other}
 
 
 def score(result: Result) -> str:
