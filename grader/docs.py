@@ -34,6 +34,7 @@ from grader.recording import event, interaction, simulated
 from grader.recording import model as recording
 from grader.report.concepts import concepts
 from grader.spec.unit import UNITS, Dimension, format_duration
+from grader.starter import rendered
 from sim import description, world_model
 from sim.motion import Pose
 
@@ -202,17 +203,7 @@ def recording_markdown() -> str:
 
 
 def _rendered(name: str, **values: Any) -> str:
-    # Imported late: `rosgrade checks` shows one check without it.
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(resources.templates() / "docs"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template(f"{name}.j2").render(values, made=_MADE, table=_table)
+    return rendered(f"docs/{name}", **values, made=_MADE, table=_table)
 
 
 def _sentence(symptom: type[Any]) -> str:
