@@ -26,8 +26,8 @@ VENV = ".venv"
 STAMP = "rosgrade-setup.json"
 
 # ROS's extensions are built against the system's numpy 1, which numpy 2 breaks, and its message
-# generators are written for the system's empy.
-_FROM_SYSTEM = {"numpy", "empy"}
+# generators are written for the system's empy and lark.
+_FROM_SYSTEM = {"numpy", "empy", "lark-parser"}
 # One package of the lock has no wheel and is built by these, so they are installed before it.
 _BUILD_TOOLS = {"setuptools"}
 
@@ -116,21 +116,15 @@ def read_lock(lock_text: str) -> List[Locked]:
 def requirements(lock_text: str, plan: Plan) -> str:
     """Return the part of the lock that is installed under this plan.
 
-    With the system's ROS that is all but the ROS wheels, what only they need, and what ROS was
-    built against.
+    With the system's ROS that is all but the ROS wheels and what the system's ROS was made for.
     """
     entries = read_lock(lock_text)
     if plan.ros == "system":
-        # A package that has an entry for each of several Pythons has its parents in any of them.
-        parents: Dict[str, Set[str]] = {}
-        for entry in entries:
-            parents.setdefault(entry.name, set()).update(entry.parents)
-        dropped = {name for name in parents if name.startswith("ros-") or name in _FROM_SYSTEM}
-        before = 0
-        while len(dropped) > before:
-            before = len(dropped)
-            dropped |= {name for name, whose in parents.items() if whose and whose <= dropped}
-        entries = [entry for entry in entries if entry.name not in dropped]
+        entries = [
+            entry
+            for entry in entries
+            if not entry.name.startswith("ros-") and entry.name not in _FROM_SYSTEM
+        ]
     return "".join(entry.text for entry in entries)
 
 

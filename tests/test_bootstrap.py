@@ -32,9 +32,6 @@ empy==4.2 \\
 lark-parser==0.12 \\
     --hash=sha256:cc
     # via ros-rosidl-parser
-needed-by-lark==1.0 \\
-    --hash=sha256:dd
-    # via lark-parser
 numpy==2.2 ; python_full_version < '3.11' \\
     --hash=sha256:ee
     # via

@@ -8,6 +8,7 @@ every script and style but its own, which it names by their hashes.
 from __future__ import annotations
 
 import contextlib
+import os
 from base64 import b64encode
 from functools import cache
 from hashlib import sha256
@@ -88,24 +89,15 @@ def environment() -> Environment:
 
 
 def compiled_templates(folder: Path) -> FileSystemBytecodeCache | None:
-    """A folder that keeps compiled templates from one start to the next.
+    """A folder that keeps compiled templates from one start to the next, for its owner alone.
 
-    Only its owner may look into it. None where it cannot be made: then each start compiles.
+    None where nothing can be written: then each start compiles.
     """
     from jinja2 import FileSystemBytecodeCache
-    from jinja2.bccache import Bucket
 
-    class CompiledTemplates(FileSystemBytecodeCache):
-        def dump_bytecode(self, bucket: Bucket) -> None:
-            # The disk may be full, or the folder not writable.
-            with contextlib.suppress(OSError):
-                super().dump_bytecode(bucket)
-
-    try:
+    with contextlib.suppress(OSError):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    except OSError:
-        return None
-    return CompiledTemplates(str(folder))
+    return FileSystemBytecodeCache(str(folder)) if os.access(folder, os.W_OK) else None
 
 
 def _cleaned(value: Any) -> Any:
