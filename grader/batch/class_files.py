@@ -19,9 +19,9 @@ from grader.report.formats.gradebook import grades_csv
 from grader.report.html.overview import render_overview
 from grader.report.model.class_result import for_class
 from grader.report.model.class_row import ClassRow
+from grader.report.model.cluster import clusters
 from grader.report.model.result import read_result
 from grader.report.model.result_model import Result
-from grader.review.cluster import clusters
 from grader.review.store import ReviewStore
 from grader.safe_text import one_line
 
@@ -116,7 +116,7 @@ def write_overview(done: Sequence[Done], ledger: Ledger) -> Path:
     rows = class_rows(done, ledger)
     overview = ledger.out / OVERVIEW_FILE
     store = ReviewStore(ledger.out)
-    found = clusters(rows, store.of_class().content)
+    found = clusters(rows, store.of_class().content.shares)
     vanished = store.vanished({item.entry.review_key for item in done})
     pages = sorted(file.name for file in (ledger.out / INSTRUCTOR_FOLDER).glob("*.html"))
     write_whole(overview, render_overview(rows, found, vanished, pages))

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from grader.errors import UsageError
 from grader.findings.finding import Status
 from grader.grade.model import points_for, total
+from grader.report.model.cause import cause
 from grader.report.model.result_model import AdjustmentPart, CommentPart, Result
-from grader.review.cause import cause
 from grader.review.model import ClassReview, ManualScore, StudentReview
 
 

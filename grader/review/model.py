@@ -61,3 +61,8 @@ class ClassReview(Model):
 
     bank: tuple[BankEntry, ...] = Field((), description="The bank of comments.")
     forgiven: tuple[Forgiven, ...] = ()
+
+    @property
+    def shares(self) -> dict[tuple[str, str], float]:
+        """Check and cause of each cluster that is forgiven -> share of the lost points."""
+        return {(one.check, one.cause): one.share for one in self.forgiven}

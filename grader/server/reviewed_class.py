@@ -16,8 +16,8 @@ from grader.batch.regrading import load_used
 from grader.errors import RosgradeError, UsageError
 from grader.report.files import file_version, folder_name
 from grader.report.model.class_row import ClassRow
+from grader.report.model.cluster import Cluster, clusters
 from grader.report.model.result_model import AdjustmentPart
-from grader.review.cluster import Cluster, clusters
 from grader.review.model import StudentReview
 from grader.review.store import ReviewStore, Saved
 from grader.submission.kept_source import SOURCE_FOLDER, KeptSource, read_source
@@ -95,7 +95,7 @@ class ReviewedClass:
 
     def clusters(self) -> tuple[Cluster, ...]:
         """Failures with the same cause."""
-        return clusters([row.row for row in self.rows()], self.store.of_class().content)
+        return clusters([row.row for row in self.rows()], self.store.of_class().content.shares)
 
     def source(self, row: ReviewedRow) -> KeptSource:
         """What was handed in, as far as it is text and was kept."""

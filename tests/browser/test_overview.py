@@ -8,7 +8,7 @@ import pytest
 
 from grader.report.html.overview import MOST_SHOWN, render_overview
 from grader.report.model.class_row import ClassRow
-from grader.review.cluster import clusters
+from grader.report.model.cluster import clusters
 from tests.browser.test_report import violations
 from tests.report.classroom import classroom
 from tests.report.sample import full_points, reviewed

@@ -18,9 +18,9 @@ from grader.batch.ledger import Entry, Ledger
 from grader.grade import grade
 from grader.recording.mcap_writer import write_recording
 from grader.recording.model import to_json
+from grader.report.model.cause import cause
 from grader.report.model.facts import Clock
 from grader.report.model.result import read_result
-from grader.review.cause import cause
 from grader.review.model import ClassReview, Comment, Forgiven, ManualScore, StudentReview
 from grader.review.store import ReviewStore
 from grader.submission.prepare import Prepared

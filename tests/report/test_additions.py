@@ -14,7 +14,7 @@ from grader.report.formats.gradebook import canvas_csv, grades_csv, read_canvas
 from grader.report.formats.markdown import render_markdown
 from grader.report.html.overview import render_overview
 from grader.report.model.class_row import ClassRow
-from grader.review.cluster import clusters
+from grader.report.model.cluster import clusters
 from tests.report.sample import full_points, lost_points, reviewed
 
 LINES = (

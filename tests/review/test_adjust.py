@@ -6,12 +6,12 @@ import pytest
 
 from grader.errors import UsageError
 from grader.findings.finding import Finding
+from grader.report.model.cause import cause
 from grader.report.model.class_row import ClassRow, RowStatus
 from grader.report.model.result import result_json
 from grader.report.model.result_model import AdjustmentPart, Result
 from grader.report.model.student import for_student
 from grader.review.adjust import adjusted
-from grader.review.cause import cause
 from grader.review.model import ClassReview, Comment, Forgiven, ManualScore, StudentReview
 from tests.grade.sample import Told
 from tests.report.sample import judged

@@ -9,18 +9,15 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import fmean, median
-from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from grader.findings.finding import Status
 from grader.report.drawing.distribution import draw_distribution
 from grader.report.html.page import render_page
 from grader.report.model.class_row import ClassRow, RowStatus
+from grader.report.model.cluster import Cluster
 from grader.report.model.result_model import ScenarioPart
 from grader.safe_text import one_line
-
-if TYPE_CHECKING:
-    from grader.review.cluster import Cluster
 
 NO_LINKS: Mapping[str, str] = {}
 MOST_DISTURBED = 50

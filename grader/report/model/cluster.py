@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.findings.finding import Status
 from grader.grade.model import points_for, total
+from grader.report.model.cause import MOST_CHARACTERS, cause
 from grader.report.model.class_row import ClassRow
 from grader.report.model.result_model import CheckPart
 from grader.report.text.words import cut
-from grader.review.cause import MOST_CHARACTERS, cause
-from grader.review.model import ClassReview
 from grader.safe_text import one_line
 
-_NOTHING = ClassReview()
+_NO_SHARES: Mapping[tuple[str, str], float] = {}
 
 
 @dataclass(frozen=True)
@@ -47,14 +46,19 @@ class Cluster:
         return {key: points_for(lost, share) for key, lost in self.lost.items()}
 
 
-def clusters(rows: Sequence[ClassRow], of_class: ClassReview = _NOTHING) -> tuple[Cluster, ...]:
-    """Group the failures of a class by check and cause, the most frequent first."""
+def clusters(
+    rows: Sequence[ClassRow], forgiven: Mapping[tuple[str, str], float] = _NO_SHARES
+) -> tuple[Cluster, ...]:
+    """Group the failures of a class by check and cause, the most frequent first.
+
+    Args:
+        forgiven: Check and cause -> share of the points that is given back.
+    """
     found: dict[tuple[str, str], list[tuple[str, CheckPart]]] = {}
     for row in rows:
         for check in row.judged:
             if check.status is Status.FAILED:
                 found.setdefault((check.id, cause(check)), []).append((row.id, check))
-    shares = {(one.check, one.cause): one.share for one in of_class.forgiven}
     grouped = [
         Cluster(
             name,
@@ -62,7 +66,7 @@ def clusters(rows: Sequence[ClassRow], of_class: ClassReview = _NOTHING) -> tupl
             why,
             cut(one_line(members[0][1].observed), MOST_CHARACTERS),
             {key: total((check.max_points, -check.points)) for key, check in members},
-            shares.get((name, why), 0.0),
+            forgiven.get((name, why), 0.0),
         )
         for (name, why), members in found.items()
     ]

@@ -3,9 +3,9 @@
 import pytest
 
 from grader.findings.finding import Finding
+from grader.report.model.cause import cause
 from grader.report.model.class_row import ClassRow
-from grader.review.cause import cause
-from grader.review.cluster import clusters
+from grader.report.model.cluster import clusters
 from grader.review.model import ClassReview, Forgiven
 from tests.grade.sample import Told
 from tests.report.sample import judged
@@ -90,7 +90,7 @@ def test_a_cluster_names_students_points_and_what_forgiving_gives():
         ClassRow("dee", missing=True),
     ]
     forgiven = Forgiven(check="check", cause="one on `…` instead", share=0.5, by="AB")
-    first, second = clusters(rows, ClassReview(forgiven=(forgiven,)))
+    first, second = clusters(rows, ClassReview(forgiven=(forgiven,)).shares)
     assert (tuple(first.lost), first.cause, first.title) == (
         ("ana", "ben"),
         "one on `…` instead",
