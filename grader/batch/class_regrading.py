@@ -9,7 +9,7 @@ from pathlib import Path
 from grader.assignment.load import LoadedAssignment
 from grader.batch.adjusting import ClassAdjustments
 from grader.batch.batch import Done
-from grader.batch.class_files import GRADES_FILE, NO_RESULT, standing, write_class
+from grader.batch.class_files import GRADES_FILE, NO_RESULT, write_class
 from grader.batch.files import RESULT_FILE, write_graded
 from grader.batch.ledger import Entry, Ledger, keep_earlier
 from grader.batch.regrading import compare, find, refuse_other, regrade
@@ -47,13 +47,12 @@ class Regraded:
 
 
 def regrade_class(
-    loaded: LoadedAssignment, ledger: Ledger, only: Path | None = None, *, write: bool = True
+    loaded: LoadedAssignment, ledger: Ledger, *, write: bool = True
 ) -> Iterator[Regraded]:
     """Judge the rows of a batch with the assignment as it is now.
 
-    A result that changes is kept beside the new one, in ``earlier/``. With the folder of a row's
-    report, only that row is judged, and those with the same submission. With ``write=False``
-    nothing is written: a preview of who gains and who loses.
+    A result that changes is kept beside the new one, in ``earlier/``. With ``write=False`` nothing
+    is written: a preview of who gains and who loses.
     """
     written = ledger.read()
     entries = written.entries
@@ -61,24 +60,17 @@ def regrade_class(
     # What people wrote must be readable before anything is written.
     adjust.vanished()
     refuse_other(ledger.out, written.assignment, loaded)
-    chosen = {
-        entry.original
-        for entry in entries
-        if only is None or ledger.folder(entry.key).name == only.resolve().name
-    }
     for entry in entries:
         before = ledger.result(entry.key)
         if entry.fault:
             yield Regraded(Done(entry, None, fresh=False), None, problem=entry.fault)
-        elif entry.original not in chosen:
-            yield Regraded(standing(ledger, entry), before)
         elif before is not None and entry.sha256 in ("", before.submission.sha256):
             yield _regrade(loaded, ledger, entry, before, adjust, write=write)
         elif entry.sha256:
             yield _not_judged(entry, None, NO_RESULT)
         else:
             yield Regraded(Done(entry, None, fresh=False), None)
-    if only is None and write:
+    if write:
         version = (loaded.assignment.id, loaded.sha256, loaded.location)
         ledger.write(entries, *version, written.course)
 

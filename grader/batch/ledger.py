@@ -127,11 +127,12 @@ class Ledger:
                 shutil.rmtree(self.out / _PARTIAL, ignore_errors=True)
 
     @classmethod
-    def around(cls, report: Path) -> Ledger | None:
-        """The folder of the batch that a report lies in; None for a report of its own."""
-        submissions = report.resolve().parent
-        found = submissions.name == SUBMISSIONS and (submissions.parent / BATCH_FILE).is_file()
-        return cls(submissions.parent) if found else None
+    def around(cls, folder: Path) -> Ledger | None:
+        """The batch that a folder is, or that a report lies in; None for a report of its own."""
+        resolved = folder.resolve()
+        # The report itself or its recordings.
+        near = (resolved, *resolved.parents[1:3])
+        return next((cls(out) for out in near if (out / BATCH_FILE).is_file()), None)
 
     def folder(self, key: str) -> Path:
         """Folder of a row's result."""

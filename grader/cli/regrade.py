@@ -14,10 +14,6 @@ from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from grader.assignment.load import LoadedAssignment
-    from grader.batch.class_regrading import Regraded
     from grader.batch.ledger import Ledger
 
 NOT_GRADED = 3
@@ -37,23 +33,23 @@ def regrade(
 ) -> None:
     """Judge the recordings again with the current YAML. Nothing is run.
 
-    Shows what changed and why, and updates reports and results. For a class, or one submission
-    of it, also updates the gradebook and the overview, and keeps the old results.
+    Shows what changed and why, and updates reports and results. The folder of one submission of
+    a class stands for the class: all of it is judged alike. Then the gradebook and the overview are
+    updated too, and the old results are kept.
     """
-    from grader.batch.ledger import BATCH_FILE
+    from grader.batch.ledger import Ledger
 
-    if (path / BATCH_FILE).is_file():
-        _class(path, assignment, quiet, write=not dry_run)
+    batch = Ledger.around(path) if path.is_dir() else None
+    if batch is not None:
+        _class(batch, assignment, quiet, write=not dry_run)
     else:
         _one(path, assignment, write=not dry_run)
 
 
 def _one(path: Path, assignment: str | None, *, write: bool) -> None:
     from grader.assignment.load import load_assignment
-    from grader.batch.adjusting import ClassAdjustments
     from grader.batch.attempts import with_history
     from grader.batch.files import REPORT_FILE, write_graded
-    from grader.batch.ledger import Ledger
     from grader.batch.regrading import compare, find, refuse_other, stored_assignment
     from grader.batch.regrading import regrade as judge_again
     from grader.report.model.facts import Clock, RunFacts
@@ -61,67 +57,38 @@ def _one(path: Path, assignment: str | None, *, write: bool) -> None:
     from grader.report.text.terminal import print_grade
 
     found = find(path)
-    batch = Ledger.around(found.folder) if found.result is not None else None
-    location = (batch.read().location if batch is not None else None) or found.location
-    name = assignment or stored_assignment(path, found.assignment, location, "regrade", str(path))
-    loaded = load_assignment(name)
+    words = ("regrade", str(path))
+    loaded = load_assignment(
+        assignment or stored_assignment(path, found.assignment, found.location, *words)
+    )
     if found.result is not None:
         refuse_other(found.folder, found.result.assignment.id, loaded)
     clock = Clock()
     graded = judge_again(loaded, found)
     say(f"Assignment: {loaded.file}")
     result = make_result(graded.grade, graded.recordings, RunFacts(clock.started, clock.elapsed_s))
-    if batch is not None:
-        result = ClassAdjustments(batch)(result)
     print_grade(output_console(), loaded.assignment.title, result)
     if found.result is not None:
         for line in compare(found.result, graded.grade) or ["no check changed"]:
             say(line)
         if not write:
             say(NOTHING_WRITTEN)
-        elif batch is not None:
-            _in_class(batch, loaded, found.folder)
         else:
             history = partial(with_history, found.folder)
             write_graded(graded, found.folder, clock, amended=history)
-        if write:
             say(f"Report: {found.folder / REPORT_FILE}")
     grade = graded.grade
     raise typer.Exit(NOT_GRADED if not grade.graded else 0 if grade.full_points else 1)
 
 
-def _in_class(batch: Ledger, loaded: LoadedAssignment, folder: Path) -> None:
-    from grader.batch.class_regrading import regrade_class
-    from grader.batch.regrading import regrade_command
-
-    with batch.opened() as ledger:
-        rows = list(regrade_class(loaded, ledger, folder))
-        _write(ledger, rows)
-    results = [row.done.result for row in rows if row.done.result is not None]
-    others = sum(one.assignment.sha256 != loaded.sha256 for one in results)
-    if others:
-        say(
-            f"{others} of the class are still graded with another version of the assignment: "
-            f"{regrade_command(batch.out, loaded)} judges all of them"
-        )
-
-
-def _write(ledger: Ledger, rows: Sequence[Regraded]) -> None:
+def _class(batch: Ledger, assignment: str | None, quiet: bool, *, write: bool) -> None:
     from grader.batch.class_files import GRADES_FILE
-    from grader.batch.class_regrading import write_regraded
-
-    say(f"Overview: {write_regraded(rows, ledger)}")
-    say(f"Grades: {ledger.out / GRADES_FILE}")
-
-
-def _class(path: Path, assignment: str | None, quiet: bool, *, write: bool) -> None:
-    from grader.batch.class_regrading import regrade_class
-    from grader.batch.ledger import Ledger
+    from grader.batch.class_regrading import regrade_class, write_regraded
     from grader.batch.regrading import load_used
 
     began_s = time.monotonic()
     rows = []
-    with Ledger(path).opened() as ledger:
+    with batch.opened() as ledger:
         loaded = load_used(ledger, assignment)
         say(f"Assignment: {loaded.file}")
         with Progress(quiet).shown() as progress:
@@ -134,7 +101,8 @@ def _class(path: Path, assignment: str | None, quiet: bool, *, write: bool) -> N
             for change in (*row.changes, *problem):
                 say(f"{row.done.entry.key}: {change}")
         if write:
-            _write(ledger, rows)
+            say(f"Overview: {write_regraded(rows, ledger)}")
+            say(f"Grades: {ledger.out / GRADES_FILE}")
         else:
             say(NOTHING_WRITTEN)
     gain = [row for row in rows if row.gained > 0]

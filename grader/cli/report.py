@@ -39,7 +39,7 @@ def report(
     from grader.batch.class_files import find_reports, standing, write_class
     from grader.batch.files import REPORT_FILE, RESULT_FILE
     from grader.batch.grading import RECORDINGS_FOLDER
-    from grader.batch.ledger import BATCH_FILE, Ledger
+    from grader.batch.ledger import Ledger
     from grader.batch.rendering import bring_up_to_date, render_again
     from grader.errors import UsageError
     from grader.report.files import refuse_inputs
@@ -51,7 +51,7 @@ def report(
             f"{out} has {len(folders)} reports, and a file of such a format holds one: "
             "give the folder of one report"
         )
-    ledger = Ledger(out) if (out / BATCH_FILE).is_file() else Ledger.around(folders[0])
+    ledger = Ledger.around(out)
     adjust = ClassAdjustments(ledger) if ledger is not None else None
     for key in adjust.vanished() if adjust is not None else ():
         print_warning(f"the review of {key} stays, but the class has no such student")
