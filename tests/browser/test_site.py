@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -108,6 +109,28 @@ def test_a_copy_button_copies_the_commands_and_nothing_else(page: Page) -> None:
     assert copied("2 of 3 graded") == (
         "rosgrade batch timed_publisher submissions/ --roster roster.csv --out results"
     )
+    page.goto("tutorial/")
+    assert copied("✗ failed").splitlines()[-1] == "rosgrade check battery_monitor ana --quiet"
+
+
+def test_a_part_of_a_name_is_found(page: Page) -> None:
+    page.goto("students/")
+    page.keyboard.press("/")
+    page.keyboard.type("overshoot")
+    expect(page.locator(".md-search-result")).to_contain_text("motion.overshoot")
+    assert Axe().run(page).response["violations"] == []
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("Enter")
+    expect(page).to_have_url(re.compile("/checks/motion/"))
+
+
+def test_next_leads_through_every_page(page: Page, site: Path) -> None:
+    page.goto(".")
+    seen = 1
+    while page.get_by_role("link", name="Next:").count():
+        page.goto(page.evaluate("document.querySelector('.md-footer__link--next').href"))
+        seen += 1
+    assert seen == len(list(site.rglob("index.html")))
 
 
 def test_a_page_leads_to_its_neighbours_and_to_the_code(page: Page) -> None:
