@@ -17,11 +17,6 @@ _HINT = (
     "destroy_subscription(), destroy_service(), destroy() and destroy_node(), and for a node that "
     "is stored only in a local variable of a function that returns."
 )
-_HINT_OF_CPP = (
-    "A publisher, a subscription or a server lasts as long as a variable that holds it. Keep it in "
-    "a member of the class, as in subscription_ = this->create_subscription<...>(...): a local "
-    "variable ends with the constructor. The node must last until rclcpp::spin() returns."
-)
 
 
 def why_unsubscribed(
@@ -66,10 +61,8 @@ def why_destroyed(
         ):
             return None
     when_s = recording.since_launch_s(last_ns)
-    process = declarations.process_of(recording, found[0].node)
-    compiled = process is not None and declarations.is_compiled(recording, process.name)
     return Cause(
         f"{seen}: {what} was destroyed {when_s:.2f} s after launch, while the process still ran",
-        _HINT_OF_CPP if compiled else _HINT,
+        _HINT,
         Evidence(moments=(Moment(f"{what.replace('`', '')} was destroyed", when_s),)),
     )

@@ -25,7 +25,6 @@ from grader.recording.model import NS, Process, Recording
 from grader.spec.unit import format_duration
 from grader.submission.record import SourceError
 
-_MULTI = "MultiThreadedExecutor"
 _LOG_LINES = 10
 _ROUNDING_S = 1e-6
 
@@ -212,21 +211,6 @@ def why_taken(
         return None
     return Cause.to_repeat(
         f"{what}, but the machine took {format_duration(stolen_s)} from the process meanwhile"
-    )
-
-
-def why_one_cpu(recording: Recording, what: str) -> Cause | None:
-    """The cause if an executor of several threads has one only because the machine has one CPU."""
-    spins = [item.data for item in recording.declared("spin")]
-    alone = any(item.get("executor") == _MULTI and item.get("threads") == 1 for item in spins)
-    one_cpu = recording.environment.get("cpus", "1") == "1"
-    if not (alone and one_cpu and declarations.traced(recording)):
-        return None
-    return Cause(
-        f"{what}: MultiThreadedExecutor() has as many threads as the machine has CPUs, and this "
-        "machine has one",
-        "Give the number of threads: MultiThreadedExecutor(num_threads=4).",
-        ours=True,
     )
 
 

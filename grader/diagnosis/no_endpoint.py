@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_destroyed
-from grader.diagnosis.exchanged_executables import why_exchanged
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import crashed, why_crashed
@@ -63,14 +62,6 @@ ACTION_CLIENT = Word(
     "action client", "has an action client of", "ActionClient(self, {type}, '{name}')"
 )
 _WORDS = (PUBLISHER, SUBSCRIPTION, SERVICE, ACTION, CLIENT, ACTION_CLIENT)
-_OTHER = {
-    PUBLISHER: SUBSCRIPTION,
-    SUBSCRIPTION: PUBLISHER,
-    SERVICE: ACTION,
-    ACTION: SERVICE,
-    CLIENT: SERVICE,
-    ACTION_CLIENT: ACTION,
-}
 
 
 @dataclass(frozen=True)
@@ -257,26 +248,6 @@ def never_appeared(symptom: NoEndpoint) -> Cause | None:
     if not declarations.declares(symptom.recording, noun, topic=name):
         return None
     return why_never_appeared(symptom.recording, f"a {noun} on {code(name)}")
-
-
-@explanation(NoEndpoint)
-def exchanged_executables(symptom: NoEndpoint) -> Cause | None:
-    """In setup.py an executable runs the function of another executable."""
-    exchanged = why_exchanged(symptom.recording)
-    return exchanged and exchanged.after(symptom.seen)
-
-
-@explanation(NoEndpoint)
-def exchanged_kind(symptom: NoEndpoint) -> Cause | None:
-    """The node subscribes instead of publishing, or offers an action instead of a service."""
-    word, other = symptom.word, _OTHER[symptom.word]
-    if not any(item.name == symptom.name for item in _of_students(symptom.recording, other)):
-        return None
-    return Cause(
-        f"the node {other.does} {code(symptom.name)}, but has no {word.noun} of that name",
-        f"Use {symptom.create} in place of the {other.noun}.",
-        symptom.evidence,
-    )
 
 
 @explanation(NoEndpoint, general=True)

@@ -10,8 +10,7 @@ from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Evidence
 from grader.findings.wording import code, codes
 from grader.spec.nearest_name import nearest
-from grader.submission.read.cmake import CMakeCommand, read_commands
-from grader.submission.record import PYTHON, PackageRecord, SourceError, SubmissionRecord
+from grader.submission.record import CPP, PYTHON, PackageRecord, SourceError, SubmissionRecord
 
 
 @dataclass(frozen=True)
@@ -26,25 +25,6 @@ class NoExecutable(Symptom[Cause], concept="packages"):
     def setup_py(self) -> Evidence:
         """Where executables of a Python package are defined."""
         return _at(self.package, "setup.py", "console_scripts")
-
-    def commands(self, name: str) -> list[CMakeCommand]:
-        """The commands of that name in CMakeLists.txt."""
-        return [one for one in read_commands(self.package.cmake or "") if one.name == name]
-
-    @property
-    def targets(self) -> list[str]:
-        """The programs that CMakeLists.txt builds."""
-        return [one.arguments[0] for one in self.commands("add_executable") if one.arguments]
-
-    @property
-    def line(self) -> str:
-        """How CMakeLists.txt installs it."""
-        return code(f"install(TARGETS {self.name} DESTINATION lib/${{PROJECT_NAME}})")
-
-    @property
-    def install(self) -> str:
-        """What to do where that line is missing."""
-        return f"CMakeLists.txt needs {self.line}."
 
 
 def why_no_executable(submission: SubmissionRecord, package: str, name: str) -> Cause | None:
@@ -84,24 +64,6 @@ def no_such_function(symptom: NoExecutable) -> Cause | None:
     return Cause(seen, hint, Evidence(places=(target,)))
 
 
-@explanation(NoExecutable)
-def in_another_package(symptom: NoExecutable) -> Cause | None:
-    """Another package of the submission has the executable."""
-    name, own = symptom.name, symptom.package
-    if name in dict(own.entry_points):
-        return None
-    for other in symptom.submission.packages:
-        if other.name != own.name and name in other.executables:
-            file = "setup.py" if other.build_type == "ament_python" else "CMakeLists.txt"
-            return Cause(
-                f"it is in the package {code(other.name)}: `ros2 run {other.name} {name}`",
-                f"Move its entry in console_scripts and its module to the package "
-                f"{code(own.name)}.",
-                _at(other, file, name),
-            )
-    return None
-
-
 @explanation(NoExecutable, only=PYTHON)
 def installed_in_bin(symptom: NoExecutable) -> Cause | None:
     """setup.cfg is missing or wrong: the executable was installed in bin/."""
@@ -117,57 +79,24 @@ def installed_in_bin(symptom: NoExecutable) -> Cause | None:
     )
 
 
-@explanation(NoExecutable)
-def not_registered(symptom: NoExecutable) -> Cause | None:
-    """CMakeLists.txt does not call ament_package(), so that ROS does not find the package."""
-    package = symptom.package
-    if package.build_type == "ament_python" or package.registered:
-        return None
-    return _in_cmake(
-        symptom,
-        f"the package was built, but ROS does not find it: `ros2 run {package.name}` says that "
-        "there is no such package",
-        "Write `ament_package()` as the last line of CMakeLists.txt.",
-        "ament_package",
-    )
-
-
-@explanation(NoExecutable)
-def built_and_not_installed(symptom: NoExecutable) -> Cause | None:
-    """CMakeLists.txt builds the executable, but does not install it where `ros2 run` looks."""
-    package, name = symptom.package, symptom.name
-    known = name in symptom.targets or name in package.misplaced_executables
-    if package.build_type == "ament_python" or not known:
-        return None
-    if name in package.misplaced_executables:
-        seen = f"{code(name)} was installed in bin/, where `ros2 run` does not look"
-        return _in_cmake(symptom, seen, symptom.install)
-    where = next((one for one in symptom.commands("install") if name in one.arguments), None)
-    if where is None:
-        seen = f"CMakeLists.txt builds {code(name)} and does not install it"
-        return _in_cmake(symptom, seen, symptom.install)
-    place = (where.after("DESTINATION", frozenset()) or ("bin",))[0]
-    seen = f"CMakeLists.txt installs {code(name)} in {code(place)}, where `ros2 run` does not look"
-    return _in_cmake(symptom, seen, symptom.install)
-
-
-@explanation(NoExecutable)
+@explanation(NoExecutable, only=CPP)
 def not_installed_by_cmake(symptom: NoExecutable) -> Cause | None:
-    """CMakeLists.txt gives the executable another name, or defines none."""
+    """CMakeLists.txt does not build it, or does not install it where `ros2 run` looks."""
     package, name = symptom.package, symptom.name
     if package.build_type == "ament_python":
         return None
-    match = nearest(name, package.executables)
-    there = f"the build installed {code(match)}" if match else "it was not installed"
-    if not match and package.executables:
-        there = f"the build installed {codes(package.executables)}"
-    build = f"`add_executable({name} src/<file>.cpp)` and " if symptom.targets else ""
-    scripts = "" if build else ", or install(PROGRAMS ...) for a Python script"
-    return _in_cmake(symptom, there, f"CMakeLists.txt needs {build}{symptom.line}{scripts}.")
-
-
-def _in_cmake(symptom: NoExecutable, seen: str, hint: str, command: str = "install") -> Cause:
-    return Cause(seen, hint, _at(symptom.package, "CMakeLists.txt", command))
+    seen = f"the build installed {codes(package.executables) or 'no executable'}"
+    if name in package.misplaced_executables:
+        seen = f"{code(name)} was installed in bin/, where `ros2 run` does not look"
+    elif name in package.executables:
+        seen = f"ROS does not find the package, so `ros2 run {package.name}` does not either"
+    line = f"install(TARGETS {name} DESTINATION lib/${{PROJECT_NAME}})"
+    return Cause(
+        seen,
+        f"CMakeLists.txt needs `add_executable({name} src/<file>.cpp)`, then {code(line)} "
+        "(of a Python script only install(PROGRAMS ...)), and `ament_package()` as its last line.",
+        _at(package, "CMakeLists.txt", "install"),
+    )
 
 
 @explanation(NoExecutable, only=PYTHON)

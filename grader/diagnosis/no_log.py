@@ -14,8 +14,8 @@ from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Moment
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.wording import code, counted, listing
-from grader.measure.declarations import is_compiled
 from grader.measure.printed import (
+    UNFILLED,
     Echo,
     Wanted,
     echoes,
@@ -25,7 +25,6 @@ from grader.measure.printed import (
     output_lines,
     quote,
     shown,
-    unfilled,
 )
 from grader.recording.model import NS, Endpoint, Kind, LogLine, Recording
 from grader.spec.unit import format_duration
@@ -236,19 +235,15 @@ def only_some_logged(symptom: NotLogged) -> Cause | None:
 
 @explanation(NotLogged)
 def no_f_string(symptom: NotLogged) -> Cause | None:
-    """The lines show `{x}` or `%f` instead of values: no f before the quotes, a stream in C++."""
+    """The lines show `{x}` or `%f` instead of values: no f before the quotes."""
     line = _meant(symptom)
-    compiled = line is not None and is_compiled(symptom.recording, line.process)
-    braces = unfilled(line.text, compiled=compiled) if line else None
-    if line is None or braces is None:
+    unfilled = UNFILLED.search(logged_text(line.text)) if line else None
+    if line is None or unfilled is None:
         return None
     return Cause(
-        f"log lines follow messages on {code(symptom.topic)}, but they show {code(braces)} instead "
-        f"of a value: {quote(line.text)}",
-        'RCLCPP_INFO(this->get_logger(), "x = %.2f", x) fills in %.2f, and %s for text.c_str(). '
-        "RCLCPP_INFO_STREAM and std::cout take values after <<, and neither fills in braces."
-        if compiled
-        else "Python fills in braces only where an f stands before the quotes: "
+        f"log lines follow messages on {code(symptom.topic)}, but they show {code(unfilled[0])} "
+        f"instead of a value: {quote(line.text)}",
+        "Python fills in braces only where an f stands before the quotes: "
         "f'... {value}' instead of '... {value}'.",
         symptom.evidence(line),
     )

@@ -13,9 +13,9 @@ from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Moment
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.wording import code, codes, counted
-from grader.measure import compatibility
-from grader.measure.declarations import is_compiled_publisher, was_held_up
-from grader.recording.model import NS, Endpoint, Kind, Owner, Recording
+from grader.measure.compatibility import compatibility_table, refusals, sides
+from grader.measure.declarations import was_held_up
+from grader.recording.model import NS, Endpoint, Kind, Owner, Qos, Recording
 from grader.spec.unit import format_duration
 
 ENDED_HINT = (
@@ -50,6 +50,16 @@ class OnTopic(Symptom[Cause]):
             for item in self.recording.endpoints
             if item.owner is Owner.PROBE and item.kind is not self.kind and item.topic == self.topic
         ]
+
+    @property
+    def pairs(self) -> list[tuple[Qos, Qos]]:
+        """The QoS that is offered and the one that is requested, of each two that could match."""
+        return [sides(self.kind, own.qos, other.qos) for own in self.own for other in self.others]
+
+    @property
+    def refused(self) -> list[tuple[Qos, Qos]]:
+        """Those of them that do not match."""
+        return [pair for pair in self.pairs if refusals(*pair)]
 
     @property
     def seen(self) -> str:
@@ -120,17 +130,9 @@ class NotDelivered(OnTopic):
         return "its callback is never called"
 
 
-def seconds_hint(
-    recording: Recording, topic: str, example: str = "0.3 is 300 ms", period_s: float = 0.3
-) -> str:
-    """What a timer takes as its period, in the language of what publishes on a topic."""
-    if is_compiled_publisher(recording, topic):
-        return (
-            "create_wall_timer takes a period with its unit, such as "
-            f"{format_duration(period_s).replace(' ', '')}: `300s` is 300 seconds. Of a number "
-            "make one with std::chrono::milliseconds(number)."
-        )
-    return f"create_timer takes its period in seconds: {example}."
+def seconds_hint(period_s: float = 0.3) -> str:
+    """What a timer takes as its period."""
+    return f"create_timer takes its period in seconds: {period_s:g} is {format_duration(period_s)}."
 
 
 def why_silent(recording: Recording, topic: str) -> Cause:
@@ -207,23 +209,23 @@ def unreadable(symptom: OnTopic) -> Cause | None:
 @explanation(NoMessages, NotDelivered, concept="qos")
 def incompatible_qos(symptom: OnTopic) -> Cause | None:
     """The publisher's QoS offers less (reliability, durability, deadline) than requested."""
-    pairs = [
-        (own.qos, other.qos) if symptom.kind is Kind.PUBLISHER else (other.qos, own.qos)
-        for own in symptom.own
-        for other in symptom.others
-    ]
-    reasons = [compatibility.refusals(*pair) for pair in pairs]
-    if not reasons or not all(reasons):
+    return why_refused(symptom) if symptom.pairs == symptom.refused else None
+
+
+def why_refused(symptom: OnTopic) -> Cause | None:
+    """The cause if the QoS of an endpoint of the student's refuses another one, or is refused."""
+    if not symptom.refused:
         return None
     other = "its reader" if symptom.kind is Kind.PUBLISHER else "the publisher"
+    pair = symptom.refused[0]
     return Cause(
         f"{symptom.seen}: the {symptom.kind.value}'s QoS does not match {other} on "
-        f"{code(symptom.topic)} ({', '.join(reasons[0])})",
+        f"{code(symptom.topic)} ({', '.join(refusals(*pair))})",
         "A subscription receives nothing from a publisher that offers less than it requests. A "
         "number as QoS, such as 10, means reliable and volatile, and the default for the rest.",
         Evidence(
             moments=endpoints_seen(symptom.recording, symptom.own),
-            tables=(compatibility.compatibility_table(*pairs[0]),),
+            tables=(compatibility_table(*pair),),
         ),
     )
 
@@ -292,16 +294,3 @@ def nothing_to_answer(symptom: NoMessages) -> Cause | None:
         f"{symptom.seen}, because the messages that the node should answer, on "
         f"{code(symptom.asked[0])}, never reached it"
     )
-
-
-@explanation(NoMessages)
-def subscription_destroyed(symptom: NoMessages) -> Cause | None:
-    """The program destroyed its subscription, so no callback is called that could publish."""
-    recording = symptom.recording
-    topics = {item.topic for item in recording.student_endpoints(Kind.SUBSCRIPTION)}
-    causes = [
-        why_unsubscribed(recording, name, symptom.seen)
-        for name in sorted(topics)
-        if recording.carried(name)
-    ]
-    return causes[0] if causes and all(causes) else None

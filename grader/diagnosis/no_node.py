@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.exchanged_executables import why_exchanged
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.not_built import why_not_built
 from grader.diagnosis.process.process_exit import why_crashed, why_ended
@@ -182,13 +181,6 @@ def node_never_appeared(symptom: OtherNode) -> Cause | None:
     return cause.after(symptom.seen)
 
 
-@explanation(OtherNode)
-def exchanged_executables(symptom: OtherNode) -> Cause | None:
-    """In setup.py an executable runs the function of another executable."""
-    exchanged = why_exchanged(symptom.recording)
-    return exchanged and exchanged.after(symptom.seen)
-
-
 @explanation(OtherNode, general=True)
 def other_name(symptom: OtherNode) -> Cause:
     """The node has another name: wrong upper or lower case, a namespace, or a misspelling."""
@@ -203,6 +195,7 @@ def other_name(symptom: OtherNode) -> Cause:
         f"{symptom.seen}{how}",
         f"The node's name is the argument of super().__init__('{symptom.base}') in its "
         "constructor. Upper and lower case matter, and a namespace (the argument or `__ns`) "
-        "stands in front of it.",
+        "stands in front of it. If it is another node of yours, look whether each executable "
+        "runs its own function.",
         Evidence(moments=nodes_seen(symptom.recording)),
     )

@@ -64,26 +64,15 @@ def services_not_asked(symptom: NotDeclared) -> Cause | None:
     return why_not_asked(symptom.recording, symptom.node, "its descriptor was not read")
 
 
-@explanation(NotDeclared)
-def no_parameters(symptom: NotDeclared) -> Cause | None:
-    """The node declares no parameters."""
-    return None if symptom.there else symptom.cause("the node declares no parameters")
-
-
-@explanation(NotDeclared)
-def no_value(symptom: NotDeclared) -> Cause | None:
-    """It is declared without a default, so it has no value."""
-    if symptom.name not in symptom.there:
-        return None
-    return symptom.cause(f"{code(symptom.name)} is declared, but without a value")
-
-
 @explanation(NotDeclared, general=True)
 def other_parameters(symptom: NotDeclared) -> Cause:
-    """Its name is misspelt, or only other parameters are declared."""
-    match = nearest(symptom.name, symptom.there)
-    there = f"is {code(match)}" if match else f"are {codes(symptom.there)}"
-    return symptom.cause(f"declared {there}")
+    """Its name is misspelt, it has no value, or only other parameters are declared, or none."""
+    match, there = nearest(symptom.name, symptom.there), symptom.there
+    if not there:
+        return symptom.cause("the node declares no parameters")
+    if symptom.name in there:
+        return symptom.cause(f"{code(symptom.name)} is declared, but without a value")
+    return symptom.cause(f"declared {f'is {code(match)}' if match else f'are {codes(there)}'}")
 
 
 def why_services_silent(recording: Recording, calls: Iterable[Call]) -> Cause | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from itertools import takewhile
 
 from grader.diagnosis.build_error import BuildError
 from grader.diagnosis.cause import Cause
@@ -27,11 +26,6 @@ _ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 _CHATTER = re.compile(r"Starting +>>>|(Finished|Failed|Aborted) +<<<|Summary:|\s+\d+ packages? ")
 # What CMake tells of its work, and how far make is.
 _STEPS = re.compile(r"-- |\[ *\d+%\] (?!Building)")
-# What a compiler says of headers and templates of others on the way to an error, and the line of
-# code that it shows after it.
-_FOLDED = re.compile(r"(In file included | +)from |/\S+: (In |.*required (from|by))")
-_COMPILING = "Building CXX object "
-_SHOWN = re.compile(r" *\d* \| ")
 _CMAKE = ("ament_cmake", "cmake")
 # What the build adds at the end when it ended colcon itself.
 _OURS = re.compile(r"\n\[rosgrade: (.+)\]\n\Z")
@@ -281,7 +275,7 @@ def _failed(submission: SubmissionRecord, build: BuildRecord, name: str) -> Caus
     error = build.culprit or SourceError("", None, ended[1] if ended else "")
     return Cause(
         f"`colcon build` failed: {error if error.file else error.message}".removesuffix(": "),
-        cause_of(BuildError(error, submission, existing_package(submission, name))),
+        cause_of(BuildError(error, existing_package(submission, name))),
         _evidence(build, name),
     )
 
@@ -317,7 +311,7 @@ def _clean(build: BuildRecord) -> str:
 
 def _relevant(build: BuildRecord, name: str) -> tuple[str, ...]:
     """The log of the package's build, up to its first error or to its end."""
-    noise = (_CHATTER, _STEPS, _FOLDED)
+    noise = (_CHATTER, _STEPS)
     kept = [
         line
         for line in _written(build, name)
@@ -328,10 +322,7 @@ def _relevant(build: BuildRecord, name: str) -> tuple[str, ...]:
         blamed = next((i for i, line in enumerate(kept) if message and message in line), None)
         # What follows is the complaint of the tools that called the student's file.
         if blamed is not None:
-            is_own = not kept[blamed].startswith("/")
-            shown = takewhile(_SHOWN.match, kept[blamed + 1 :]) if is_own else ()
-            begin = max((i for i in range(blamed) if _COMPILING in kept[i]), default=-1) + 1
-            kept = [*kept[begin : blamed + 1], *shown]
+            kept = kept[: blamed + 1]
     return tuple(kept[-_LOG_LINES:])
 
 

@@ -33,25 +33,6 @@ _OWN_S = 2.0
 _ENDED_PERIODS = 3.0
 
 
-@explanation(NoMessages, FewMessages, concept="timers")
-def timer_destroyed(symptom: OnTopic) -> Cause | None:
-    """The timer was destroyed: in C++ it ends with the variable that holds it."""
-    recording = symptom.recording
-    gone_ns = declarations.last_timer_destroyed_ns(recording)
-    if gone_ns is None:
-        return None
-    period = format_duration(declarations.timers(recording)[-1].period_s)
-    gone_s = recording.since_launch_s(gone_ns)
-    return Cause(
-        f"{symptom.seen}: the process destroyed its timer of {period} again, {gone_s:.2f} s after "
-        "launch",
-        "A timer lasts as long as a variable that holds it. Keep it in a member of the class, "
-        "timer_ = this->create_wall_timer(...): a local variable, as in `auto timer = ...`, ends "
-        "with the constructor. Look for timer_.reset() and timer_ = nullptr, too.",
-        Evidence(moments=(Moment("timer destroyed", gone_s), *symptom.moments)),
-    )
-
-
 @explanation(NoMessages, concept="timers")
 def slow_timer(symptom: NoMessages) -> Cause | None:
     """The timer's period is longer than the observation: milliseconds were given as seconds."""
@@ -63,7 +44,7 @@ def slow_timer(symptom: NoMessages) -> Cause | None:
     return Cause(
         f"{symptom.seen} in {format_duration(watched_s)}: the process declared a "
         f"timer of {format_duration(timer.period_s)}",
-        seconds_hint(recording, symptom.topic),
+        seconds_hint(),
         Evidence(
             moments=(
                 Moment("timer declared", recording.since_launch_s(timer.declared_ns)),
@@ -163,7 +144,8 @@ def publish_not_reached(symptom: NoMessages) -> Cause:
     return Cause(
         _idle(symptom) + although,
         "Is publish(msg) reached in the callback? Look for a condition or a `return` before it, "
-        "for an `except: pass` that hides an error, for timer.cancel() and timer.reset(), and for "
+        "for an `except: pass` that hides an error, for timer.cancel() and timer.reset(), for a "
+        "timer that is destroyed, and for "
         "a lambda without brackets after the method's name. Printing or logging a message does "
         "not send it. With use_sim_time a timer waits for a simulator that publishes /clock.",
         _idle_evidence(symptom),
@@ -188,7 +170,7 @@ def publishing_stopped(symptom: FewMessages) -> Cause:
     return Cause(
         f"{symptom.seen}; the process declared a timer of "
         f"{listing(map(format_duration, period_s))}",
-        seconds_hint(recording, symptom.topic) if is_slow else ENDED_HINT,
+        seconds_hint() if is_slow else ENDED_HINT,
         evidence,
     )
 

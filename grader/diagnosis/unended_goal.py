@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.no_answer import why_late, why_one_cpu, why_raised, why_taken, why_unanswered
+from grader.diagnosis.no_answer import why_late, why_raised, why_taken, why_unanswered
 from grader.diagnosis.no_endpoint import ACTION
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.fields import the_goal
@@ -97,9 +97,8 @@ def executor_busy_with_the_goal(symptom: NotCanceled) -> Cause | None:
     seen = f"{symptom.seen}: the server did not handle the request to cancel"
     text = f"{seen}: its executor is busy while the execute callback runs"
     busy = Cause(text, _TWO_THREADS, symptom.evidence)
-    alone = why_one_cpu(recording, seen)
-    if alone is not None or goal.result_ns is not None:
-        return alone or busy
+    if goal.result_ns is not None:
+        return busy
     asked_ns, within_s = goal.canceled_ns or 0, symptom.within_s
     return why_unanswered(recording, seen, ACTION, goal.action, asked_ns, within_s, busy)
 

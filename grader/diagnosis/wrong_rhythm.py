@@ -10,9 +10,10 @@ from statistics import mean
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, explanation
 from grader.diagnosis.no_messages import seconds_hint
-from grader.diagnosis.process.blocked_executor import left_s, long_wait
+from grader.diagnosis.process.blocked_executor import left_s
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Moment
+from grader.findings.wording import counted
 from grader.measure import declarations
 from grader.measure.period import Interval, PeriodLimits, PeriodVerdict
 from grader.recording.model import NS, Kind, Recording
@@ -20,14 +21,8 @@ from grader.spec.unit import format_duration
 
 _SAME = 0.05
 _POWERS = (10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
-_TIMES = {2: "twice", 3: "three times", 4: "four times", 5: "five times"}
+_TIMES = range(2, 6)
 _TIMES_TOLERANCE = 0.08
-# So many timers of one period are created in a callback.
-_CREATED_AGAIN = 4
-# An executor that answers within this share of the period lets no timer wait.
-_AT_ONCE = 0.1
-
-
 _ONE_TIMER = "Create one timer in the constructor, once, and publish once in its callback."
 
 
@@ -52,13 +47,6 @@ class WrongRhythm(Symptom[Cause], concept="timers"):
         """Periods of the timers that the process declared, in seconds."""
         return [timer.period_s for timer in declarations.timers(self.recording)]
 
-    @property
-    def seconds_hint(self) -> str:
-        """The period as an argument of create_timer."""
-        wanted_s = self.limits.period_s
-        example = f"{format_duration(wanted_s)} is {wanted_s:g}"
-        return seconds_hint(self.recording, self.topic, example, wanted_s)
-
     def declares(self, period_s: float) -> list[float]:
         """The declared periods that are nearly this one."""
         return [item for item in self.timers_s if math.isclose(item, period_s, rel_tol=_SAME)]
@@ -76,7 +64,7 @@ def several_in_each_period(symptom: WrongRhythm) -> Cause | None:
     cut = 0.0 if symptom.verdict.regular else times * (times - 1) / len(symptom.measured)
     if times not in _TIMES or abs(ratio - times) > _TIMES_TOLERANCE * times + cut:
         return None
-    words = f"messages come {_TIMES[times]} as often as expected"
+    words = f"messages come {times} times as often as expected"
     publishers = symptom.recording.student_endpoints(Kind.PUBLISHER, symptom.topic)
     timers_s = symptom.timers_s
     if len(publishers) > 1:
@@ -89,48 +77,25 @@ def several_in_each_period(symptom: WrongRhythm) -> Cause | None:
     if symptom.declares(average_s):
         return Cause(
             f"{words}: the process declared a timer of {format_duration(timers_s[0])}",
-            symptom.seconds_hint,
+            seconds_hint(symptom.limits.period_s),
         )
     return Cause(words, _ONE_TIMER)
 
 
 @explanation(WrongRhythm)
-def some_left_out(symptom: WrongRhythm) -> Cause | None:
-    """The period is right, but some messages are missing."""
-    verdict = symptom.verdict
-    if not verdict.period_good or verdict.median_s <= 0.0:
-        return None
-    ratios = [symptom.measured[index].seconds / verdict.median_s for index in verdict.irregular]
-    if any(ratio < 1.5 or abs(ratio - round(ratio)) > 0.1 for ratio in ratios):
-        return None
-    return Cause(
-        "messages are left out",
-        "Publish in every call of the callback, without a condition. No callback may work or "
-        "sleep for longer than the period: the timer has to wait for it.",
-    )
-
-
-@explanation(WrongRhythm)
 def irregular(symptom: WrongRhythm) -> Cause | None:
-    """The period is right, but many intervals are not: a callback takes long, or a loop sleeps."""
+    """The period is right, but not all intervals: a callback takes long, a condition, a loop."""
     if not symptom.verdict.period_good:
         return None
-    if symptom.timers_s:
-        hint = (
-            "Publish in the timer's callback only, in every call. No callback may work or sleep "
-            "for long: the timer has to wait for it."
-        )
-    else:
-        hint = (
-            "Let a timer call the callback: self.create_timer(...) keeps its period, while "
-            "sleeping and waiting in a loop do not."
-        )
-    return Cause("", hint)
+    hint = "Publish in every call of the timer's callback, without a condition. "
+    if not symptom.timers_s:
+        hint = "Let a timer call the callback: self.create_timer(...). "
+    return Cause("", f"{hint}No callback may work or sleep for long: the timer has to wait for it.")
 
 
 @explanation(WrongRhythm)
 def other_timer(symptom: WrongRhythm) -> Cause | None:
-    """The timer has another period, such as 1/10 or 10 times the expected one."""
+    """The timer has another period, such as 10 times the expected one, or 0 from int(0.3)."""
     median_s = symptom.verdict.median_s
     ratio = median_s / symptom.limits.period_s
     words = []
@@ -140,25 +105,10 @@ def other_timer(symptom: WrongRhythm) -> Cause | None:
         elif math.isclose(ratio, 1.0 / power, rel_tol=0.1):
             words.append(f"1/{power:g} of the expected period")
     same = symptom.declares(median_s)
+    if median_s <= symptom.limits.period_s and declarations.timer_of_zero(symptom.recording):
+        same = [0.0]
     words += [f"the process declared a timer of {format_duration(item)}" for item in same[:1]]
-    return Cause("; ".join(words), symptom.seconds_hint) if words else None
-
-
-@explanation(WrongRhythm)
-def timer_of_zero(symptom: WrongRhythm) -> Cause | None:
-    """A timer of 0 s fires again and again without a pause."""
-    recording = symptom.recording
-    too_often = symptom.verdict.median_s <= symptom.limits.period_s
-    if not too_often or not declarations.timer_of_zero(recording):
-        return None
-    how = "300 // 1000 or int(0.3)"
-    if declarations.is_compiled_publisher(recording, symptom.topic):
-        how = "std::chrono::seconds(300 / 1000)"
-    return Cause(
-        "messages come too often: the process declared a timer of 0 s, which fires again and "
-        "again without a pause",
-        f"A period below 1 s becomes 0 as an integer, as in {how}. {symptom.seconds_hint}",
-    )
+    return Cause("; ".join(words), seconds_hint(symptom.limits.period_s)) if words else None
 
 
 @explanation(WrongRhythm)
@@ -168,27 +118,12 @@ def right_timer_too_late(symptom: WrongRhythm) -> Cause | None:
     right = symptom.declares(wanted_s)
     if not right or late_s < 0.0:
         return None
-    wanted, longer = format_duration(wanted_s), f"{format_duration(late_s)} too long"
-    if len(right) >= _CREATED_AGAIN:
-        return Cause(
-            f"{longer}: the process declared {len(right)} timers of {wanted}, as if the callback "
-            "created a new one each time",
-            "Create one timer in the constructor: it calls again by itself, and keeps its period "
-            "however long the callback takes.",
-        )
-    waited = long_wait(symptom.recording, {node.name for node in symptom.recording.student_nodes})
-    if symptom.verdict.regular and waited is not None and waited[1] < _AT_ONCE * wanted_s:
-        return Cause(
-            f"{longer}, although the executor is not blocked and the process declared a timer of "
-            f"{wanted}",
-            "Publish in every call of the timer's callback, and leave out timer.reset(), which "
-            "restarts the period.",
-        )
     return Cause(
-        f"{longer}: the process declared a timer of {wanted}, but the executor does not call it "
-        "in time",
-        "Keep callbacks short: no sleep, no loop that waits, no long computation. Keep a loop "
-        "around spin_once() short too.",
+        f"{format_duration(late_s)} too long, although the process declared "
+        f"{counted(len(right), 'timer')} of {format_duration(wanted_s)}",
+        "Keep callbacks short: no sleep, no loop that waits, no long computation. Create the timer "
+        "once, in the constructor: it goes on by itself, without timer.reset(). Publish in every "
+        "call of its callback.",
     )
 
 
@@ -218,7 +153,7 @@ def other_period(symptom: WrongRhythm) -> Cause:
     return Cause(
         f"{format_duration(symptom.verdict.median_s)} instead of "
         f"{format_duration(symptom.limits.period_s)}",
-        symptom.seconds_hint,
+        seconds_hint(symptom.limits.period_s),
     )
 
 

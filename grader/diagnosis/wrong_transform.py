@@ -145,14 +145,6 @@ def exchanged_frames(symptom: NoTransform) -> Cause | None:
 
 
 @explanation(NoTransform)
-def leading_slash(symptom: NoTransform) -> Cause | None:
-    """The name of a frame has a leading slash, which tf2 does not allow."""
-    names = {(one.lstrip("/"), two.lstrip("/")): it for (one, two), it in symptom.edges.items()}
-    found = names.get((symptom.parent, symptom.child))
-    return symptom.instead(found, "has a slash in front of a name: frames are no topics")
-
-
-@explanation(NoTransform)
 def no_transform_at_all(symptom: NoTransform) -> Cause | None:
     """Nothing is published on the topic, or only by others, such as the simulated robot."""
     recording, topic = symptom.recording, symptom.topic

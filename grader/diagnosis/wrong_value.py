@@ -24,11 +24,7 @@ _FACTORS = {
 }
 _FACTOR_TOLERANCE = 2e-3
 MISREAD = "an integer, a text or a numpy.float32"
-# A C++ variable without a value shows old memory. Read as a float that is nearly always 0 or a
-# number far outside of this range.
-_LEAST_MEANT, _MOST_MEANT = 1e-30, 1e30
-_FLOAT_HINT = "A number in a message must be a float: write 1.0 instead of 1, or float(value)."
-_SET_HINT = "Give each variable a value where it is declared, as in `double speed = 0.0;`."
+FLOAT_HINT = "A number in a message must be a float: write 1.0 instead of 1, or float(value)."
 # Python 3.11 has the number of digits of a negative integer with a minus.
 _LEAST_NEGATIVE = (1 << 64) - (1 << 8)
 
@@ -44,14 +40,12 @@ class WrongValue(Symptom[str]):
         observed: All leaves of the message.
         tolerance: Largest difference of two equal numbers.
         always: No other message is right.
-        compiled: A compiled program published it.
     """
 
     wrong: tuple[Difference, ...]
     observed: Mapping[str, Any]
     tolerance: float
     always: bool = True
-    compiled: bool = False
 
     @property
     def numbers(self) -> list[Difference]:
@@ -68,18 +62,9 @@ class WrongValue(Symptom[str]):
 def integer_in_a_float_field(symptom: WrongValue) -> str | None:
     """A float field holds an integer, a text or a numpy.float32, which ROS misreads."""
     bad = next((one for one in symptom.numbers if was_integer(one.observed)), None)
-    if bad is None or symptom.compiled:
+    if bad is None:
         return None
     return f"{bad.field} is a float field, but {MISREAD} was put into it, which ROS misreads"
-
-
-@explanation(WrongValue)
-def never_set(symptom: WrongValue) -> str | None:
-    """In C++, a variable that was never given a value is put into the message."""
-    bad = next((one for one in symptom.numbers if _is_unmeant(one.observed)), None)
-    if bad is None or not symptom.compiled:
-        return None
-    return f"{bad.field} has what lay in memory: a variable was never given a value"
 
 
 @explanation(WrongValue)
@@ -140,18 +125,6 @@ def was_integer(number: Any) -> bool:
     return isinstance(number, float) and (
         0.0 < abs(number) < sys.float_info.min or _bits(number) >= _LEAST_NEGATIVE
     )
-
-
-def misread_hint(number: Any, *, compiled: bool) -> str | None:
-    """What to do about a number that is none that a program means, or None where it is one."""
-    if compiled:
-        return _SET_HINT if _is_unmeant(number) else None
-    return _FLOAT_HINT if was_integer(number) else None
-
-
-def _is_unmeant(number: Any) -> bool:
-    is_float = isinstance(number, float) and math.isfinite(number) and number != 0.0
-    return is_float and not _LEAST_MEANT < abs(number) < _MOST_MEANT
 
 
 def _bits(number: float) -> int:

@@ -52,13 +52,6 @@ def is_compiled(recording: Recording, process: str) -> bool:
     return package is not None and package.build_type == "ament_cmake"
 
 
-def is_compiled_publisher(recording: Recording, topic: str) -> bool:
-    """Whether a compiled program publishes on a topic."""
-    names = {item.process for item in _on(recording, Kind.PUBLISHER, topic)}
-    names = names or {process.name for process in recording.processes}
-    return any(is_compiled(recording, name) for name in names)
-
-
 def hides_calls(recording: Recording) -> bool:
     """Whether an EventsExecutor of rclpy spins: it calls from C++, where no tracer in Python is."""
     return any(
@@ -129,16 +122,6 @@ def timers(recording: Recording) -> tuple[DeclaredTimer, ...]:
     return tuple(found)
 
 
-def last_timer_destroyed_ns(recording: Recording) -> int | None:
-    """When a process destroyed its last timer, or None where one was kept or none declared.
-
-    Only compiled programs tell: rclpy keeps a timer as long as its node.
-    """
-    ends = [_destroyed_ns(recording, item) for item in recording.declared("timer")]
-    known = [time_ns for time_ns in ends if time_ns is not None]
-    return max(known) if known and len(known) == len(ends) else None
-
-
 def timer_of_zero(recording: Recording) -> bool:
     """Whether the processes declared a timer without a period, which :func:`timers` leaves out."""
     return any(_number(item.data, "period_s") == 0.0 for item in recording.declared("timer"))
@@ -165,21 +148,15 @@ def _on(recording: Recording, kind: Kind, topic: str) -> list[Declaration]:
 
 
 def _was_destroyed(recording: Recording, made: Declaration) -> bool:
-    return _destroyed_ns(recording, made) is not None
-
-
-def _destroyed_ns(recording: Recording, made: Declaration) -> int | None:
-    """When a process declared an endpoint or a timer destroyed while it was observed, or None."""
+    """Whether a process declared an endpoint destroyed while it was observed."""
     number = made.data.get("number")
-    ends = (
-        item.time_ns
-        for item in recording.declared("destroyed")
-        if item.process == made.process
+    return number is not None and any(
+        item.process == made.process
         and item.data.get("pid") == made.data.get("pid")
         and item.data.get("number") == number
         and item.time_ns < recording.stop_ns
+        for item in recording.declared("destroyed")
     )
-    return None if number is None else next(ends, None)
 
 
 def profiles(recording: Recording, kind: Kind, topic: str) -> tuple[tuple[str, Qos], ...]:

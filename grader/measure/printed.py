@@ -30,9 +30,8 @@ _GROUPED = re.compile(
 )
 # Typographers' sign, which some locales and tables write.
 _MINUS = "\N{MINUS SIGN}"
-# `{position.x:.2f}` as it stands in the source; of C++ `%.2f`, and `{}` of std::format.
-_UNFILLED = re.compile(r"\{[A-Za-z_][^{}\s\"',]*\}")
-_UNFILLED_CPP = re.compile(r"%[-+0-9.]*l{0,2}[dfgsuz]|\{[^{}\s\"',]*\}")
+UNFILLED = re.compile(r"\{[A-Za-z_][^{}\s\"',]*\}|%[-+0-9.]*l{0,2}[dfgsuz]\b")
+"""``{position.x:.2f}`` or ``%.2f`` as it stands in the source, where a value should be."""
 # `x = 1.37`, `y: -0.62`, `"x": 1.37`: a name and its number with nothing but such signs between.
 _NAMED = re.compile(
     r"""(?<![A-Za-z0-9_])(?P<name>[A-Za-z_]\w*)["']?[ \t]*[:=][ \t]*(?P<number>"""
@@ -71,12 +70,6 @@ def numbers(line: str) -> tuple[float, ...]:
     found += [float(match[0].replace(",", ".")) for match in _DECIMAL_COMMA.finditer(text)]
     found += [float(match[0].replace(match[1], "")) for match in _GROUPED.finditer(text)]
     return tuple(found)
-
-
-def unfilled(line: str, *, compiled: bool = False) -> str | None:
-    """What stands where a value should, such as the braces of an f-string without its f."""
-    found = (_UNFILLED_CPP if compiled else _UNFILLED).search(logged_text(line))
-    return found[0] if found else None
 
 
 def exchanged(text: str, values: Mapping[str, float], decimals: int) -> tuple[str, str] | None:

@@ -64,7 +64,7 @@ def test_a_right_action_passes(check, run, parameters, observed):
     ("check", "run", "parameters", "words"),
     [
         ("exists", acting(services=(action("/fibonaci"),)), FIB, "`/fibonaci` instead of"),
-        ("exists", acting(services=(service("/fibonacci"),)), FIB, "no action of that name"),
+        ("exists", acting(services=(service("/fibonacci"),)), FIB, "created no action"),
         (
             "result",
             acting(goal(sequence=(0, 1, 1, 2))),

@@ -411,9 +411,7 @@ class TestMistakes:
         [
             ((GOAL[1], GOAL[0], GOAL[2]), "x and y swapped"),
             ((GOAL[0], -GOAL[1], GOAL[2]), "the sign of y changed"),
-            ((GOAL[0], GOAL[1], math.radians(GOAL[2])), "or were in degrees"),
-            ((GOAL[0], GOAL[1], 0.0), "as if the goal's heading were 0"),
-            ((GOAL[0], GOAL[1], -GOAL[2]), "heading with the wrong sign"),
+            ((GOAL[0], GOAL[1], -GOAL[2]), "counter-clockwise is positive"),
             ((0.4, 0.2, 0.0), "came to rest at (0.3"),
         ],
     )

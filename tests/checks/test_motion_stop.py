@@ -281,16 +281,6 @@ class TestStops:
         said = failing("motion.no_contact", run)
         assert "Is it the beam straight ahead" in said and "sent" not in said
 
-    def test_two_places_that_publish(self):
-        def law(senses: Senses):
-            if senses.new_scan and senses.scan is not None and senses.scan.ranges_m[0] <= 0.2:
-                return (0.0, 0.0)
-            return (0.1, 0.0)
-
-        said = failing("motion.no_contact", drive(law, world=WALL, seconds=12))
-        assert "commands in the last second were to stop" in said
-        assert "Two places publish" in said
-
     @pytest.mark.parametrize(
         ("caller", "words"),
         [("rclpy/executors.py", f"a callback was at {SOURCE}:14"), ("threading.py", "Log")],

@@ -14,7 +14,6 @@ from tests.checks.builder import (
     judge,
     output,
     taken,
-    text,
     traceback,
 )
 from tests.checks.requests import SET_BOOL, asked, service, serving
@@ -167,13 +166,6 @@ class TestConcurrent:
         assert "the second call waited until the first was answered" in found
         assert "`SingleThreadedExecutor`" in found
         assert "ReentrantCallbackGroup" in found
-
-    def test_a_machine_with_one_cpu_is_no_students_fault(self):
-        spin = declared("spin", executor="MultiThreadedExecutor", threads=1)
-        run = serving(asked(1.0, 0.4), asked(1.001, 0.8), declarations=(declared("started"), spin))
-        finding = judge("service.concurrent", run, **SLOW)
-        assert finding.status is Status.ERROR
-        assert "num_threads=4" in text(finding)
 
     def test_a_busy_machine_is_no_students_fault(self):
         run = serving(asked(1.0, 0.4), asked(1.001, 0.8), disturbance=taken(1.0, 1.9, waited_s=0.4))

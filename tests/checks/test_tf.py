@@ -213,7 +213,7 @@ class TestStatic:
         ("names", "words"),
         [
             (("laser", "base_link"), "parent and child are exchanged"),
-            (("/base_link", "/laser"), "a slash in front of a name"),
+            (("/base_link", "/laser"), "without slashes"),
             (("base_link", "lazer"), "is there instead"),
             (("base_footprint", "laser"), "`base_footprint` → `laser`"),
             (("map", "odom"), "no other than those of `odom`"),

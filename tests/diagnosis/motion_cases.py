@@ -50,14 +50,6 @@ def loop(run: Recording) -> Recording:
     return replace(run, log=output(IN_A_CALLBACK, time_s=30.0))
 
 
-def two_publishers() -> Recording:
-    def law(senses: Any) -> Any:
-        near = senses.new_scan and senses.scan is not None and senses.scan.ranges_m[0] <= 0.2
-        return (0.0, 0.0) if near else (0.1, 0.0)
-
-    return drive(law, world=WALL, seconds=12)
-
-
 def asleep_at_the_goal() -> Recording:
     student, until_s = Student(GOAL), [0.0]
 
@@ -102,10 +94,6 @@ def one_direction() -> Recording:
     return drive(law, seconds=30)
 
 
-def turns_at_the_end() -> Recording:
-    return run_to(GOAL, align_law=lambda _: 0.5, straight=0.0, seconds=30)
-
-
 CASES: list[Group] = [
     (
         "motion.drives",
@@ -113,9 +101,6 @@ CASES: list[Group] = [
         {
             "NotMoved.ended_before_it_moved": lambda: still(processes=(died(1),)),
             "NotMoved.nothing_published": still,
-            "NotMoved.no_velocity_command": lambda: still(
-                messages=messages([0.6, 0.8], {"data": 1})
-            ),
             "NotMoved.not_finite": lambda: ahead(math.nan),
             "NotMoved.robot_not_matched": asks_weakly,
             "NotMoved.only_zeros": lambda: ahead(0.0),
@@ -130,7 +115,6 @@ CASES: list[Group] = [
             "Contact.no_scan_for_long": without_scans,
             "Contact.old_command": holds_its_command,
             "Contact.callback_in_a_loop": lambda: loop(ahead()),
-            "Contact.contradicting_commands": two_publishers,
             "Contact.decided_to_drive": ahead,
         },
     ),
@@ -146,11 +130,6 @@ CASES: list[Group] = [
             "GoalMissed.wrong_place": lambda: run_to((0.5, 0.8, 2.0)),
             "GoalMissed.stopped_elsewhere": lambda: run_to((0.4, 0.2, 0.0)),
             "GoalMissed.too_slow": lambda: run_to(GOAL, linear=0.02, seconds=20),
-            "HeadingMissed.turns_for_ever": turns_at_the_end,
-            "HeadingMissed.another_heading": lambda: run_to((0.8, 0.5, 0.0)),
-            "HeadingMissed.has_not_turned": lambda: run_to(
-                GOAL, align_law=lambda _: 0.0, seconds=20
-            ),
             "HeadingMissed.stopped_turning": lambda: run_to(GOAL, straight=0.3),
         },
     ),

@@ -12,8 +12,6 @@ from tests.checks.builder import (
     LAUNCH_NS,
     RELIABLE,
     at,
-    declarations,
-    declared,
     died,
     endpoint,
     every,
@@ -24,7 +22,6 @@ from tests.checks.builder import (
     reader,
     recording,
     sent,
-    silent,
     stimulus,
     taken,
 )
@@ -94,24 +91,6 @@ def test_an_action_server_that_was_destroyed_while_it_worked():
     run = acting(goal(end_s=None), services=(gone(action(), 1.2),))
     found = failing("action.result", run, action="/fibonacci", within="2 s")
     assert "the action `/fibonacci` was destroyed 1.20 s after launch" in found
-
-
-def test_in_cpp_an_endpoint_ends_with_the_variable_that_holds_it():
-    compiled = declared("started", language="C++")
-    found = failing("log.follows", deaf(sent=FIRST_TEN, declarations=(compiled,)), **LOGGED)
-    assert WORDS in found and "Keep it in a member of the class" in found
-
-
-def test_a_timer_is_destroyed_only_where_none_is_kept():
-    made = [declared("timer", number=n, period_s=0.3) for n in (1, 2)]
-    first, second = (declared("destroyed", 0.1 * n, number=n) for n in (1, 2))
-    late = replace(second, time_ns=recording().stop_ns)
-    for ends in ((), (first,), (first, late)):
-        run = silent(declarations=(*declarations(timer_s=None), *made, *ends))
-        assert "destroyed" not in failing("messages.count", run, topic="/cmd_vel", at_least=5)
-    run = silent(declarations=(*declarations(timer_s=None), *made, first, second))
-    found = failing("messages.count", run, topic="/cmd_vel", at_least=5)
-    assert "the process destroyed its timer of 300 ms again, 0.20 s after launch" in found
 
 
 def test_what_vanished_with_its_process_was_not_destroyed():

@@ -48,7 +48,6 @@ from tests.checks.builder import (
 )
 from tests.checks.requests import (
     acting,
-    action,
     asked,
     asking,
     canceled,
@@ -66,16 +65,10 @@ STRING = "std_msgs/msg/String"
 LATCHED = replace(RELIABLE, durability="transient_local")
 LISTENER = endpoint("/chatter", kind=Kind.SUBSCRIPTION, type=STRING)
 EXITED = {"ending": Ending.EXITED}
-EXCHANGED = {"bot_pub": "bot_publisher.bot_sub:main", "bot_sub": "bot_publisher.bot_pub:main"}
 NOT_STARTED = {"ending": Ending.NOT_STARTED, "processes": ()}
 BUSY = taken(0.1, 4.4, waited_s=4.2)
 FAILED_BUILD = BuildRecord(
     False, 1.0, failed_packages=("bot_publisher",), log="Starting >>> bot_publisher\n"
-)
-DESTROYED_TIMER = (
-    *declarations(timer_s=None),
-    declared("timer", number=2, period_s=0.3),
-    declared("destroyed", 0.5, number=2),
 )
 HANGS = tuple(call(0.5 * n, None) for n in range(2, 6))
 
@@ -97,11 +90,6 @@ def answers() -> Iterator[set[str]]:
     entries = {symptom: tuple(map(recorded, found)) for symptom, found in explanations().items()}
     with patch.object(explanation, "explanations", lambda: entries):
         yield names
-
-
-def exchanged(run: Recording) -> Recording:
-    changed = package(entry_points=tuple(EXCHANGED.items()))
-    return replace(run, submission=submission(changed), declarations=())
 
 
 def gone(item: Any, time_s: float = 0.9) -> Any:
@@ -136,13 +124,6 @@ def logging(*lines: str, **changes: Any) -> Recording:
 
 def turned(x: float = 1.0, z: float = 0.5, roll: float = 0.0) -> Recording:
     return recording(messages=messages(every(0.3), twist((x, 0, 0), (roll, 0, z))))
-
-
-def without_value(*names: str) -> Any:
-    """The answers of a node that declares parameters without a default."""
-    listed, described, read = parameters_read(**dict.fromkeys(names, 1.0))
-    descriptors = [{**item, "type": 0} for item in described.response["descriptors"]]
-    return listed, replace(described, response={"descriptors": descriptors}), read
 
 
 def paced(intervals_s: list[float], **changes: Any) -> Recording:
@@ -218,13 +199,6 @@ CASES: list[Group] = [
         },
     ),
     (
-        "node.exists",
-        {"name": "/bot_pub"},
-        {
-            "OtherNode.exchanged_executables": exchanged(recording(nodes=(node("/bot_sub"),))),
-        },
-    ),
-    (
         "topic.published",
         {"topic": "/cmd_vel"},
         {
@@ -232,7 +206,6 @@ CASES: list[Group] = [
             "NoEndpoint.misspelt_name": silent(endpoints=(endpoint("/cmdvel"), reader())),
             "NoEndpoint.process_crashed": silent(endpoints=(reader(),), **CRASH),
             "NoEndpoint.never_appeared": silent(endpoints=(reader(),)),
-            "NoEndpoint.exchanged_executables": exchanged(silent(endpoints=(reader(),))),
         },
     ),
     (
@@ -246,7 +219,6 @@ CASES: list[Group] = [
         "service.exists",
         {"service": "/enable"},
         {
-            "NoEndpoint.exchanged_kind": serving(services=(action("/enable"),)),
             "NoEndpoint.others_only": serving(services=()),
         },
     ),
@@ -267,10 +239,6 @@ CASES: list[Group] = [
             "NoMessages.process_ended": silent(processes=(died(1),)),
             "NoMessages.publisher_destroyed": silent(endpoints=(gone(endpoint()), reader())),
             "NoMessages.nothing_to_answer NotDelivered.no_endpoint": answering(),
-            "NoMessages.subscription_destroyed": silent(
-                endpoints=(gone(LISTENER), endpoint(), reader()), sent=sent([0.5, 1.5])
-            ),
-            "NoMessages.timer_destroyed": silent(declarations=DESTROYED_TIMER),
             "NoMessages.slow_timer": silent(declarations=declarations(timer_s=300.0)),
             "NoMessages.no_cpu_time": silent(calls=(), disturbance=BUSY),
             "NoMessages.never_spun": silent(declarations=declarations(spin=False)),
@@ -290,9 +258,6 @@ CASES: list[Group] = [
             ),
             "FewMessages.publisher_destroyed": recording(
                 messages=messages([0.7]), endpoints=(gone(endpoint()), reader())
-            ),
-            "FewMessages.timer_destroyed": recording(
-                messages=messages([1.0]), declarations=DESTROYED_TIMER
             ),
             "FewMessages.never_spun": recording(
                 messages=messages([1.0]), declarations=declarations(spin=False)
@@ -343,12 +308,8 @@ CASES: list[Group] = [
         EACH,
         {
             "WrongRhythm.several_in_each_period": paced([0.15] * 20),
-            "WrongRhythm.some_left_out": paced([0.3, 0.3, 0.6] * 5),
             "WrongRhythm.irregular": paced([0.3, 0.21, 0.39, 0.3, 0.25, 0.42, 0.3, 0.2, 0.37]),
             "WrongRhythm.other_timer": paced([3.0, 3.0]),
-            "WrongRhythm.timer_of_zero": paced(
-                [0.0001] * 50, declarations=(declared("timer", period_s=0.0),)
-            ),
             "WrongRhythm.right_timer_too_late": paced([0.42] * 10),
             "WrongRhythm.sleeping_loop": paced(
                 [0.405] * 10, declarations=declarations(timer_s=None)
@@ -451,9 +412,6 @@ CASES: list[Group] = [
             "NoExecutable.no_such_function": submission(
                 package(missing_targets=(("bot_pub", SourceError("setup.py", 22, "no module")),))
             ),
-            "NoExecutable.in_another_package": submission(
-                package(executables=(), entry_points=()), package("robot")
-            ),
             "NoExecutable.installed_in_bin": submission(
                 package(executables=(), misplaced_executables=("bot_pub",))
             ),
@@ -469,8 +427,6 @@ CASES: list[Group] = [
         {"node": NODE, "name": "speed"},
         {
             "NotDeclared.services_not_asked": recording(),
-            "NotDeclared.no_parameters": recording(calls=without_value()),
-            "NotDeclared.no_value": recording(calls=without_value("speed")),
             "NotDeclared.other_parameters": recording(calls=parameters_read(sped=1.0)),
         },
     ),

@@ -8,7 +8,7 @@ import pytest
 
 from grader.diagnosis.explanation import Explanation, explanations
 from grader.diagnosis.no_messages import FewMessages, NoMessages
-from grader.diagnosis.process.exceptions import CPP_TABLE, TABLE, Raised, Row
+from grader.diagnosis.process.exceptions import CPP_ROWS, TABLE, Raised, Row
 from grader.diagnosis.process.failure import Failure, Frame
 from grader.docs import explanations_markdown
 from tests.checks.builder import recording
@@ -93,12 +93,12 @@ def test_a_row_of_the_table_matches_all_that_it_says(
 
 
 @pytest.mark.parametrize(
-    "entry", (*TABLE.exceptions, *CPP_TABLE.exceptions), ids=lambda entry: entry.example[:60]
+    "entry", (*TABLE.exceptions, *CPP_ROWS), ids=lambda entry: entry.example[:60]
 )
 def test_every_row_of_the_tables_answers_for_its_example(entry: Row) -> None:
     type_, _, message = entry.example.partition(": ")
     frame = Frame(f"/opt/ros/jazzy/{entry.raised_in or 'bot/node.py'}", 1, "f", entry.line)
-    compiled = entry in CPP_TABLE.exceptions
+    compiled = entry in CPP_ROWS
     raised = Raised(Failure(type_, message, (frame,), compiled=compiled), recording())
     answer = next(one for one in explanations()[Raised] if one.apply(raised) is not None)
     assert answer.sentence == entry.mistake

@@ -3,7 +3,7 @@
 import pytest
 
 from grader.findings.finding import Status
-from tests.checks.builder import at, declared, failing, judge, taken
+from tests.checks.builder import at, failing, judge, taken
 from tests.checks.requests import acting, canceled
 
 FIB = {"action": "/fibonacci"}
@@ -35,10 +35,3 @@ class TestBusyExecutor:
         assert "its executor is busy while" in found and "spins" not in found
         starved = acting(self.BLOCKED, calls=(), disturbance=taken(2.0, 2.1, waited_s=3.0))
         assert judge("action.cancels", starved, **FIB).status is Status.ERROR
-
-    @pytest.mark.parametrize(("cpus", "status"), [("1", Status.ERROR), ("4", Status.FAILED)])
-    def test_threads_that_only_this_machine_lacks_cost_nothing(self, cpus, status):
-        spin = declared("spin", executor="MultiThreadedExecutor", threads=1)
-        started = (declared("started"), spin)
-        run = acting(self.BLOCKED, declarations=started, environment={"cpus": cpus})
-        assert judge("action.cancels", run, **FIB).status is status

@@ -35,7 +35,7 @@ BROADCAST = {**ODOM, "rate": "20 Hz"}
         ("refused_by_tf2", run(qos=RELIABLE)),
         ("other_topic", run(moving=on(TF, (0.7, [transform(*LASER)])))),
         ("exchanged_frames", static_run(transform("laser", "base_link"))),
-        ("leading_slash", static_run(transform("/base_link", "laser"))),
+        ("other_frame", static_run(transform("/base_link", "laser"))),
         ("no_transform_at_all", run(endpoints=(endpoint(),))),
         ("other_frame", static_run(transform("base_link", "lasr"))),
         ("other_transforms_only", static_run(transform("map", "odom"))),

@@ -9,7 +9,6 @@ from pydantic import Field
 from grader.checks.check import Subject, check
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code, codes, counted, listing
-from grader.diagnosis.exchanged_executables import why_exchanged
 from grader.measure.callback_runs import Overlap, Run, overlaps
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Duration
@@ -55,12 +54,11 @@ def never_overlap(recording: Recording, parameters: NeverOverlap) -> Finding:
             Evidence(spans=spans(recording, reports)),
         )
     worst = max(found, key=lambda item: item.seconds)
-    declared, hint = _why(recording, _exclusion_hint(recording, names, worst))
     return Finding.failed(
         expected,
         f"{_overlap_words(recording, worst)}, and {counted(len(found), 'overlap')} in all"
-        + declared,
-        hint,
+        + _declared(recording),
+        _exclusion_hint(recording, names, worst),
         Evidence(
             moments=(
                 Moment(
@@ -102,11 +100,10 @@ def _all(found: Sequence[Overlap]) -> list[Run]:
     return [item for overlap in found for item in (overlap.one, overlap.other)]
 
 
-def _why(recording: Recording, hint: str) -> tuple[str, str]:
-    """What the declarations tell, to follow what was seen, and what to try next."""
-    exchanged = why_exchanged(recording)
-    declared = exchanged.observed if exchanged else concurrency.declared_words(recording)
-    return f"; {declared}" if declared else "", exchanged.hint if exchanged else hint
+def _declared(recording: Recording) -> str:
+    """What the declarations tell, to follow what was seen."""
+    declared = concurrency.declared_words(recording)
+    return f"; {declared}" if declared else ""
 
 
 class Overlapping(Reported):
@@ -187,11 +184,10 @@ def _serial(
     excused = concurrency.not_judged(recording, expected, observed, prevented=prevented)
     if excused is not None:
         return excused
-    declared, hint = _why(recording, _concurrency_hint(recording, len(names)))
     return Finding.failed(
         expected,
-        observed + declared,
-        hint,
+        observed + _declared(recording),
+        _concurrency_hint(recording, len(names)),
         Evidence(
             moments=(Moment("first run", recording.since_launch_s(ended[0].begin_ns)),),
             spans=spans(recording, reports, reports.of(callback)),

@@ -12,7 +12,7 @@ from grader.checks.check import NamedFields, Parameters, Subject, check, toleran
 from grader.checks.need import Published, Recorded
 from grader.diagnosis.explanation import explain
 from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
-from grader.diagnosis.wrong_value import WrongValue, accumulates, misread_hint
+from grader.diagnosis.wrong_value import FLOAT_HINT, WrongValue, accumulates, was_integer
 from grader.findings.fields import (
     FieldTolerance,
     difference_table,
@@ -36,7 +36,6 @@ from grader.findings.value import (
     tolerance_of,
 )
 from grader.findings.wording import code, codes, counted
-from grader.measure.declarations import is_compiled_publisher
 from grader.measure.numbering import is_numbered, published
 from grader.recording.model import Kind, Recording
 from grader.spec.expression import Expression
@@ -218,14 +217,12 @@ def _wrong(
     more = len(found) - _MOST_FIELDS
     observed += f" and {counted(more, 'more wrong field')}" if more > 0 else ""
     field, message = found[0].field, messages[first - 1]
-    compiled = is_compiled_publisher(recording, parameters.topic)
     if accumulates(found[0].expected, [leaves(item.value).get(field) for item in messages]):
         observed += f": {field} grows from message to message, as if added up"
     else:
         tolerance = tolerance_of(parameters.tolerance, field)
         always = wrong == len(messages)
-        symptom = WrongValue(found, leaves(message.value), tolerance, always, compiled)
-        clause = explain(symptom)
+        clause = explain(WrongValue(found, leaves(message.value), tolerance, always))
         observed += f": {clause}" if clause else ""
     if len(messages) > 1:
         observed += f" ({wrong} of {counted(len(messages), 'message')} wrong)"
@@ -233,7 +230,7 @@ def _wrong(
     return Finding.failed(
         parameters.words,
         observed,
-        _hint(found, len(messages), len(messages) - wrong, compiled=compiled),
+        _hint(found, len(messages), len(messages) - wrong),
         Evidence(
             moments=(Moment(f"message {first} is wrong", when_s),),
             tables=(difference_table(f"Message {first}", found),),
@@ -241,11 +238,9 @@ def _wrong(
     )
 
 
-def _hint(found: tuple[Difference, ...], number: int, right: int, *, compiled: bool) -> str:
-    hints = (misread_hint(item.observed, compiled=compiled) for item in found)
-    hint = next(filter(None, hints), None)
-    if hint:
-        return hint
+def _hint(found: tuple[Difference, ...], number: int, right: int) -> str:
+    if any(was_integer(item.observed) for item in found):
+        return FLOAT_HINT
     if right:
         return (
             f"{counted(right, 'message')} of {number} {'is' if right == 1 else 'are'} right. Look "

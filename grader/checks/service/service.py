@@ -13,7 +13,7 @@ from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.need import Called, Doubt
 from grader.checks.requests import judged_requests, why_other_fields
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.no_answer import why_late, why_one_cpu
+from grader.diagnosis.no_answer import why_late
 from grader.diagnosis.no_endpoint import SERVICE, is_offered
 from grader.findings.fields import FieldTolerance, brief, words
 from grader.findings.finding import Evidence, Finding, Moment, Table
@@ -249,7 +249,7 @@ def _why_other_order(
             "Give the service a MutuallyExclusiveCallbackGroup, or use rclpy.spin(node).",
             _evidence(recording, pair),
         )
-    return why_one_cpu(recording, seen) or Cause(
+    return Cause(
         f"{seen}, so the second call waited until the first was answered{declared}",
         "Spin with a MultiThreadedExecutor, and give the service a ReentrantCallbackGroup: "
         "self.create_service(..., callback_group=ReentrantCallbackGroup()).",

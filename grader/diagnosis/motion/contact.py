@@ -8,8 +8,7 @@ from functools import cached_property
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.process.blocked_executor import stuck_callback
-from grader.findings.wording import counted
-from grader.measure.motion.command import VelocityCommand, commands, is_zero
+from grader.measure.motion.command import VelocityCommand, commands
 from grader.measure.motion.quantities import speed, turn
 from grader.measure.motion.scan import newest
 from grader.measure.motion.track import evidence_at, is_at_rest, speed_plot
@@ -17,9 +16,6 @@ from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 from sim.shapes import obstacle_words
 
-# Commands that were sent so long before contradict each other; fewer may come of noise.
-_LATELY_NS = NS
-_CONTRADICTIONS = 3
 # A command that is older did not answer one of the last two scans of the slowest LiDAR.
 _HELD_NS = NS // 2
 # Several scans of any LiDAR.
@@ -29,8 +25,11 @@ _RESTED_NS = NS // 5
 
 
 @dataclass(frozen=True)
-class Contact(Symptom["Reason"]):
-    """The robot drove into something."""
+class Contact(Symptom[Cause]):
+    """The robot drove into something.
+
+    What a cause observes is a clause that follows the contact in the text.
+    """
 
     recording: Recording
     step: Truth
@@ -40,14 +39,6 @@ class Contact(Symptom["Reason"]):
     def sent(self) -> list[VelocityCommand]:
         """Commands until then."""
         return [item for item in commands(self.recording) if item.time_ns <= self.step.time_ns]
-
-
-@dataclass(frozen=True)
-class Reason:
-    """What follows the contact in the text, and what to try."""
-
-    words: str
-    hint: str
 
 
 def why_touched(recording: Recording) -> Cause | None:
@@ -69,20 +60,20 @@ def why_touched(recording: Recording) -> Cause | None:
         command = "although the last command was to stop: it came too late"
     reason = cause_of(Contact(recording, step, before))
     return Cause(
-        f"drove into {name} {motion}, {when_s:.2f} s after launch, {command}{reason.words}",
+        f"drove into {name} {motion}, {when_s:.2f} s after launch, {command}{reason.observed}",
         reason.hint,
         evidence_at(recording, f"contact with {name}", step.time_ns, speed_plot(recording)),
     )
 
 
 @explanation(Contact)
-def no_scan_for_long(symptom: Contact) -> Reason | None:
+def no_scan_for_long(symptom: Contact) -> Cause | None:
     """No scan came for a long time."""
     scan = newest(symptom.recording, symptom.step.time_ns)
     since_ns = symptom.step.time_ns - scan.stamp_ns if scan is not None else 0
     if since_ns <= _BLIND_NS:
         return None
-    return Reason(
+    return Cause(
         f"; the last scan had come {since_ns / NS:.2f} s before",
         "Without new scans the robot drives blindly. Store the time of the last scan, and let a "
         "timer stop the robot when that is more than 1 s ago.",
@@ -90,12 +81,12 @@ def no_scan_for_long(symptom: Contact) -> Reason | None:
 
 
 @explanation(Contact)
-def old_command(symptom: Contact) -> Reason | None:
+def old_command(symptom: Contact) -> Cause | None:
     """The last command was to drive, and the robot keeps it."""
     since_ns = symptom.step.time_ns - symptom.sent[-1].time_ns if symptom.sent else 0
     if since_ns <= _HELD_NS or not symptom.before.command_m_s:
         return None
-    return Reason(
+    return Cause(
         f", sent {since_ns / NS:.2f} s before",
         "The robot keeps the last command. Publish a command for every scan, or from a timer of "
         "10 Hz or more. To stop, publish linear.x = 0.0. A time.sleep() or a loop in a callback "
@@ -104,42 +95,27 @@ def old_command(symptom: Contact) -> Reason | None:
 
 
 @explanation(Contact)
-def callback_in_a_loop(symptom: Contact) -> Reason | None:
+def callback_in_a_loop(symptom: Contact) -> Cause | None:
     """A callback looped or slept and never saw a newer scan."""
     place = stuck_callback(symptom.recording)
     if place is None:
         return None
-    return Reason(
+    return Cause(
         f"; a callback was at {place.file}:{place.line} when it was interrupted",
         "A callback with a loop or a time.sleep() never sees a newer scan: the next scan waits "
         "until it returns. Decide once for each scan, publish once and return.",
     )
 
 
-@explanation(Contact)
-def contradicting_commands(symptom: Contact) -> Reason | None:
-    """Two parts of the code publish: one stops the robot, the other lets it drive."""
-    since_ns = symptom.step.time_ns - _LATELY_NS
-    lately = [item for item in symptom.sent if item.time_ns >= since_ns]
-    stops = sum(is_zero(item.twist) for item in lately)
-    if not _CONTRADICTIONS <= stops < len(lately):
-        return None
-    return Reason(
-        f"; {stops} of {counted(len(lately), 'command')} in the last second were to stop",
-        "Two places publish: one stops the robot, the other starts it again at once. Look for a "
-        "timer that publishes the speed again and again. Let only one place decide.",
-    )
-
-
 @explanation(Contact, general=True)
-def decided_to_drive(symptom: Contact) -> Reason:
+def decided_to_drive(symptom: Contact) -> Cause:
     """The node continued to drive, or stopped too late."""
-    return Reason(
+    return Cause(
         "",
         "Log the range that you compare. Is it the beam straight ahead (angle 0) of the newest "
         "scan? Is your limit in metres? When the range is below the limit, publish linear.x = 0.0. "
         "With a time.sleep() in the callback or a slow timer, you decide by an old scan. A scan "
-        "comes every 0.2 s, and the robot needs time to brake.",
+        "comes every 0.2 s, and the robot needs time to brake. Let only one place publish.",
     )
 
 

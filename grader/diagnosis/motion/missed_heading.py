@@ -15,10 +15,6 @@ from grader.measure.motion.approach import Approach
 from grader.measure.motion.quantities import degrees, turn
 from grader.measure.motion.track import is_at_rest, turned_rad
 from grader.recording.simulated import Truth
-from sim.motion import wrap_angle
-
-# How far from the heading that it was sent to a robot rests: the default of angle_tolerance.
-_AS_SENT_RAD = 0.06
 
 
 @dataclass(frozen=True)
@@ -65,64 +61,18 @@ def heading_misread(symptom: HeadingMissed) -> Cause | None:
     return symptom.cause(f": {misread}", misread.hint) if misread else None
 
 
-@explanation(HeadingMissed)
-def turns_for_ever(symptom: HeadingMissed) -> Cause | None:
-    """It still turns at the end of the observation."""
-    if is_at_rest(symptom.last):
-        return None
-    return symptom.cause(
-        f" and still turns at {turn(symptom.last.angular_rad_s)} when the observation ends",
-        "angular.z = gain * (goal's heading - yaw), in radians, normalised to [-pi, pi], and 0.0 "
-        "within the tolerance. Print the goal's heading, yaw and angular.z while it turns.",
-    )
-
-
-@explanation(HeadingMissed)
-def another_heading(symptom: HeadingMissed) -> Cause | None:
-    """The goal's heading is read as degrees or as 0, or has the wrong sign."""
-    goal_rad = symptom.run.goal.yaw_rad
-    headings = (
-        (
-            math.radians(goal_rad),
-            "as if the goal's heading were 0, or were in degrees",
-            "The goal's heading is in radians already (REP-103): do not convert it. Log the value "
-            "that your node has read. A float parameter's value is "
-            "get_parameter_value().double_value.",
-        ),
-        (
-            -goal_rad,
-            "that is the goal's heading with the wrong sign",
-            "Counter-clockwise is positive (REP-103): error = goal's heading - yaw.",
-        ),
-    )
-    near_rad = min(symptom.heading_rad, _AS_SENT_RAD)
-    for heading_rad, words, hint in headings:
-        is_another = abs(wrap_angle(heading_rad - goal_rad)) > 2.0 * symptom.heading_rad
-        if is_another and abs(wrap_angle(heading_rad - symptom.last.yaw_rad)) <= near_rad:
-            return symptom.cause(f": {words}", hint)
-    return None
-
-
-@explanation(HeadingMissed)
-def has_not_turned(symptom: HeadingMissed) -> Cause | None:
-    """It has not turned since it arrived."""
-    run = symptom.run
-    driven = run.driven(math.inf)
-    if driven is None or abs(turned_rad(run.truth[driven:])) >= symptom.heading_rad:
-        return None
-    return symptom.cause(
-        ": it has not turned since it arrived",
-        "At the goal's position, angular.z = gain * (goal's heading - yaw). Is this part of the "
-        "code reached? Which command does it publish?",
-    )
-
-
 @explanation(HeadingMissed, general=True)
 def stopped_turning(symptom: HeadingMissed) -> Cause:
-    """It stopped turning too early or too late."""
+    """It stopped turning too early or too late, never turned to the heading, or still turns."""
+    words, driven = "", symptom.run.driven(math.inf)
+    if not is_at_rest(symptom.last):
+        words = f" and still turns at {turn(symptom.last.angular_rad_s)} when the observation ends"
+    elif driven is not None and abs(turned_rad(symptom.run.truth[driven:])) < symptom.heading_rad:
+        words = ": it has not turned since it arrived"
     return symptom.cause(
-        "",
-        "Turn until abs(goal's heading - yaw) is below the tolerance, both in radians. Print yaw: "
-        "compute it from the quaternion, and add nothing to it. If the robot turns past the "
-        "heading, make the angular gain smaller.",
+        words,
+        "At the goal's position, angular.z = gain * (goal's heading - yaw), normalised to "
+        "[-pi, pi], and 0.0 when this error is below the tolerance. Both are in radians already, "
+        "and counter-clockwise is positive (REP-103). Print yaw, the goal's heading and "
+        "angular.z: if the robot turns past the heading, make the gain smaller.",
     )

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.no_messages import NoMessages, why_refused, why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
-from grader.diagnosis.wrong_value import MISREAD, misread_hint
+from grader.diagnosis.wrong_value import FLOAT_HINT, MISREAD, was_integer
 from grader.findings.finding import Evidence
-from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.reference import Goal, UnknownValue
 from grader.findings.value import leaves
 from grader.findings.wording import code, codes, counted
-from grader.measure.compatibility import compatibility_table, refusals
-from grader.measure.declarations import is_compiled_publisher
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.command import (
     VelocityCommand,
@@ -30,7 +26,7 @@ from grader.measure.motion.command import (
 from grader.measure.motion.quantities import speed
 from grader.measure.motion.scan import misreading
 from grader.measure.motion.track import evidence_at, has_moved, index_at, is_at_rest
-from grader.recording.model import NS, Kind, Owner, Recording
+from grader.recording.model import NS, Recording
 from grader.spec.unit import format_duration
 
 _STILL = "the robot never moved"
@@ -130,21 +126,7 @@ def ended_before_it_moved(symptom: NotMoved) -> Cause | None:
 def nothing_published(symptom: NotMoved) -> Cause | None:
     """Nothing was published on the topic of velocity commands."""
     recording, topic = symptom.recording, command_topic(symptom.recording)
-    return None if recording.on(topic) else why_silent(recording, topic).after(_STILL)
-
-
-@explanation(NotMoved)
-def no_velocity_command(symptom: NotMoved) -> Cause | None:
-    """The published message is not a velocity command."""
-    if symptom.sent:
-        return None
-    recording, topic = symptom.recording, command_topic(symptom.recording)
-    found = sorted({message.type for message in recording.on(topic)})
-    return Cause(
-        f"{_STILL}: the messages on {code(topic)} are no velocity commands but {codes(found)}",
-        "Publish geometry_msgs/msg/Twist.",
-        Evidence(moments=first_seen(recording, recording.on(topic))),
-    )
+    return None if symptom.sent else why_silent(recording, topic).after(_STILL)
 
 
 @explanation(NotMoved)
@@ -159,27 +141,9 @@ def robot_not_matched(symptom: NotMoved) -> Cause | None:
     recording = symptom.recording
     if any(step.command_m_s or step.command_rad_s for step in recording.truth):
         return None
-    topic = command_topic(recording)
-    readers = [
-        item
-        for item in recording.endpoints
-        if item.owner is Owner.PROBE and item.kind is Kind.SUBSCRIPTION and item.topic == topic
-    ]
-    publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
-    for publisher, reader in product(publishers, readers):
-        reasons = refusals(offered=publisher.qos, requested=reader.qos)
-        if reasons:
-            return Cause(
-                f"{_STILL}: the QoS of the publisher on {code(topic)} does not match that of "
-                f"the robot ({', '.join(reasons)})",
-                "The robot's subscription is reliable: publish reliably, as "
-                "create_publisher(Twist, 'cmd_vel', 10) does.",
-                Evidence(
-                    moments=endpoints_seen(recording, (publisher,)),
-                    tables=(compatibility_table(publisher.qos, reader.qos),),
-                ),
-            )
-    return None
+    # A subscription of the probe that requests less may get what the robot does not.
+    refused = why_refused(NoMessages(recording, command_topic(recording)))
+    return refused and refused.after(_STILL)
 
 
 @explanation(NotMoved)
@@ -212,12 +176,11 @@ def integer_in_command(symptom: NotMoved) -> Cause | None:
     """A float field holds an integer, which ROS misreads."""
     twist = symptom.first.twist
     for field, number in (("linear.x", twist.linear_m_s), ("angular.z", twist.angular_rad_s)):
-        hint = misread_hint(number, compiled=False)
-        if hint and not is_compiled_publisher(symptom.recording, command_topic(symptom.recording)):
+        if was_integer(number):
             return Cause(
                 f"{_STILL}: {MISREAD} was put into {code(field)}, a float field, "
                 "which ROS misreads",
-                hint,
+                FLOAT_HINT,
                 symptom.evidence,
             )
     return None

@@ -79,10 +79,14 @@ def why_blocked(
 
 def why_slow(recording: Recording, seen: str, nodes: Collection[str]) -> Cause | None:
     """The cause if callbacks keep each other waiting for long, as late answers to calls tell."""
-    waited = long_wait(recording, nodes)
-    if waited is None or waited[1] <= _SLOW_S:
+    waits = [
+        (call, left_s(recording, call.requested_ns, call.answered_ns or recording.stop_ns))
+        for call in _calls(recording, nodes)
+    ]
+    # The longest but one: a single answer may have been lost on its way.
+    call, wait_s = sorted(waits, key=lambda item: item[1])[-2] if len(waits) > 1 else (None, 0.0)
+    if call is None or wait_s <= _SLOW_S:
         return None
-    call, wait_s = waited
     moment = Moment("call that waited", recording.since_launch_s(call.requested_ns))
     return Cause(
         f"{seen}: the callbacks keep each other waiting, and calls to the node's parameter "
@@ -91,20 +95,6 @@ def why_slow(recording: Recording, seen: str, nodes: Collection[str]) -> Cause |
         Evidence(moments=(moment,)),
         concept="executors",
     )
-
-
-def long_wait(recording: Recording, nodes: Collection[str]) -> tuple[Call, float] | None:
-    """The call that the nodes let wait the longest but one, and for how long (seconds).
-
-    A single one may have been lost on its way. What the machine took from the nodes meanwhile
-    does not count.
-    """
-    waits = [
-        (call, left_s(recording, call.requested_ns, call.answered_ns or recording.stop_ns))
-        for call in _calls(recording, nodes)
-    ]
-    waits.sort(key=lambda item: item[1])
-    return waits[-2] if len(waits) > 1 else None
 
 
 def why_never_spun(

@@ -6,7 +6,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 from string import Template
-from typing import ClassVar
+
+from pydantic import Field
 
 from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
 from grader.diagnosis.process.failure import Failure, Frame
@@ -32,11 +33,15 @@ class Raised(Symptom[str]):
 
 
 class Row(Model):
-    """A row of the table: a mistake, how to recognise its exception, and what to try."""
+    """A row of a table: a mistake, how to recognise its exception, and what to try.
 
-    only: ClassVar[str] = ""
+    Attributes:
+        only: The one language of the programs that it explains, or nothing if any.
+    """
+
     mistake: str
     example: str
+    only: str = ""
     line: str = ""
     type: str = ""
     message: str = ""
@@ -46,15 +51,13 @@ class Row(Model):
 
     def __call__(self, symptom: Raised) -> str | None:
         """The hint, if the exception is that of the mistake."""
-        return self.hint_for(symptom.failure)
-
-    def hint_for(self, failure: Failure) -> str | None:
-        """The same of an exception alone."""
+        failure = symptom.failure
         last = failure.frames[-1] if failure.frames else Frame("", 0)
         found = re.search(self.message, failure.message)
         # Classes of C++ have the same names as those of Python, in a namespace.
         is_type = not self.type or re.fullmatch(self.type, failure.type.rpartition("::")[2])
-        if found is None or not is_type or self.raised_in not in last.file:
+        is_other = self.only == CPP and not failure.compiled
+        if found is None or not is_type or is_other or self.raised_in not in last.file:
             return None
         names = {key: text for key, text in found.groupdict().items() if text}
         if not re.search(Template(self.source).safe_substitute(names), last.source):
@@ -62,35 +65,22 @@ class Row(Model):
         return Template(self.hint).safe_substitute(names)
 
 
-class CppRow(Row):
-    """The same of what ends compiled programs only."""
-
-    only = CPP
-
-    def __call__(self, symptom: Raised) -> str | None:
-        """The hint, if the failure is that of the mistake."""
-        return self.hint_for(symptom.failure) if symptom.failure.compiled else None
-
-
 class Table(Model):
-    """The whole of ``exceptions.yaml``.
+    """The whole of ``exceptions.yaml``, or of ``exceptions_cpp.yaml``.
 
     Attributes:
         imports: The beginning of a line that imports something -> names, with blanks between.
     """
 
     exceptions: tuple[Row, ...]
-    imports: dict[str, str]
-
-
-class CppTable(Model):
-    """The whole of ``exceptions_cpp.yaml``."""
-
-    exceptions: tuple[CppRow, ...]
+    imports: dict[str, str] = Field(default_factory=dict)
 
 
 TABLE = read_source(Path(__file__).with_suffix(".yaml")).read(Table)
-CPP_TABLE = read_source(Path(__file__).with_name("exceptions_cpp.yaml")).read(CppTable)
+CPP_ROWS = [
+    row.model_copy(update={"only": CPP})
+    for row in read_source(Path(__file__).with_name("exceptions_cpp.yaml")).read(Table).exceptions
+]
 _GDB = (
     "Find the line with a debugger: `ros2 run --prefix 'gdb -ex run --args' PACKAGE EXECUTABLE`, "
     "then `bt` for the functions that were being called. It names lines only if the program is "
@@ -120,7 +110,7 @@ def not_imported(symptom: Raised) -> str | None:
     return None
 
 
-for _row in (*CPP_TABLE.exceptions, *TABLE.exceptions):
+for _row in (*CPP_ROWS, *TABLE.exceptions):
     add(
         Explanation(
             Raised, _row.mistake, _row, __name__, _row.mistake, example=_row.example, only=_row.only

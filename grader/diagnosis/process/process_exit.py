@@ -15,7 +15,7 @@ from grader.diagnosis.process.missing_library import lacking_package
 from grader.diagnosis.process.newer_names import newer_name
 from grader.diagnosis.process.raised import fatal_failure, in_brackets, student_place
 from grader.findings.finding import Evidence, Moment
-from grader.findings.wording import code, codes
+from grader.findings.wording import code
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.spec.source import Model, read_source
@@ -205,14 +205,8 @@ def launch_file_not_installed(symptom: ProcessExit) -> Cause | None:
     if found is None or symptom.failure is not None:
         return None
     name, package = found["file"], found["package"]
-    own = [path for path in symptom.recording.submission.files if path.endswith(f"/{name}")]
-    record = symptom.recording.submission.package(package)
-    there = [path for path, _ in record.shared if "launch" in path] if record else []
-    handed_in = f", which is handed in as {codes(own)}" if own else ""
-    installed = f"; it installed {codes(there)}" if there else ""
     return Cause(
-        f"{symptom.seen}: the package {code(package)} installed no {code(name)}"
-        f"{handed_in}{installed}",
+        f"{symptom.seen}: the package {code(package)} installed no {code(name)}",
         f"Name the launch file {code(name)}, and install it: "
         f"('share/{package}/launch', glob('launch/*')) in data_files of setup.py, or "
         "install(DIRECTORY launch DESTINATION share/${PROJECT_NAME}) in CMakeLists.txt.",

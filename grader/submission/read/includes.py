@@ -15,8 +15,7 @@ from itertools import islice
 from grader.submission.read.cmake import CMakeCommand, read_commands
 from grader.submission.record import Import
 
-SOURCES = (".c", ".cc", ".cpp", ".cxx")
-CODE = (*SOURCES, ".h", ".hh", ".hpp", ".hxx")
+CODE = (".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp", ".hxx")
 MOST_SOURCE_BYTES = 256 * 1024
 MOST_SOURCES = 200
 """Larger files, and more of them, are not read."""
