@@ -84,14 +84,14 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def heard(environment: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
-    """What `python -m sim` says on /tf and /odom at one time, and late on /tf_static."""
+    """What `rosgrade sim` says on /tf and /odom at one time, and late on /tf_static."""
     folder = tmp_path_factory.mktemp("worlds")
     world, options = folder / "room.yaml", folder / "options.yaml"
     world.write_text(WORLD)
     options.write_text(OPTIONS)
     with lock_domain() as domain:
         number = str(domain.domain_id)
-        command = [sys.executable, "-m", "sim", str(world), "--options", str(options)]
+        command = [sys.executable, "-m", "grader", "sim", str(world), "--options", str(options)]
         simulator = subprocess.Popen(
             [*command, "--domain-id", number],
             cwd=ROOT,
