@@ -24,7 +24,7 @@ from grader.submission.build import build_log, own_tests, standalone_build
 from grader.submission.build.bounded import Outcome
 from grader.submission.build.build_cache import INSTALL, BuildCache, CachedBuild
 from grader.submission.build.build_error_location import Sources, find_build_error, last_started
-from grader.submission.build.colcon import COMPILE_S, STOPPED, BuildLimits, BuildSetting, Colcon
+from grader.submission.build.colcon import COMPILE_S, BuildLimits, BuildSetting, Colcon
 from grader.submission.build.installed import tidy
 from grader.submission.build.toolchain import missing_here, missing_tools, watched_folders
 from grader.submission.intake.locate import Located, only
@@ -295,7 +295,7 @@ def _is_cut_off(status: int, output: str) -> bool:
     # As a shell tells of a signal, and bubblewrap does.
     if status < 0 or status > _SIGNALLED:
         return True
-    return "Starting >>>" in output and STOPPED not in output
+    return "Starting >>>" in output
 
 
 def _limit(outcome: Outcome, wall_s: float) -> str | None:

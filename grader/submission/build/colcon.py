@@ -30,8 +30,6 @@ _COMPILER_BYTES = 1024 * MIB
 """A compiler takes 750 MiB for a file that includes rclcpp."""
 _USABLE = 0.875
 """Share of the memory that builds may have together; the rest is for all else."""
-STOPPED = "Exception in job execution"
-"""The message of colcon when its executor stops in spite of --continue-on-error."""
 UNTOUCHABLE = """\
 import ctypes, os, runpy, sys
 ctypes.CDLL(None).prctl(4, 0, 0, 0, 0)
@@ -104,8 +102,6 @@ class Colcon:
             return self._build(finished)
 
     def _build(self, finished: set[str]) -> Outcome:
-        started: set[str] = set()
-
         def on_output(text: str) -> None:
             for line in build_log.own_lines(text).split("\n"):
                 self.setting.on_output(line)
@@ -115,35 +111,16 @@ class Colcon:
                 if match[1] == "Finished":
                     finished.add(match[2])
                 elif match[1] == "Starting":
-                    started.add(match[2])
                     self.setting.on_progress(f"building {match[2]}")
                 else:
                     # The last such line is colcon's own, even if a package printed one before.
                     finished.discard(match[2])
 
-        failed: set[str] = set()
-        total = Outcome(status=0, ended_by_us=None, output="", duration_s=0.0)
-        while True:
-            command = self._command()
-            if failed or finished:
-                command += ["--packages-skip", *sorted(failed | finished)]
-            if failed:
-                command += ["--packages-skip-by-dep", *sorted(failed)]
-            outcome = self._run(command, self.wall_s - total.duration_s, on_output)
-            outcome = replace(outcome, output=build_log.own_lines(outcome.output))
-            total = Outcome(
-                # It succeeded if all did.
-                status=total.status or outcome.status,
-                ended_by_us=outcome.ended_by_us,
-                output=total.output + outcome.output,
-                duration_s=total.duration_s + outcome.duration_s,
-            )
-            # Where setup.py raises before anything is built, colcon's executor stops with the
-            # exception in spite of --continue-on-error; the others are still to be built.
-            stopped = not outcome.ended_by_us and STOPPED in outcome.output
-            if not stopped or started - finished <= failed:
-                return total
-            failed = started - finished
+        command = self._command()
+        if finished:
+            command += ["--packages-skip", *sorted(finished)]
+        outcome = self._run(command, self.wall_s, on_output)
+        return replace(outcome, output=build_log.own_lines(outcome.output))
 
     def compile(self) -> None:
         """Compile what the build installed, so that nodes start without doing it."""
@@ -194,10 +171,13 @@ class Colcon:
         folders = [str(self.root / folder) for folder in self.folders.values()]
         command = _colcon(self.setting.ros, self.environment["PATH"])
         command += ["--log-base", os.devnull, "build"]
-        command += ["--merge-install", "--continue-on-error", "--executor", "sequential"]
+        command += ["--merge-install", "--continue-on-error"]
+        # Unlike the sequential executor it goes on where a setup.py raises before a build begins.
+        command += ["--executor", "parallel", "--parallel-workers", "1"]
         command += ["--build-base", str(self.scratch / "build")]
         command += ["--install-base", str(self.install)]
         command += ["--event-handlers", "console_direct+", "console_cohesion-", "console_stderr-"]
+        command += ["parallel_status-"]
         command += ["--base-paths", *folders]
         if not self.only_python:
             # Linters and test frameworks are not there to be found on a small installation.
