@@ -3,14 +3,13 @@
 rosgrade, its libraries and ROS's wheels share one environment. In a sandbox another one is
 mounted in its place, of the same files (hard links, or copies where links are not possible),
 that holds only what a machine with ROS and colcon has, and the libraries that the assignment
-allows. It is made once and kept in the cache, ``python/<key>/``. A process that uses one holds a
-shared lock on ``<key>.lock``; of those that are not used only the newest stay.
+allows. It is made once and kept in the cache, ``python/<key>/``, until no command has used it for
+a month.
 """
 
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import hashlib
 import os
 import re
@@ -19,7 +18,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
@@ -28,41 +26,15 @@ from grader.spec.nearest_name import did_you_mean
 from grader.tree import listing
 
 VERSION = 3
-KEPT = 4
-"""Trees that are not used at the moment; each holds up to 0.3 GB where ROS was updated since."""
 
 # With what `ros2` and launch files need, which a machine with ROS has as well.
 _ROOTS = re.compile(
     r"ros-.*|colcon-.*|setuptools|numpy|pyyaml|lark|empy|argcomplete|psutil|packaging|osrf-pycommon"
 )
 _NAME = re.compile(r"[A-Za-z0-9._-]+")
-_LOCK = ".lock"
 _UNFINISHED = ".unfinished-"
-_STALE_S = 3600.0
+_UNUSED_S = 30 * 24 * 3600.0
 _FOR_OTHERS = 0o444
-
-
-@dataclass(frozen=True)
-class PythonTree:
-    """An environment that is held: it stays as long as this object, or its process."""
-
-    path: Path
-    lock: int
-
-    def is_whole(self) -> bool:
-        """Whether all of it is still there as it was made: caches are emptied, disks damaged."""
-        try:
-            return _list_file(self.path).read_text(encoding="ascii") == _listed(self.path)
-        except (OSError, ValueError):
-            return False
-
-    def discard(self) -> None:
-        """Let another one be made in its place; what uses it keeps what is left."""
-        with contextlib.suppress(OSError):
-            self.path.rename(tempfile.mkdtemp(prefix=_UNFINISHED, dir=self.path.parent))
-
-    def __del__(self) -> None:
-        os.close(self.lock)
 
 
 def trees_folder(cache: Path) -> Path:
@@ -75,29 +47,38 @@ def trees_folder(cache: Path) -> Path:
     return folder
 
 
-def student_prefix(
-    cache: Path, libraries: Collection[str] = (), prefix: Path = Path(sys.prefix)
-) -> PythonTree:
+def student_prefix(cache: Path, libraries: Collection[str] = ()) -> Path:
     """The environment, made if it is not there."""
     check_installed(libraries)
-    wanted = frozenset(map(_normal, libraries))
+    prefix, wanted = Path(sys.prefix), frozenset(map(_normal, libraries))
     parts = [str(VERSION), str(prefix), sys.executable, sys.version, *sorted(wanted)]
     # Their folders are named by distribution and version; to read them all takes 0.1 s.
     parts += sorted(path.name for path in prefix.glob("lib/python3*/site-packages/*-info"))
     key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
-    target = trees_folder(cache) / key
-    lock = _open_lock(target)
-    # Waits only while it is being thrown away.
-    fcntl.flock(lock, fcntl.LOCK_SH)
-    tree = PythonTree(target, lock)
-    if target.is_dir() and not tree.is_whole():
-        tree.discard()
-    if not target.is_dir():
-        _make(target, prefix, _closure(wanted).values())
-        prune(target.parent)
+    tree = trees_folder(cache) / key
+    if tree.is_dir() and not is_whole(tree):
+        discard(tree)
+    if not tree.is_dir():
+        _make(tree, prefix, _closure(wanted).values())
+        prune(tree.parent)
     with contextlib.suppress(OSError):
-        os.utime(target)
+        for used in (tree, _list_file(tree)):
+            os.utime(used)
     return tree
+
+
+def is_whole(tree: Path) -> bool:
+    """Whether all of it is still there as it was made: caches are emptied, disks damaged."""
+    try:
+        return _list_file(tree).read_text(encoding="ascii") == _listed(tree)
+    except (OSError, ValueError):
+        return False
+
+
+def discard(tree: Path) -> None:
+    """Let another one be made in its place; what uses it keeps what is left."""
+    with contextlib.suppress(OSError):
+        tree.rename(tempfile.mkdtemp(prefix=_UNFINISHED, dir=tree.parent))
 
 
 def check_installed(libraries: Collection[str]) -> None:
@@ -135,31 +116,17 @@ def unlisted(modules: Collection[str], libraries: Collection[str]) -> tuple[str,
     )
 
 
-def prune(folder: Path, kept: int = KEPT) -> None:
-    """Throw away environments that are not used, but for the newest."""
-    stale_s = time.time() - _STALE_S
-    trees: list[tuple[float, Path]] = []
+def prune(folder: Path) -> None:
+    """Throw away what has not been used for a month."""
     for path in folder.iterdir():
         with contextlib.suppress(OSError):
-            used_s = path.lstat().st_mtime
-            if not path.name.startswith(_UNFINISHED):
-                trees += [(used_s, path)] if path.is_dir() else []
-            elif used_s < stale_s:
-                shutil.rmtree(path, ignore_errors=True)
-    for _, path in sorted(trees, reverse=True)[kept:]:
-        # The lock file stays: a process that waits for it would get a lock on a deleted file.
-        lock = _open_lock(path)
-        with contextlib.suppress(OSError):
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # Renamed first: a part of it is never found.
-            gone = path.rename(path.with_name(f"{_UNFINISHED}{path.name}"))
-            _list_file(path).unlink(missing_ok=True)
-            shutil.rmtree(gone, ignore_errors=True)
-        os.close(lock)
-
-
-def _open_lock(tree: Path) -> int:
-    return os.open(tree.with_name(tree.name + _LOCK), os.O_RDWR | os.O_CREAT, 0o600)
+            if time.time() - path.lstat().st_mtime < _UNUSED_S:
+                continue
+            if path.is_dir():
+                # Renamed first: a part of it is never found.
+                shutil.rmtree(path.rename(path.with_name(f"{_UNFINISHED}{path.name}")))
+            else:
+                path.unlink()
 
 
 def _normal(name: str) -> str:

@@ -21,7 +21,7 @@ from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.limits import BUILD, SandboxLimits, size_words
 from grader.sandbox.namespaces import MOUNT_POINTS
-from grader.sandbox.python_tree import PythonTree, student_prefix, trees_folder
+from grader.sandbox.python_tree import discard, is_whole, student_prefix, trees_folder
 from grader.sandbox.seccomp import student_filter
 from grader.sandbox.usage import (
     OrphanCpu,
@@ -57,7 +57,7 @@ class Sandbox:
     cache: Path
     libraries: tuple[str, ...] = ()
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
-    _tree: PythonTree | None = field(default=None, repr=False)
+    _tree: Path | None = field(default=None, repr=False)
     _others: dict[tuple[str, ...], Sandbox] = field(default_factory=dict, repr=False)
 
     @property
@@ -84,12 +84,9 @@ class Sandbox:
 
     @property
     def python_tree(self) -> Path:
-        """The Python environment of students; it is not thrown away while this sandbox is used."""
-        return self._held_tree().path
-
-    def _held_tree(self) -> PythonTree:
+        """The Python environment of students."""
         with self._lock:
-            if self._tree is None or not self._tree.path.is_dir():
+            if self._tree is None or not self._tree.is_dir():
                 self._tree = student_prefix(self.cache, self.libraries)
             return self._tree
 
@@ -101,19 +98,19 @@ class Sandbox:
 
     def watched(self) -> Callable[[], None]:
         """A function that raises :class:`GraderFault` if the students' Python was damaged."""
-        tree = self._held_tree() if _in_environment() else None
+        tree = self.python_tree if _in_environment() else None
 
         def check() -> None:
             if tree is None:
                 return
             with self._lock:
-                if self._tree is tree and tree.is_whole():
+                if self._tree is tree and is_whole(tree):
                     return
                 if self._tree is tree:
-                    tree.discard()
+                    discard(tree)
                     self._tree = None
             raise GraderFault(
-                f"files of the sandbox's Python were deleted in {tree.path.parent}, perhaps by a "
+                f"files of the sandbox's Python were deleted in {tree.parent}, perhaps by a "
                 "clean-up. Grade again: rosgrade makes them again"
             )
 
