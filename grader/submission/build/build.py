@@ -165,15 +165,13 @@ class Builder(BuildSetting):
         """
         quiet = replace(self, on_output=lambda _: None, tested=frozenset())
         for name in names:
-            folder = sources.folders[name]
-            with only(located, folder, name) as part:
+            with only(located, sources.folders[name], name) as part:
                 files = {file.path for file in part.files}
                 built = quiet.build(
                     part, Sources(files, {name: name}), only_python=False, is_standalone=True
                 )
             if built.build.succeeded and built.install is not None:
-                log = standalone_build.as_handed_in(built.build.log, name, folder)
-                yield name, replace(built, build=replace(built.build, log=log))
+                yield name, built
 
     def _run(
         self, colcon: Colcon, sources: Sources, parts: Mapping[str, CachedBuild]

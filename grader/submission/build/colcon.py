@@ -182,8 +182,8 @@ class Colcon:
         if not self.only_python:
             # Linters and test frameworks are not there to be found on a small installation.
             command += ["--cmake-args", "-DBUILD_TESTING=OFF"]
-            # Quicker than make, but stricter with rules that a student may have written; of these
-            # an interface package has none.
+            # Quicker than make, but stricter with rules that a student may have written; where it
+            # fails, the package is built with the others.
             if self.is_standalone and shutil.which("ninja", path=self.environment["PATH"]):
                 command += ["-GNinja"]
             if self.setting.ros.source == "wheels":

@@ -14,8 +14,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from grader.submission.intake.listing import SubmissionFile
-from grader.submission.intake.paths import is_within, shown
-from grader.submission.read.cmake import read_commands
+from grader.submission.intake.paths import is_within
 from grader.submission.read.manifest import MANIFEST
 from grader.submission.read.package import Package
 
@@ -24,18 +23,6 @@ _INTERFACES = (".msg", ".srv", ".action", ".idl")
 _DOCUMENTS = (".md", ".rst", ".txt")
 _OTHERS = ("LICENSE", "README", "CHANGELOG", ".gitignore", MANIFEST)
 
-# What an author uses for interfaces alone; others would miss something where the package is alone.
-# No safety depends on this list: the result of such a build is only used for the same files.
-_HARMLESS = """
-add_compile_options add_definitions ament_export_dependencies ament_export_include_directories
-ament_lint_auto_find_test_dependencies ament_package cmake_minimum_required cmake_policy else
-elseif endforeach endif endwhile file find_package foreach if install list math message option
-project return rosidl_generate_interfaces set string unset while
-"""
-_COMMANDS = frozenset(_HARMLESS.split())
-_GLOBS = ("GLOB", "GLOB_RECURSE")
-_PROGRAMS = frozenset({"CODE", "SCRIPT"})
-_WAYS_OUT = ("..", "$ENV", "CMAKE_INSTALL_PREFIX", "CMAKE_PREFIX_PATH")
 _PREFIX = re.compile(r'^_colcon_package_sh_COLCON_CURRENT_PREFIX="(/.*)"$', re.MULTILINE)
 
 
@@ -57,28 +44,18 @@ def _is_harmless(path: str) -> bool:
 
 
 def _needs_nothing(package: Package, others: set[str]) -> bool:
-    """Whether a package does not look at the others, and makes only its own interfaces."""
+    """Whether a package makes interfaces and names neither the others nor the folders above it.
+
+    No safety depends on this: the result of such a build is only used for the same files.
+    """
     manifest, cmake = package.manifest, package.cmake
     if cmake is None or manifest.error is not None or package.build_type != "ament_cmake":
         return False
-    if manifest.name != package.name:
+    if manifest.name != package.name or others & {one.name for one in manifest.dependencies}:
         return False
-    named = {dependency.name for dependency in manifest.dependencies}
-    if others & named or any(text in cmake for text in (*others, *_WAYS_OUT)):
-        return False
-    commands = read_commands(cmake)
-    return any(one.name == "rosidl_generate_interfaces" for one in commands) and all(
-        one.name in _COMMANDS
-        and (one.name != "file" or one.arguments[:1] in [(glob,) for glob in _GLOBS])
-        and _PROGRAMS.isdisjoint(one.arguments)
-        and not any(argument.startswith("/") for argument in one.arguments)
-        for one in commands
+    return "rosidl_generate_interfaces" in cmake and not any(
+        text in cmake for text in (*others, "..")
     )
-
-
-def as_handed_in(log: str, package: str, folder: str) -> str:
-    """Name the files of a package in a log by where they are in the submission."""
-    return re.sub(rf"(?<![\w/.-]){package}/(?=[\w.])", lambda _: f"{shown(folder)}/", log)
 
 
 def lay(package: str, built: Path, install: Path) -> None:
