@@ -189,7 +189,6 @@ def _prepare(
         files={file.path for file in located.files},
         folders={package.name: package.folder for package in packages},
         texts={path: lines for package in packages for path, lines in package.texts.items()},
-        malformed={package.name: package.setup.malformed for package in packages},
     )
     built = replace(builder, ros=ros, tested=tested(record)).build(
         located,

@@ -7,8 +7,6 @@ from textwrap import dedent
 import pytest
 
 from grader.submission.build.build_error_location import Sources, find_build_error, last_started
-from grader.submission.record import SourceError
-from tests.submission.samples import SETUP_PY
 
 FILES = {
     "src/bot/setup.py",
@@ -22,10 +20,7 @@ FILES = {
 SOURCES = Sources(
     files=FILES,
     folders={"bot": "src/bot", "c": "src/c"},
-    texts={
-        "src/bot/setup.py": SETUP_PY.splitlines(),
-        "src/c/msg/Bot.msg": ["uint8 model", "unit8 x"],
-    },
+    texts={"src/c/msg/Bot.msg": ["uint8 model", "unit8 x"]},
 )
 RUN_SETUP = """\
 Traceback (most recent call last):
@@ -33,9 +28,6 @@ Traceback (most recent call last):
   File "/venv/setuptools/_distutils/core.py", line 267, in run_setup
     exec(code, g)
 """
-NEVER_CALLED = (
-    f"Starting >>> bot\n{RUN_SETUP}RuntimeError: 'distutils.core.setup()' was never called\n"
-)
 
 
 def culprit(log: str, *failed: str, sources: Sources = SOURCES) -> str:
@@ -46,14 +38,6 @@ LOGS = {
     "setup.py raises": (
         f'Starting >>> bot\n{RUN_SETUP}  File "<string>", line 5, in <module>\nValueError: boom\n',
         "src/bot/setup.py:5: ValueError: boom",
-    ),
-    "setup.cfg cannot be read": (
-        f'Starting >>> bot\n{RUN_SETUP}  File "<string>", line 7, in <module>\n'
-        '  File "/venv/setuptools/dist.py", line 448, in _parse_config_files\n'
-        "configparser.MissingSectionHeaderError: File contains no section headers.\n"
-        "file: 'setup.cfg', line: 1\n",
-        "src/bot/setup.py:7: configparser.MissingSectionHeaderError: File contains no section "
-        "headers. file: 'setup.cfg', line: 1",
     ),
     "syntax of setup.py": (
         f'Starting >>> bot\n{RUN_SETUP}  File "<string>", line 7\n'
@@ -90,39 +74,9 @@ LOGS = {
         """,
         "src/bot/setup.py: there is no setup.py",
     ),
-    "setuptools, quoted in setup.py": (
-        "Starting >>> bot\nerror: package directory 'resource/' does not exist\n",
-        "src/bot/setup.py:10: package directory 'resource/' does not exist",
-    ),
     "setuptools": (
         "Starting >>> bot\nerror: can't copy 'resource/bot': doesn't exist\n",
         "src/bot/setup.py: can't copy 'resource/bot': doesn't exist",
-    ),
-    "setup() never called": (
-        NEVER_CALLED,
-        "src/bot/setup.py: setup() is never called, or refuses its arguments",
-    ),
-    "absolute data_files": (
-        """\
-        Starting >>> bot
-        Traceback (most recent call last):
-          File "/venv/colcon_core/task/python/__init__.py", line 38, in get_data_files_mapping
-            assert not os.path.isabs(dest)
-        AssertionError
-        """,
-        "src/bot/setup.py: data_files names an absolute folder; write 'share/<package>'",
-    ),
-    "setup.py prints": (
-        """\
-        Starting >>> bot
-        Traceback (most recent call last):
-          File "/venv/colcon_python_setup_py/python_setup_py.py", line 301, in _get_setup
-            return ast.literal_eval(output)
-          File "<unknown>", line 1
-            Hello
-        SyntaxError: invalid syntax
-        """,
-        "src/bot/setup.py: setup.py prints something: colcon cannot read its answer then",
     ),
     "CMake": (
         """\
@@ -282,13 +236,6 @@ def test_the_first_place_that_a_log_names_is_found(log: str, found: str) -> None
     assert culprit(log) == found
 
 
-def test_a_setup_that_setuptools_refuses_is_explained_by_its_entry_points() -> None:
-    malformed = {"bot": (SourceError("src/bot/setup.py", 20, "the entry point 'x' is bad"),)}
-    sources = Sources(FILES, SOURCES.folders, SOURCES.texts, malformed)
-    found = culprit(NEVER_CALLED, sources=sources)
-    assert found == "src/bot/setup.py:20: the entry point 'x' is bad"
-
-
 def test_a_package_that_was_finished_is_no_reason() -> None:
     log = """\
         Starting >>> bot
@@ -310,13 +257,12 @@ def test_a_message_is_printable_and_not_endless() -> None:
 
 
 def test_a_log_that_quotes_thousands_of_names_is_read_at_once() -> None:
-    texts = {"src/bot/setup.py": ["x"] * 100_000}
+    texts = {"src/c/msg/Bot.msg": ["x"] * 100_000}
     quoted = " ".join(f"'a{number}'" for number in range(10_000))
-    found = find_build_error(
-        f"Starting >>> bot\nerror: {quoted}\n", ("bot",), Sources(FILES, SOURCES.folders, texts)
+    log = f"{LOGS['interface'][0]}".replace("'unit8'", quoted)
+    assert culprit(log, sources=Sources(FILES, SOURCES.folders, texts)).startswith(
+        "src/c/CMakeLists.txt:5: rosidl_adapter.parser.InvalidResourceName: 'a0' 'a1'"
     )
-    assert found is not None
-    assert (found.file, found.line) == ("src/bot/setup.py", None)
     assert find_build_error(f"Starting >>> bot\n{'setup.py' * 16_000}\n", ("bot",), SOURCES) is None
 
 
@@ -340,6 +286,12 @@ def test_where_a_compiler_is_ended_its_file_is_named() -> None:
             "/usr/bin/ld: x.o: undefined reference to `drive'\ncollect2: error: ld returned 1",
             "/usr/bin/ld: x.o: undefined reference to `drive'",
         ),
+        (
+            "Traceback (most recent call last):\n"
+            "RuntimeError: 'distutils.core.setup()' was never called\n"
+            "subprocess.CalledProcessError: Command '[...]' failed",
+            "RuntimeError: 'distutils.core.setup()' was never called",
+        ),
         ("", "there is no error message"),
     ],
 )
@@ -347,6 +299,6 @@ def test_where_no_file_is_blamed_the_log_s_own_words_are_shown(said: str, words:
     log = (
         f"Starting >>> c\n--- stderr: c\n{said}\n"
         "gmake[1]: *** [CMakeFiles/Makefile2:183: all] Error 2\n---\n"
-        "Failed   <<< c [0.5s, exited with code 2]\n"
+        "Failed   <<< c [0.5s, exited with code 2]\nCommand 'c' ended with an error\n"
     )
     assert str(last_started(log, SOURCES, None)) == f"src/c/CMakeLists.txt: {words}"

@@ -35,19 +35,10 @@ _INTERFACE = re.compile(r"Error processing '([^']+)' of package '[^']+': (.+)")
 _QUOTED = re.compile(r"'([^']+)'")
 _RUN_SETUP = ", in run_setup"
 _NO_CMAKELISTS = "does not appear to contain CMakeLists.txt"
-_NEVER_CALLED = "setup()' was never called"
-_OF_SETUP = {
-    _NEVER_CALLED: "setup() is never called, or refuses its arguments",
-    "os.path.isabs(dest)": "data_files names an absolute folder; write 'share/<package>'",
-    "ast.literal_eval(output)": "setup.py prints something: colcon cannot read its answer then",
-}
-"""What stands in a traceback of colcon's own code -> what is wrong in setup.py."""
-_INTERFACES = (".msg", ".srv", ".action")
+_ENDED = re.compile(r"^(?:Failed|Aborted) +<<<", re.MULTILINE)
 # What colcon and make say of a program that failed, and not that program itself.
-_AROUND = re.compile(
-    r"g?make(\[\d+\])?: |ninja: |---( |$)|(Failed|Aborted) +<<<|Summary:|\s+\d+ pack"
-)
-_ERROR = re.compile(r"\berror\b|undefined reference", re.IGNORECASE)
+_AROUND = re.compile(r"g?make(\[\d+\])?: |ninja: |---( |$)")
+_ERROR = re.compile(r"\berror\b|^[\w.]+Error\b|undefined reference", re.IGNORECASE)
 _MAX_MESSAGE = 500
 _MOST_QUOTED = 10
 _MOST_LINES = 10_000
@@ -60,14 +51,12 @@ class Sources:
 
     Attributes:
         folders: Of each package.
-        texts: Lines of each setup.py and interface file, in which quoted names are looked up.
-        malformed: Entry points of each package that setuptools refuses.
+        texts: Lines of each interface file, in which quoted names are looked up.
     """
 
     files: Collection[str]
     folders: Mapping[str, str]
     texts: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    malformed: Mapping[str, tuple[SourceError, ...]] = field(default_factory=dict)
 
 
 def find_build_error(log: str, failed: Collection[str], sources: Sources) -> SourceError | None:
@@ -117,7 +106,8 @@ def last_started(log: str, sources: Sources, problem: str | None) -> SourceError
 
 def _last_words(log: str) -> str:
     """The first line of a package's log that tells of an error, or its last line."""
-    lines = [line.strip() for line in log.splitlines() if line.strip() and not _AROUND.match(line)]
+    own = _ENDED.split(log)[0].splitlines()
+    lines = [line.strip() for line in own if line.strip() and not _AROUND.match(line)]
     errors = [line for line in lines if _ERROR.search(line)]
     return [*errors[:1], *lines[-1:], "there is no error message"][0][:_MAX_MESSAGE]
 
@@ -159,7 +149,7 @@ class _Place:
         if _NO_SETUP_PY.match(line):
             return SourceError(self.setup_py, None, "there is no setup.py")
         if match := _SETUPTOOLS.match(line):
-            return self._setup(match[1])
+            return self._at(self.setup_py, None, match[1])
         return None
 
     def _path(self, name: str) -> str:
@@ -201,24 +191,13 @@ class _Place:
     def _traceback(self) -> SourceError | None:
         block = self._block()
         message = block[-1] if block else ""
-        if message.startswith("configparser."):
-            # Which file cannot be read, setup.cfg, is said in the next line.
-            end = self.number + len(block)
-            message = " ".join(self.lines[end : end + 2])
         found, in_setup = None, False
         for line in block:
             if frame := _FRAME.match(line):
                 path = self.setup_py if in_setup and frame[1] == "<string>" else frame[1]
                 in_setup = in_setup or _RUN_SETUP in line
                 found = self._at(path, int(frame[2]), message) or found
-        if found is not None:
-            return found
-        malformed = self.sources.malformed.get(self.package)
-        if _NEVER_CALLED in message and malformed:
-            return malformed[0]
-        text = "\n".join(block)
-        wrong = next((wrong for sign, wrong in _OF_SETUP.items() if sign in text), None)
-        return self._setup(wrong) if wrong else None
+        return found
 
     def _plain_cmake(self, message: str) -> SourceError | None:
         if _NO_CMAKELISTS not in message:
@@ -237,7 +216,7 @@ class _Place:
         if any(_TRACEBACK in paragraph for paragraph in paragraphs):
             # The generators of interfaces: what they raise is the last that they say.
             message = paragraphs[-1]
-            quoted = self._quoted(message, _INTERFACES)
+            quoted = self._quoted(message)
             if quoted is not None:
                 return quoted
         if match[1] == "cmake_install.cmake":
@@ -254,18 +233,13 @@ class _Place:
                 yield from ((caller[1], caller[2]) for caller in callers if caller)
                 return
 
-    def _setup(self, message: str) -> SourceError | None:
-        if self.setup_py not in self.sources.files:
-            return None
-        return self._quoted(message, ("setup.py",)) or SourceError(self.setup_py, None, message)
-
-    def _quoted(self, message: str, endings: tuple[str, ...]) -> SourceError | None:
-        """The first line of such a file of the package that has what the message quotes."""
+    def _quoted(self, message: str) -> SourceError | None:
+        """The first line of an interface of the package that has what the message quotes."""
         folder = self._path("")
         for quoted in _QUOTED.findall(message)[:_MOST_QUOTED]:
             word = re.compile(rf"(?<![\w-]){re.escape(quoted)}(?![\w-])")
             for file, lines in sorted(self.sources.texts.items()):
-                if file.startswith(folder) and file.endswith(endings):
+                if file.startswith(folder):
                     for number, line in enumerate(lines[:_MOST_LINES], start=1):
                         if word.search(line):
                             return SourceError(file, number, message)

@@ -43,7 +43,6 @@ class Package:
     """A package as handed in; see :class:`PackageRecord` for what it shares with that.
 
     Attributes:
-        setup_py: The lines of its setup.py, or None where it has none.
         hashes: Path of each Python file in the submission -> hash of its content.
         trees: Path of each Python file -> its syntax tree, or why there is none.
         code_cpp: Path of each file of C and C++, from the folder of the package -> its text.
@@ -54,7 +53,7 @@ class Package:
     manifest: Manifest
     setup: Setup
     cmake: str | None
-    setup_py: Sequence[str] | None
+    has_setup_py: bool
     definitions: tuple[Definition, ...]
     hashes: Mapping[str, str]
     trees: Mapping[str, ast.Module | SourceError]
@@ -65,7 +64,7 @@ class Package:
     @property
     def build_type(self) -> str:
         """As colcon takes it; guessed where package.xml is broken before it says."""
-        guessed = "ament_cmake" if self.setup_py is None else "ament_python"
+        guessed = "ament_python" if self.has_setup_py else "ament_cmake"
         return self.manifest.build_type or guessed
 
     @property
@@ -77,13 +76,8 @@ class Package:
 
     @property
     def texts(self) -> dict[str, Sequence[str]]:
-        """Lines of setup.py and of the definitions, by path: what messages of a build quote."""
-        found: dict[str, Sequence[str]] = {
-            one.file: one.text.splitlines() for one in self.definitions
-        }
-        if self.setup_py is not None:
-            found[join(self.folder, SETUP_PY)] = self.setup_py
-        return found
+        """Lines of the definitions, by path: what messages of a build quote."""
+        return {one.file: one.text.splitlines() for one in self.definitions}
 
     @property
     def code(self) -> dict[str, ast.Module | SourceError]:
@@ -223,7 +217,7 @@ def read_package(
         manifest=manifest,
         setup=setup,
         cmake=None if cmake is None else _text(cmake),
-        setup_py=None if setup_py is None else _text(setup_py).splitlines(),
+        has_setup_py=setup_py is not None,
         definitions=tuple(
             Definition(file.path, _text(_bytes(located, file.path) or b""))
             for file in [one for one in files if _is_definition(one)][:_MOST_DEFINITIONS]

@@ -48,7 +48,6 @@ class Setup:
 
     name: str | None = None
     entry_points: tuple[EntryPoint, ...] = ()
-    malformed: tuple[SourceError, ...] = ()
 
 
 class _Text(str):
@@ -74,18 +73,13 @@ def read_setup(
             keywords = {}
     groups = keywords.get("entry_points")
     scripts = groups.get(_GROUP) if isinstance(groups, dict) else None
-    found, malformed = [], []
-    for script in scripts if isinstance(scripts, list) else []:
-        if not isinstance(script, _Text):
-            continue
-        entry = parse_entry_point(script, file, script.line)
-        if entry is not None:
-            found.append(entry)
-        else:
-            message = f"the entry point {str(script)!r} is not of the form 'name = module:function'"
-            malformed.append(SourceError(file, script.line, message))
+    texts = scripts if isinstance(scripts, list) else []
+    entries = (parse_entry_point(one, file, one.line) for one in texts if isinstance(one, _Text))
     name = keywords.get("name")
-    return Setup(str(name) if isinstance(name, _Text) else None, tuple(found), tuple(malformed))
+    return Setup(
+        str(name) if isinstance(name, _Text) else None,
+        tuple(entry for entry in entries if entry is not None),
+    )
 
 
 def parse_entry_point(text: str, file: str, line: int | None = None) -> EntryPoint | None:
