@@ -1,8 +1,4 @@
-"""The LiDAR: rays against line segments and circles, all at once in numpy.
-
-A scan is taken in the sensor's frame. Each wall covers a run of neighbouring beams, which
-follows from the directions of its two ends; only these pairs of beam and wall are
-intersected. So the cost grows with what is seen and not with beams times walls.
+"""The LiDAR: every ray against every line segment and circle, all at once in numpy.
 
 All beams of a scan are taken at one instant (``time_increment`` is 0). Shapes are seen as
 their outlines.
@@ -23,11 +19,11 @@ from sim.shapes import Shape
 from sim.world import World
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
-_BEAM_MARGIN = 1e-9
-"""In beams: a ray that misses an end by rounding still counts, so that no ray slips through
-the corner of a polygon."""
+_ROUNDING_M = 1e-9
+"""A ray that misses an end by less still counts, so that none slips through a corner."""
+_AT_ONCE = 1_000_000
+"""Pairs of a beam and a wall, for the memory that they take."""
 _BRIGHTNESS = 2000.0
 """Intensity at no distance, about as the LDS-01 reports it of a white wall."""
 
@@ -59,9 +55,8 @@ class Lidar:
         self.angle_increment_rad = math.tau / options.beams
         self.angle_max_rad = self.angle_min_rad + (options.beams - 1) * self.angle_increment_rad
         self._world = world
-        self._walls = _outlines(world.shapes)
+        self._capsules = _capsules(world.shapes)
         self.angles_rad = self.angle_min_rad + np.arange(options.beams) * self.angle_increment_rad
-        self._cos, self._sin = np.cos(self.angles_rad), np.sin(self.angles_rad)
 
     def cast(self, pose: Pose, time_ns: int) -> Floats:
         """True distances from a robot at a pose in the world's frame.
@@ -72,9 +67,12 @@ class Lidar:
         """
         sensor = compose(pose, self.options.pose)
         ranges = np.full(self.options.beams, np.inf)
-        self._see(self._walls, sensor, ranges)
-        if self._world.moving:
-            self._see(_outlines(self._world.moving_at(time_ns)), sensor, ranges)
+        for capsules in (self._capsules, _capsules(self._world.moving_at(time_ns))):
+            parts = 1 + self.options.beams * len(capsules) // _AT_ONCE
+            for part in np.array_split(capsules, parts):
+                is_wall = part[:, 4] == 0.0
+                np.minimum(ranges, self._to_walls(part[is_wall], sensor), out=ranges)
+                np.minimum(ranges, self._to_circles(part[~is_wall], sensor), out=ranges)
         ranges[ranges > self.options.range_max] = np.inf
         return ranges
 
@@ -94,85 +92,41 @@ class Lidar:
         ranges[ranges < options.range_min] = 0.0 if is_zero else -np.inf
         return Scan(time_ns, ranges.astype(np.float32))
 
-    def _see(self, outlines: tuple[Floats, Floats], sensor: Pose, ranges: Floats) -> None:
-        segments, circles = outlines
-        if segments.size:
-            self._see_segments(segments, sensor, ranges)
-        if circles.size:
-            self._see_circles(circles, sensor, ranges)
-
-    def _see_segments(self, segments: Floats, sensor: Pose, ranges: Floats) -> None:
-        ax, ay = _into_frame(segments[0], segments[1], sensor)
-        bx, by = _into_frame(segments[2], segments[3], sensor)
-        ex, ey = bx - ax, by - ay
-        # Nearest point of each wall, to leave out what is beyond the range.
-        along = np.clip(-(ax * ex + ay * ey) / (ex * ex + ey * ey), 0.0, 1.0)
-        nearest = np.hypot(ax + along * ex, ay + along * ey)
-        seen = nearest <= self.options.range_max
-        if not seen.all():
-            ax, ay, bx, by, ex, ey = (item[seen] for item in (ax, ay, bx, by, ex, ey))
-            nearest = nearest[seen]
-        offset = ax * ey - ay * ex
-        begin, end = np.arctan2(ay, ax), np.arctan2(by, bx)
-        sweep = np.remainder(end - begin + math.pi, math.tau) - math.pi
-        wall, beam = self._pairs(np.where(sweep >= 0.0, begin, end), np.abs(sweep))
-        slope = self._cos[beam] * ey[wall] - self._sin[beam] * ex[wall]
-        end_a, end_b = np.hypot(ax, ay), np.hypot(bx, by)
+    def _to_walls(self, walls: Floats, sensor: Pose) -> Floats:
+        """How far each beam goes until it meets one of some walls; inf where it meets none."""
+        ahead_a, left_a = self._from_beams(walls[:, 0], walls[:, 1], sensor)
+        ahead_b, left_b = self._from_beams(walls[:, 2], walls[:, 3], sensor)
         with np.errstate(divide="ignore", invalid="ignore"):
-            distance = offset[wall] / slope
+            share = np.clip(left_a / (left_a - left_b), 0.0, 1.0)
+        distance = ahead_a + share * (ahead_b - ahead_a)
         # Seen along its length a wall has no width: the nearer end counts.
-        distance = np.where(np.isfinite(distance), distance, np.minimum(end_a, end_b)[wall])
-        distance = np.clip(distance, nearest[wall], np.maximum(end_a, end_b)[wall])
-        np.minimum.at(ranges, beam, distance)
+        distance = np.where(np.isnan(share), np.minimum(ahead_a, ahead_b), distance)
+        meets = (distance >= 0.0) & (np.minimum(left_a, left_b) <= _ROUNDING_M)
+        meets &= np.maximum(left_a, left_b) >= -_ROUNDING_M
+        return _nearest(distance, meets)
 
-    def _see_circles(self, circles: Floats, sensor: Pose, ranges: Floats) -> None:
-        x, y = _into_frame(circles[0], circles[1], sensor)
-        radius = circles[2]
-        centre = np.hypot(x, y)
-        seen = np.abs(centre - radius) <= self.options.range_max
-        x, y, radius, centre = x[seen], y[seen], radius[seen], centre[seen]
-        outside = centre > radius
-        half = np.where(
-            outside, np.arcsin(np.minimum(1.0, radius / np.maximum(centre, radius))), math.pi
-        )
-        circle, beam = self._pairs(np.arctan2(y, x) - half, 2.0 * half)
-        cos, sin = self._cos[beam], self._sin[beam]
-        along = cos * x[circle] + sin * y[circle]
-        across = cos * y[circle] - sin * x[circle]
-        depth = np.sqrt(np.maximum(0.0, radius[circle] ** 2 - across**2))
-        distance = np.where(outside[circle], along - depth, along + depth)
-        np.minimum.at(ranges, beam, np.maximum(distance, 0.0))
+    def _to_circles(self, circles: Floats, sensor: Pose) -> Floats:
+        """The same for circles."""
+        ahead, left = self._from_beams(circles[:, 0], circles[:, 1], sensor)
+        radius = circles[:, 4]
+        depth = np.sqrt(np.maximum(0.0, radius**2 - left**2))
+        distance = np.where(np.hypot(ahead, left) > radius, ahead - depth, ahead + depth)
+        return _nearest(distance, (distance >= 0.0) & (np.abs(left) <= radius))
 
-    def _pairs(self, begin_rad: Floats, sweep_rad: Floats) -> tuple[Ints, Ints]:
-        """All pairs of a wall and a beam that meets it, as indices of shape (pairs,) each.
-
-        Args:
-            begin_rad: Shape (walls,), clockwise end of each wall as a direction.
-            sweep_rad: Shape (walls,), how far it reaches counter-clockwise from there.
-        """
-        begin = (begin_rad - self.angle_min_rad) / self.angle_increment_rad
-        end = begin + sweep_rad / self.angle_increment_rad
-        first = np.ceil(begin - _BEAM_MARGIN).astype(np.int64)
-        last = np.floor(end + _BEAM_MARGIN).astype(np.int64)
-        count = np.clip(last - first + 1, 0, self.options.beams)
-        wall = np.repeat(np.arange(count.size), count)
-        before = np.cumsum(count) - count
-        beam = np.arange(wall.size) - before[wall] + first[wall]
-        return wall, np.remainder(beam, self.options.beams)
+    def _from_beams(self, x_m: Floats, y_m: Floats, sensor: Pose) -> tuple[Floats, Floats]:
+        """How far points lie ahead and to the left of each beam, shape (beams, points) each."""
+        yaw_rad = sensor.yaw_rad + self.angles_rad[:, np.newaxis]
+        cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
+        dx, dy = x_m - sensor.x_m, y_m - sensor.y_m
+        return cos * dx + sin * dy, cos * dy - sin * dx
 
 
-def _outlines(shapes: Iterable[Shape]) -> tuple[Floats, Floats]:
-    """Segments, shape (4, n): x1, y1, x2, y2; and circles, shape (3, m): x, y, radius."""
-    capsules = [capsule for shape in shapes for capsule in shape.capsules]
-    segments = [item[:4] for item in capsules if item[4] == 0.0]
-    circles = [(item[0], item[1], item[4]) for item in capsules if item[4] > 0.0]
-    return (
-        np.array(segments, dtype=float).reshape(-1, 4).T.copy(),
-        np.array(circles, dtype=float).reshape(-1, 3).T.copy(),
-    )
+def _nearest(distance: Floats, meets: NDArray[np.bool_]) -> Floats:
+    nearest: Floats = np.where(meets, distance, np.inf).min(axis=1, initial=np.inf)
+    return nearest
 
 
-def _into_frame(x: Floats, y: Floats, sensor: Pose) -> tuple[Floats, Floats]:
-    cos, sin = math.cos(sensor.yaw_rad), math.sin(sensor.yaw_rad)
-    dx, dy = x - sensor.x_m, y - sensor.y_m
-    return cos * dx + sin * dy, cos * dy - sin * dx
+def _capsules(shapes: Iterable[Shape]) -> Floats:
+    """Shape (n, 5): x1, y1, x2, y2, radius, which is zero for a wall."""
+    found = [capsule for shape in shapes for capsule in shape.capsules]
+    return np.array(found, dtype=float).reshape(-1, 5)
