@@ -30,8 +30,9 @@ from grader.checks.check import Check, Subject
 from grader.checks.tolerance import TimeTolerance
 from grader.diagnosis.explanation import explanations
 from grader.findings import finding
-from grader.recording import event, interaction, simulated
+from grader.recording import interaction, simulated
 from grader.recording import model as recording
+from grader.recording.mcap_writer import FACTS
 from grader.report.concepts import concepts
 from grader.spec.unit import UNITS, Dimension, format_duration
 from grader.starter import rendered
@@ -111,25 +112,8 @@ _EXAMPLES = {
     Dimension.SIZE: "64 MiB",
 }
 _RECORDED = (
-    recording.Recording,
-    recording.Message,
-    recording.Node,
-    recording.Endpoint,
-    recording.Qos,
-    recording.Process,
-    recording.LogLine,
-    recording.Call,
-    interaction.Goal,
-    interaction.Asked,
-    interaction.Feedback,
-    interaction.Service,
-    recording.Join,
-    event.Intervention,
-    simulated.Truth,
-    simulated.Incident,
-    simulated.Scene,
-    recording.Declaration,
-    event.Disturbance,
+    *(recording.Recording, recording.Message, *dict.fromkeys(FACTS.values())),
+    *(recording.Qos, interaction.Feedback, simulated.Scene),
 )
 _FOUND = (finding.Finding, finding.Evidence, finding.Moment, finding.Plot, finding.Table)
 _READABLE = (FunctionType, property, cached_property)

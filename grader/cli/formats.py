@@ -133,14 +133,12 @@ class Formats:
         if not self.github:
             yield
             return
-        from grader.report.formats import github
-
         token = secrets.token_hex(16)
-        print(github.stop_commands(token), flush=True)
+        print(f"::stop-commands::{token}", flush=True)
         try:
             yield
         finally:
-            print(github.resume_commands(token), flush=True)
+            print(f"::{token}::", flush=True)
 
     def write(self, result: Result, submission: Path | None = None) -> None:
         """Write everything that was asked for."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from markupsafe import Markup
 
@@ -14,56 +14,46 @@ ROW = 17
 GAP = 6
 
 
-@dataclass(frozen=True)
-class Flag:
+class Flag(NamedTuple):
     """A labelled time, in seconds since launch."""
 
     time_s: float
     text: str
 
-    @property
-    def length(self) -> float:
-        """Pixels that its text takes."""
-        return len(self.text) * LETTER + GAP
 
-
-@dataclass(frozen=True)
-class PlacedFlag:
-    """A flag with its place.
-
-    Attributes:
-        x: Pixel of its leader.
-        extent: First and last pixel of its text.
-        left: Whether its text lies left of the leader, because it would not fit on the right.
-    """
+class PlacedFlag(NamedTuple):
+    """A flag with the pixel of its leader, and the first and the last one of its text."""
 
     flag: Flag
     x: float
     extent: tuple[float, float]
-    left: bool
     row: int
+
+    @property
+    def left(self) -> bool:
+        """Whether its text lies left of the leader, because it would not fit on the right."""
+        return self.extent[0] < self.x
 
 
 def place(flags: Sequence[Flag], scale: Scale) -> list[PlacedFlag]:
-    """Give every flag a row, so that no text meets another.
+    """Give every flag, by time, a row, so that no text meets another.
 
     Each goes below all texts before it that it would meet: so the leader of a later one begins
     below an earlier text. Texts to the left mirror this, the latest is on top, and they come
     first: only there a leader passes behind a text.
-
-    Args:
-        flags: By time.
-        scale: Seconds to pixels.
     """
     placed: list[PlacedFlag] = []
-    at = [(scale.clipped(flag.time_s), flag) for flag in flags]
-    lefts = [(x, flag) for x, flag in reversed(at) if x + flag.length > scale.end]
-    rights = [(x, flag) for x, flag in at if x + flag.length <= scale.end]
-    for index, (x, flag) in enumerate(lefts + rights):
-        left = index < len(lefts)
-        begin, end = extent = (x - flag.length, x) if left else (x, x + flag.length)
+    lefts: list[tuple[Flag, float, tuple[float, float]]] = []
+    rights: list[tuple[Flag, float, tuple[float, float]]] = []
+    for flag in flags:
+        x, length = scale.clipped(flag.time_s), len(flag.text) * LETTER + GAP
+        if x + length > scale.end:
+            lefts.insert(0, (flag, x, (x - length, x)))
+        else:
+            rights.append((flag, x, (x, x + length)))
+    for flag, x, (begin, end) in lefts + rights:
         met = [one.row for one in placed if one.extent[0] < end + 1 and begin - 1 < one.extent[1]]
-        placed.append(PlacedFlag(flag, x, extent, left, 1 + max(met, default=-1)))
+        placed.append(PlacedFlag(flag, x, (begin, end), 1 + max(met, default=-1)))
     return sorted(placed, key=lambda one: (one.flag.time_s, one.x))
 
 

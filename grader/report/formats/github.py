@@ -77,16 +77,6 @@ def status(result: Result) -> str:
     return "passed" if result.known_score == result.known_max_score else "failed"
 
 
-def stop_commands(token: str) -> str:
-    """Make the runner obey nothing until :func:`resume_commands` with the same token."""
-    return f"::stop-commands::{token}"
-
-
-def resume_commands(token: str) -> str:
-    """Make the runner obey again."""
-    return f"::{token}::"
-
-
 def command(name: str, message: str, **properties: str) -> str:
     """Write a workflow command; its properties, such as ``file``, are decoded by the runner."""
     settings = ",".join(f"{key}={_property(value)}" for key, value in properties.items())
