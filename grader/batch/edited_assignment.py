@@ -15,7 +15,6 @@ from grader.batch.ledger import Ledger
 from grader.batch.regrading import stored_assignment
 from grader.errors import AssignmentError, RosgradeError, UsageError, machine_fault
 from grader.report.files import write_whole
-from grader.report.model.result import read_json
 
 FOLDER = "assignment"
 _BEFORE = "before.json"
@@ -72,7 +71,7 @@ def new_place(ledger: Ledger) -> Path:
 def load_before(ledger: Ledger) -> LoadedAssignment | None:
     """The assignment before the one that the class is graded with; None if that is the first."""
     file = Path(ledger.read().location or "").parent / _BEFORE
-    return _load(ledger, read_json(file)["location"]) if file.is_file() else None
+    return _load(ledger, json.loads(file.read_text())["location"]) if file.is_file() else None
 
 
 def _load(ledger: Ledger, location: str | None) -> LoadedAssignment:

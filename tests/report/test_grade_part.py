@@ -15,7 +15,7 @@ from tests.report.sample import lost_points
 
 MEASURED = {"schema", "rosgrade_version", "environment", "started", "duration_s"}
 # Of a person or of the course: they come after the grade of the checks.
-ADDED = {"adjustments", "comments", "attempts"}
+ADDED = {"adjustments", "comments", "attempts", "hints_opened"}
 MEASURED_OF_A_CHECK = {"observed", "disturbed", "traceback", "evidence"}
 
 

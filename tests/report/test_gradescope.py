@@ -175,7 +175,7 @@ def test_lateness_is_counted_from_the_submission_and_never_from_now(
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("{", "is not JSON"),
+        ("{", "Invalid JSON"),
         ("[]", "is not Gradescope's submission_metadata.json"),
         ('{"created_at": "soon"}', "created_at"),
     ],

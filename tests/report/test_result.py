@@ -153,10 +153,10 @@ def test_the_schema_describes_what_is_written():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{", r"result\.json is not JSON: "),
-        ("[]", r"its schema is None, not 1"),
-        ('{"schema": 2}', r"not a result that this rosgrade reads: its schema is 2, not 1"),
-        ('{"schema": 1}', r"is not a result: rosgrade_version: Field required"),
+        ("{", r"result\.json is not a result that this rosgrade reads: Invalid JSON"),
+        ('["schema"]', r"Input should be an object"),
+        ('{"schema": 2}', r"not a result that this rosgrade reads: schema: Input should be 1"),
+        ('{"schema": 1}', r"rosgrade_version: Field required"),
     ],
 )
 def test_a_file_that_is_no_result_is_refused(text, message, tmp_path):

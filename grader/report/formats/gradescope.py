@@ -17,7 +17,6 @@ from pydantic import AwareDatetime, BaseModel, ValidationError
 from grader.errors import UsageError
 from grader.findings.finding import Status
 from grader.report.formats import markdown
-from grader.report.model.result import read_json
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
 from grader.report.text import explanation
@@ -112,7 +111,9 @@ class Metadata(BaseModel):
 def read_metadata(file: Path) -> Metadata:
     """Read Gradescope's ``submission_metadata.json``."""
     try:
-        return Metadata.model_validate(read_json(file))
+        return Metadata.model_validate_json(file.read_bytes())
+    except OSError as error:
+        raise UsageError(f"{file} cannot be read: {error.strerror}") from error
     except ValidationError as error:
         raise UsageError(f"{file} is not Gradescope's submission_metadata.json: {error}") from error
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -70,29 +69,14 @@ def result_json(result: Result) -> str:
 
 def read_result(file: Path) -> Result:
     """Read a ``result.json`` of the schema that this rosgrade writes."""
-    data = read_json(file)
-    schema = data.get("schema") if isinstance(data, dict) else None
-    if schema != SCHEMA:
-        raise UsageError(
-            f"{file} is not a result that this rosgrade reads: its schema is {schema!r}, "
-            f"not {SCHEMA}"
-        )
     try:
-        return Result.model_validate(model.normalized(data), context=model.NORMALIZED)
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(step) for step in first["loc"])
-        raise UsageError(f"{file} is not a result: {place}: {first['msg']}") from error
-
-
-def read_json(file: Path) -> Any:
-    """Read JSON."""
-    try:
-        return json.loads(file.read_text(encoding="utf-8"))
+        return Result.model_validate_json(file.read_bytes())
     except OSError as error:
         raise UsageError(f"{file} cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise UsageError(f"{file} is not JSON: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        why = ": ".join([*map(str, first["loc"]), first["msg"]])
+        raise UsageError(f"{file} is not a result that this rosgrade reads: {why}") from error
 
 
 def result_schema() -> dict[str, Any]:

@@ -25,10 +25,6 @@ from grader.submission.record import BuildRecord
 SCHEMA: Literal[1] = 1
 
 
-NORMALIZED = "normalized"
-"""Context of a validation of data that :func:`normalized` has gone through as a whole."""
-
-
 def normalized(value: Any) -> Any:
     """A value whose JSON gives the same value again: rounded, and encodable in UTF-8."""
     if isinstance(value, float):
@@ -59,8 +55,8 @@ class _Part(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _normal(cls, data: Any, info: ValidationInfo) -> Any:
-        # Else each part of a part would be gone through once for every part around it.
-        return data if info.context == NORMALIZED else normalized(data)
+        # What is read from a file was normal when it was written.
+        return data if info.mode == "json" else normalized(data)
 
 
 class Identity(_Part):
@@ -242,7 +238,8 @@ class Result(_Part):
     @classmethod
     def _without_sums(cls, data: Any) -> Any:
         sums = ("final_score", "final_max_score")
-        return {name: item for name, item in data.items() if name not in sums}
+        known = isinstance(data, dict)
+        return {name: data[name] for name in data if name not in sums} if known else data
 
     @computed_field  # type: ignore[prop-decorator]
     @property
