@@ -14,7 +14,7 @@ from jinja2 import DictLoader, Environment
 from grader import resources
 from grader.findings.finding import Finding
 from grader.recording.event import Breach
-from grader.recording.model import LogLine
+from grader.recording.model import Ending, LogLine
 from grader.report.formats import github, gradescope, junit
 from grader.report.formats.markdown import render_markdown
 from grader.report.html.page import compiled_templates
@@ -259,6 +259,14 @@ def test_commands_that_write_no_report_do_not_load_jinja2():
     )
     root = resources.PACKAGE.parent
     assert subprocess.run([sys.executable, "-c", code], cwd=root, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("ending", Ending)
+def test_why_a_run_ended_is_told_in_words(ending):
+    sample = full_points()
+    runs = {name: replace(run, ending=ending) for name, run in sample.recordings.items()}
+    text = squeezed(replace(sample, recordings=runs).html())
+    assert re.search(r"ended because (?=[a-z]+ \w)", text)
 
 
 def compiled(folder, source):

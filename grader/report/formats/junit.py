@@ -18,8 +18,6 @@ from grader.findings.finding import Status
 from grader.report.html.page import environment
 from grader.report.model.mistakes import only_shown
 from grader.report.model.result_model import Result
-from grader.report.text import additions, explanation
-from grader.report.text.words import number
 
 _ENDINGS = {Status.FAILED: "failure", Status.ERROR: "error", Status.SKIPPED: "skipped"}
 _TYPES = {"failure": "check", "error": "grader", "skipped": "requirement"}
@@ -35,7 +33,6 @@ def render(result: Result, *, xunit1: bool = False) -> str:
     }
     # Without offset: the strictest of the dialects reads no other.
     timestamp = re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", result.started)
-    notes = explanation.notes_of_runs(result)
     template = environment().get_template("junit.xml.j2")
     return template.render(
         result=result,
@@ -44,26 +41,5 @@ def render(result: Result, *, xunit1: bool = False) -> str:
         endings=_ENDINGS,
         types=_TYPES,
         timestamp=timestamp[0] if timestamp else "",
-        properties=_properties(result),
         xunit1=int(xunit1),
-        notes=[
-            *(line for kind in notes for line in (f"{kind.title}:", *kind.lines)),
-            *map(additions.comment_line, result.comments),
-        ],
     )
-
-
-def _properties(result: Result) -> dict[str, str]:
-    found = {
-        "submission": result.submission.id,
-        "score": number(result.known_score) if result.known_score is not None else "not graded",
-        "max_score": number(result.known_max_score),
-        "rosgrade": result.rosgrade_version,
-    }
-    if result.withheld.checks:
-        found["hidden_checks"] = str(result.withheld.checks)
-        found["hidden_points"] = number(result.withheld.points)
-    found |= {f"points.{check.id}": explanation.points(check) for check in result.checks}
-    added = enumerate(map(additions.line, result.adjustments), 1)
-    found |= {f"adjustment.{index}": line for index, line in added}
-    return found | {f"environment.{name}": value for name, value in result.environment.items()}

@@ -10,7 +10,6 @@ from markupsafe import Markup
 
 from grader.findings.finding import Plot, Status
 from grader.grade.model import Grade
-from grader.recording.event import Breach
 from grader.recording.model import Recording
 from grader.report.concepts import SCRIPT, STYLE, concepts
 from grader.report.drawing.callbacks import draw_callbacks
@@ -100,7 +99,6 @@ def render_report(
         draw_timeline=draw_timeline,
         pairs=pairs,
         targets=partial(targets, assignment),
-        limit_reached=_limit_reached,
         shorten=shorten,
     )
 
@@ -163,9 +161,3 @@ def build_lines(build: BuildRecord) -> list[tuple[str, bool]]:
     begin = max(0, hits[0] - 2)
     end = min(len(lines), hits[-1] + CONTEXT, begin + 4 * CONTEXT)
     return [(lines[i], i in hits) for i in range(begin, end)]
-
-
-def _limit_reached(breach: Breach) -> str:
-    """What reached which limit of the sandbox, and what came of it."""
-    then = "they were ended for it" if breach.ended else "anything more is refused"
-    return f"the processes of the submission {breach.violation}; {then}"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from grader.assignment.model import Scenario
 from grader.findings.finding import Status
-from grader.grade.model import Grade, total
+from grader.grade.model import Grade
 from grader.recording.model import Recording
 from grader.report.model.result_model import CheckPart, FindingPart, Result
 
@@ -23,10 +23,6 @@ class Section:
     scenario: Scenario | None = None
     recording: Recording | None = None
     findings: tuple[FindingPart, ...] = ()
-
-    def of(self, *statuses: Status) -> tuple[CheckPart, ...]:
-        """Its checks of these statuses, in the author's order."""
-        return tuple(check for check in self.checks if check.status in statuses)
 
     @property
     def lost(self) -> bool:
@@ -46,16 +42,6 @@ class Section:
             for moment in finding.evidence.moments
             if math.isfinite(moment.time_s)
         ]
-
-    @property
-    def points(self) -> float:
-        """Points earned in it."""
-        return total(check.points for check in self.checks)
-
-    @property
-    def max_points(self) -> float:
-        """Points that it gives."""
-        return total(check.max_points for check in self.checks)
 
 
 def make_sections(
@@ -94,5 +80,6 @@ def make_sections(
         sections.append(Section(f"run-{scenario.id}", title, checks, scenario, recording, found))
     shown = [section for section in sections if section.checks or section.recording]
     return sorted(
-        shown, key=lambda one: not one.lost and len(one.checks) == len(one.of(Status.PASSED))
+        shown,
+        key=lambda one: not one.lost and all(c.status is Status.PASSED for c in one.checks),
     )
