@@ -126,6 +126,16 @@ class TestReplay:
         found.keep("replay-ghosts", full_page=True)
         assert found.complaints == []
 
+    def test_a_moving_thing_near_the_way_is_in_sight_as_a_whole(self, look, pages):
+        page = look(pages["gallery"]).page
+        page.locator(SLIDER).focus()
+        page.keyboard.press("End")
+        plan = page.locator(".replay .plan").bounding_box()
+        thing = page.locator(".replay .mover").first.bounding_box()
+        assert plan["x"] <= thing["x"] and plan["y"] <= thing["y"]
+        assert thing["x"] + thing["width"] <= plan["x"] + plan["width"]
+        assert thing["y"] + thing["height"] <= plan["y"] + plan["height"]
+
     def test_the_goal_is_drawn_and_named(self, look):
         sample = gallery()
         goal = {"goal": ["0.4", "-0.2", "90 deg"], "position": "8 cm"}

@@ -15,7 +15,7 @@ from tests.grade.sample import Told, make_submission
 from tests.report.sample import PERIOD, Sample, at, attempts, judged_runs, make_run, reviewed
 
 WALL = "{segments: [[0.6, -0.6, 0.6, 0.6]], moving: [{circle: {radius: 0.1}, path: [{at: 0 s, \
-pose: [0, 0.5]}, {at: 5 s, pose: [0.4, 0.5]}]}]}"
+pose: [0, 0.62]}, {at: 5 s, pose: [0.4, 0.62]}]}]}"
 DEFINITION = Comparison(
     "msg/BotStatus.msg",
     ("uint8 BURGER=1", "uint8 model", "geometry_msgs/Pose2D pose", "float64[2] velocities"),
