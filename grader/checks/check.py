@@ -123,19 +123,23 @@ def stop_if(reason: Reason | None) -> None:
 
 def check(
     name: str, subject: Subject, parameters: type[Parameters] = NoParameters, concept: str = ""
-) -> Callable[[Callable[[Any, Any], Finding]], Check]:
-    """Make a :class:`Check` of a function; its docstring becomes the catalogue's text."""
+) -> Callable[[Callable[[Any, Any], Finding | Reason]], Check]:
+    """Make a :class:`Check` of a function; its docstring becomes the catalogue's text.
 
-    def decorate(judge: Callable[[Any, Any], Finding]) -> Check:
+    It returns a finding, or the reason why what its parameters ask for is not so.
+    """
+
+    def decorate(judge: Callable[[Any, Any], Finding | Reason]) -> Check:
         @wraps(judge)
         def judged(subject: Any, parameters: Any) -> Finding:
             try:
-                finding = judge(subject, parameters)
+                found = judge(subject, parameters)
             except Unmet as unmet:
-                finding = unmet.reason.finding(parameters.asked_for)
+                found = unmet.reason
             except NoSuchField as error:
                 text = f"the assignment expects what cannot be: {error}"
                 return Finding.error(parameters.asked_for, text)
+            finding = found if isinstance(found, Finding) else found.finding(parameters.asked_for)
             is_open = finding.status is Status.FAILED and not finding.concept
             return replace(finding, concept=concept) if is_open else finding
 

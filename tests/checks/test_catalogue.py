@@ -108,7 +108,7 @@ PARAMETERS = {
     "motion.reaches": {"goal": GOAL, "position": "5 cm", "heading": "3 deg"},
     "motion.settles": {"within": "10 s"},
     "motion.path_length": {"goal": GOAL, "most": "10 %"},
-    "motion.overshoot": {"goal": GOAL, "most": "2 cm", "heading": "3 deg"},
+    "motion.overshoot": {"goal": GOAL, "most": "2 cm"},
     "motion.two_phases": {"goal": GOAL, "position": "5 cm"},
     "motion.short_way": {"goal": GOAL},
     "motion.proportional": {"goal": GOAL, "phase": "align"},

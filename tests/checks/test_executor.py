@@ -71,7 +71,6 @@ class TestGood:
     def test_one_late_answer_of_many(self):
         run = recording(calls=(*calls(), call(2.2, 1.5)))
         assert responsive(run).status is Status.PASSED
-        assert responsive(run, share="100 %").status is Status.FAILED
 
     def test_a_node_without_parameter_services_is_judged_by_another_one(self):
         asked = tuple(
@@ -197,7 +196,7 @@ class TestBlocked:
         run = recording(calls=(call(1.0, None),))
         assert responsive(run).status is Status.FAILED
 
-    def test_every_node_on_the_topic_counts_unless_one_is_named(self):
+    def test_every_node_on_the_topic_counts(self):
         twin = "/twin"
         run = recording(
             nodes=(node(), node(twin)),
@@ -205,7 +204,6 @@ class TestBlocked:
             calls=(*calls(), *(call(t, None, of=twin) for t in (1.0, 1.5, 2.0, 2.5))),
         )
         assert "`/twin` answered 0 of 4" in failing("executor.responsive", run)
-        assert responsive(run, node="bot_publisher").status is Status.PASSED
 
     def test_every_node_counts_if_none_is_on_the_topic(self):
         twin = "/twin"
@@ -220,7 +218,6 @@ class TestBlocked:
     def test_without_a_node_that_is_the_cause(self):
         run = nodeless(processes=(died(-11),), ending=Ending.EXITED)
         assert "SIGSEGV" in failing("executor.responsive", run)
-        assert "found the node" in failing("executor.responsive", recording(), node="/other")
 
 
 class TestNotJudged:

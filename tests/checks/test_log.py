@@ -329,14 +329,6 @@ class TestOtherValues:
         finding = judge("log.follows", run(lines(text, ODOM_TIMES_S)), **POSITION)
         assert finding.status is Status.PASSED
 
-    def test_a_whole_number_has_no_decimals(self):
-        asked = {**FRONT, "fields": ["data"]}
-        whole = run(lines("7", SCAN_TIMES_S), **scanned({"data": 765072}))
-        finding = judge("log.follows", whole, **asked)
-        assert "on `/scan`, each within 500 ms" in finding.expected
-        finding = judge("log.follows", run(), **FRONT)
-        assert "on `/scan` to 2 decimals, each within 500 ms" in finding.expected
-
     def test_what_is_written_at_ctrl_c_answers_no_message(self):
         log = lines("2.50", SCAN_TIMES_S) + output(traceback("KeyboardInterrupt"), time_s=4.25)
         found = front(log, stop_s=4.2)
@@ -450,7 +442,7 @@ class TestNotTheStudentsFault:
     )
     def test_a_field_that_the_message_does_not_have(self, field, words):
         finding = self.errs(run(), {"topic": "/scan", "fields": [field]})
-        assert "the assignment expects what sensor_msgs/msg/LaserScan cannot be" in finding.observed
+        assert "the assignment expects what cannot be" in finding.observed
         assert words in finding.observed
 
 

@@ -462,16 +462,6 @@ class TestMistakes:
         assert moment.time_s == plot.x[plot.y.index(most)]
         assert plot.band == (-math.inf, 0.02)
 
-    def test_a_turn_beyond_the_heading_is_negative_before_it(self):
-        def law(pose):
-            return (0.2, 0.0) if pose.x_m < 0.58 else (0.0, 0.5 if pose.yaw_rad < 0.8 else 0.0)
-
-        run = drive(on_odometry(law), seconds=20)
-        found = judge("motion.overshoot", run, goal=yaml((0.6, 0.0, 0.5)), heading="5 deg")
-        (plot,), (moment,) = found.evidence.plots, found.evidence.moments
-        assert found.observed == moment.label == f"{max(plot.y):.0f}° beyond its heading"
-        assert plot.y[0] < 0.0 < plot.band[1] < max(plot.y)
-
     def test_a_detour_is_measured(self):
         run = run_to((-0.8, 0.1, 0.0), angular=0.5, linear=0.3, seconds=60)
         said = failing("motion.path_length", run, goal=yaml((-0.8, 0.1, 0.0)), most="20 %")

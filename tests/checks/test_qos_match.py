@@ -12,7 +12,6 @@ from tests.checks.builder import (
     declared,
     endpoint,
     failing,
-    join,
     judge,
     reader,
     recording,
@@ -128,27 +127,6 @@ class TestTheBestAvailable:
             ),
         )
         assert self.volatile_refused(run).status is Status.PASSED
-
-
-class TestLateJoiner:
-    def test_its_own_request_counts(self):
-        run = having(RELIABLE, joins=(join(2.0, matched_ns=None),))
-        found = failing("qos.compatible", run, **peer(joiner="late"))
-        assert "durability volatile offered, transient_local requested" in found
-
-    def test_a_joiner_that_matched_passes(self):
-        run = having(LATCHED, joins=(join(2.0),))
-        assert judge("qos.compatible", run, **peer(joiner="late")).status is Status.PASSED
-
-    def test_what_happened_against_the_rules_is_our_fault(self):
-        run = having(LATCHED, joins=(join(2.0, matched_ns=None),))
-        finding = judge("qos.compatible", run, **peer(joiner="late"))
-        assert finding.status is Status.ERROR
-        assert "`late` was never matched" in finding.observed
-
-    def test_a_joiner_that_never_joined_costs_nothing(self):
-        finding = judge("qos.compatible", having(LATCHED), **peer(joiner="late"))
-        assert finding.status is Status.ERROR
 
 
 def test_an_unknown_policy_refuses_nothing():

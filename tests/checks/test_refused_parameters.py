@@ -46,8 +46,6 @@ PEER = {**TOPIC, "kind": "publisher"}
         ("log.contains", {"pattern": "("}, "is not a regular expression"),
         ("log.contains", {"text": "x", "at_least": 2, "at_most": 1}, "more than at_most"),
         ("qos.offered", TOPIC, "name a policy: reliability, durability"),
-        ("qos.compatible", {**PEER, "joiner": "late", "deadline": "1 s"}, "leave 'deadline' out"),
-        ("qos.compatible", {**PEER, "kind": "subscription", "joiner": "late"}, "late joiner sub"),
     ],
 )
 def test_parameters_that_make_no_sense_are_refused(

@@ -128,7 +128,7 @@ class Rejects(OfGoals):
 
 
 @check("action.rejects", Subject.RECORDING, Rejects)
-def rejects(recording: Recording, parameters: Rejects) -> Finding:
+def rejects(recording: Recording, parameters: Rejects) -> Finding | Cause:
     """The goal is rejected.
 
     Judged by the server's answer to the goals that the probe sent.
@@ -137,8 +137,7 @@ def rejects(recording: Recording, parameters: Rejects) -> Finding:
     for goal in goals:
         if goal.accepted:
             then = f", then {goal.status}" if goal.status else ""
-            return Finding.failed(
-                parameters.asked_for,
+            return Cause(
                 f"{the_goal(goal)} was accepted{then}",
                 "The ActionServer's goal_callback decides: it looks at the request and returns "
                 "GoalResponse.REJECT. Without one every goal is accepted.",

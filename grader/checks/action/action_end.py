@@ -77,7 +77,7 @@ class Preempts(OfGoals):
 
 
 @check("action.preempts", Subject.RECORDING, Preempts)
-def preempts(recording: Recording, parameters: Preempts) -> Finding:
+def preempts(recording: Recording, parameters: Preempts) -> Finding | Cause:
     """A new goal ends the goal that is executed.
 
     Judged by the goals that the probe sent while another one was active (`preempt: true`): the
@@ -89,7 +89,7 @@ def preempts(recording: Recording, parameters: Preempts) -> Finding:
         number = sent.index(goal)
         if number == 0:
             text = "there is no goal before it that it could end"
-            return Finding.error(parameters.asked_for, text)
+            return Cause(text, ours=True)
         old = sent[number - 1]
         stop_if(why_rejected(recording, old) or why_rejected(recording, goal))
         stop_if(_why_goes_on(recording, old, goal, parameters.within))

@@ -7,6 +7,7 @@ from fnmatch import fnmatch
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check
+from grader.diagnosis.cause import Cause
 from grader.findings.finding import Finding
 from grader.findings.wording import code, codes, listing
 from grader.submission.record import SubmissionRecord
@@ -19,7 +20,7 @@ class Clean(Parameters):
 
 
 @check("archive.clean", Subject.SUBMISSION, Clean)
-def clean(submission: SubmissionRecord, parameters: Clean) -> Finding:
+def clean(submission: SubmissionRecord, parameters: Clean) -> Finding | Cause:
     """The submission holds nothing that a build or a run makes.
 
     That is `build`, `install` and `log` of colcon, `CMakeFiles`, `__pycache__`, `*.pyc`,
@@ -28,8 +29,7 @@ def clean(submission: SubmissionRecord, parameters: Clean) -> Finding:
     """
     if not submission.leftovers:
         return Finding.passed(parameters.asked_for, "there is nothing of that kind")
-    return Finding.failed(
-        parameters.asked_for,
+    return Cause(
         f"it holds {codes(submission.leftovers)}",
         "Hand in the sources only. `git archive HEAD -o handin.zip` packs what is committed; put "
         f"{codes(sorted({one.rpartition('/')[2] for one in submission.leftovers}))} into "
@@ -60,7 +60,7 @@ class File(Parameters):
 
 
 @check("archive.file", Subject.SUBMISSION, File)
-def file(submission: SubmissionRecord, parameters: File) -> Finding:
+def file(submission: SubmissionRecord, parameters: File) -> Finding | Cause:
     """The submission holds the file, with the expected headings.
 
     Headings are those of Markdown (`# Usage`, or underlined with `===` or `---`) and of
@@ -68,10 +68,8 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding:
     """
     found = [path for path in submission.files if parameters.matches(path)]
     if not found:
-        return Finding.failed(
-            parameters.asked_for,
-            "there is no such file",
-            f"Add the file {code(parameters.path)} to what you hand in.",
+        return Cause(
+            "there is no such file", f"Add the file {code(parameters.path)} to what you hand in."
         )
     texts = dict(submission.headings)
     missing = min((_missing(parameters, texts.get(path, ())) for path in found), key=len)
@@ -80,8 +78,7 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding:
     headings = [heading for path in found for heading in texts.get(path, ())]
     there = listing(f'"{heading}"' for heading in headings) or "none"
     wanted = listing(f'"{heading}"' for heading in missing)
-    return Finding.failed(
-        parameters.asked_for,
+    return Cause(
         f"{codes(found)} lacks {wanted}; its headings: {there}",
         f"Write a section with the heading `# {missing[0]}`.",
     )

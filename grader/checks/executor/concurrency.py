@@ -10,7 +10,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.log.log_content import logged, printed
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.process.blocked_executor import why_not_called
@@ -54,6 +54,11 @@ class Overlap(Parameters):
         "as `[start, end]`; by default rclpy itself declares when it calls them.",
     )
 
+    def _asked(self) -> str:
+        asked = f"{codes(self.callbacks)} {'never ' * self.never}running at the same time"
+        runs = f"in {counted(self.at_least, 'run')} of each"
+        return f"{asked}, {runs if self.never else f'{self.at_least} times or more'}"
+
     def runs(self, recording: Recording) -> list[Run]:
         """The complete runs of the callbacks, under the names that they have here."""
         if self.log is None:
@@ -87,20 +92,16 @@ def _is(run: Run, name: str) -> bool:
 
 
 @check("executor.overlap", Subject.RECORDING, Overlap, concept="executors")
-def overlap(recording: Recording, parameters: Overlap) -> Finding:
+def overlap(recording: Recording, parameters: Overlap) -> Finding | Cause:
     """Callbacks run at the same time, or never do.
 
     Each of the named callbacks must overlap with another of them, a single one with itself. With
     `never`, no two of their runs may overlap. Only the first 1,000 runs of a process are declared.
     """
     names, never, least = parameters.callbacks, parameters.never, parameters.at_least
-    expected = f"{codes(names)} {'never ' * never}running at the same time"
-    expected += f", in {counted(least, 'run')} of each" if never else f", {least} times or more"
     runs = parameters.runs(recording)
     declared = parameters.log is None
-    missing = _why_missing(recording, names, runs, least if never else 1, declared=declared)
-    if missing is not None:
-        return missing.finding(expected)
+    stop_if(_why_missing(recording, names, runs, least if never else 1, declared=declared))
     found = [(both.one, both.other) for both in overlaps(runs)]
     if not never and len(names) > 1:
         found = [(one, other) for one, other in found if one.callback != other.callback]
@@ -111,11 +112,11 @@ def overlap(recording: Recording, parameters: Overlap) -> Finding:
     begin_s = recording.since_launch_s((wrong or runs)[0].begin_ns)
     evidence = Evidence((Moment("one runs", begin_s),), spans=spans(recording, runs, wrong))
     if not found if never else min(numbers.values()) >= least:
-        return Finding.passed(expected, observed, evidence)
+        return Finding.passed(parameters.asked_for, observed, evidence)
     prevented = sum(_was_held_up(recording, one, other) for one, other in pairwise(runs))
     if not never and min(numbers.values()) + prevented >= least:
-        return Finding.to_repeat(expected, f"{observed}, but the machine held callbacks up")
-    return Finding.failed(expected, observed, _hint(recording, runs, together=not never), evidence)
+        return Cause.to_repeat(f"{observed}, but the machine held callbacks up")
+    return Cause(observed, _hint(recording, runs, together=not never), evidence)
 
 
 def _was_held_up(recording: Recording, one: Run, other: Run) -> bool:
@@ -181,9 +182,14 @@ class ExecutorKind(Parameters):
         "same", description="Whether `callbacks` are in one mutually exclusive group."
     )
 
+    def _asked(self) -> str:
+        asked = f"a {self.executor} that spins, with {counted(self.threads, 'thread')} or more"
+        groups = f", and {codes(self.callbacks)} in groups: {self.groups}"
+        return asked + groups * bool(self.callbacks)
+
 
 @check("executor.kind", Subject.RECORDING, ExecutorKind, concept="executors")
-def kind(recording: Recording, parameters: ExecutorKind) -> Finding:
+def kind(recording: Recording, parameters: ExecutorKind) -> Finding | Cause:
     """The executor is of a kind, and callbacks are in the same group or in different ones.
 
     Judged by what the process declared: executors that spin, and groups of callbacks that ran. If
@@ -191,15 +197,13 @@ def kind(recording: Recording, parameters: ExecutorKind) -> Finding:
     MultiThreadedExecutor without a given number of threads has four or more.
     """
     names, wanted, least = parameters.callbacks, parameters.executor, parameters.threads
-    expected = f"a {wanted} that spins, with {counted(least, 'thread')} or more"
-    expected += f", and {codes(names)} in groups: {parameters.groups}" if names else ""
     spun, runs = executors(recording), _named(recording, names)
     missing = _why_missing(recording, names, runs, 1, declared=True)
     if missing is not None or not spun:
-        return (missing or _why_not_seen(recording, "no executor spun")).finding(expected)
+        return missing or _why_not_seen(recording, "no executor spun")
     impossible = _impossible(recording)
     if impossible:
-        return Finding.error(expected, f"the declarations contradict each other: {impossible}")
+        return Cause(f"the declarations contradict each other: {impossible}", ours=True)
     groups = sorted({run.group for run in runs})
     pairs = sorted({(run.callback, groups.index(run.group)) for run in runs})
     exclusive = [group.startswith(_EXCLUSIVE) for group in groups]
@@ -215,10 +219,10 @@ def kind(recording: Recording, parameters: ExecutorKind) -> Finding:
     # Before one of several threads spins, another may wait for a service.
     good = any(right) if wanted == _MULTI else all(right)
     if good and (not names or grouped[parameters.groups]):
-        return Finding.passed(expected, listing(parts), evidence)
+        return Finding.passed(parameters.asked_for, listing(parts), evidence)
     together = wanted == _MULTI and (not good or parameters.groups != "same")
     hint = _hint(recording, runs, together=together)
-    return Finding.failed(expected, listing(parts), hint, evidence)
+    return Cause(listing(parts), hint, evidence)
 
 
 def _impossible(recording: Recording) -> str:

@@ -7,12 +7,12 @@ from statistics import median
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Doubt
 from grader.checks.node.node import target_nodes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import why_silent
-from grader.diagnosis.no_node import why_no_node, why_not_node
+from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.blocked_executor import left_s, why_never_spun
 from grader.diagnosis.process.process_exit import ended_early, why_ended, why_it_exited
 from grader.diagnosis.process.raised import interrupted_place
@@ -24,8 +24,8 @@ from grader.measure import declarations
 from grader.measure.declarations import was_held_up
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.model import NS, Call, Kind, Recording
-from grader.spec.name import QualifiedNodeName, TopicName
-from grader.spec.quantity import Duration, Ratio
+from grader.spec.name import TopicName
+from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
 
 _FORGIVING_FROM = 3
@@ -50,20 +50,16 @@ class Responsive(Parameters):
     doubt = Doubt.ANSWER_MISSED
 
     within: Duration = Field(1.0, description="Longest time for an answer.")
-    share: Ratio = Field(
-        0.9,
-        description="Share of the calls that must be answered in time. With three or more calls, "
-        "one may be late, unless the share is 100 %.",
-    )
     typically: Duration | None = Field(
         None,
         description="Longest median of the answer times; by default any.",
     )
-    node: QualifiedNodeName | None = Field(
-        None,
-        description="Name of the node; by default every node of the student that has an endpoint "
-        "on a recorded topic, or every node if none has.",
-    )
+
+    def _asked(self) -> str:
+        text = f"services of the node answer within {format_duration(self.within)}"
+        if self.typically is not None:
+            text += f", the median within {format_duration(self.typically)}"
+        return text
 
 
 @dataclass(frozen=True)
@@ -74,16 +70,14 @@ class _Answers:
     judged: list[Call]
     late: list[Call]
 
-    def enough(self, share: float, late: int) -> bool:
-        """Whether so many late calls are allowed."""
+    def enough(self, late: int) -> bool:
+        """Whether so many late calls are allowed: a tenth, or one of a few."""
         number = len(self.judged)
-        one = 1 if number >= _FORGIVING_FROM and share < 1.0 else 0
-        # The small amount is float noise of (1 - share).
-        return late <= max(int((1.0 - share) * number + 1e-9), one)
+        return late <= max(number // 10, number >= _FORGIVING_FROM)
 
 
 @check("executor.responsive", Subject.RECORDING, Responsive, concept="executors")
-def responsive(recording: Recording, parameters: Responsive) -> Finding:
+def responsive(recording: Recording, parameters: Responsive) -> Finding | Cause:
     """The executor keeps spinning while the node works.
 
     The probe calls the service `list_parameters` of every node, or `get_type_description` of a node
@@ -96,34 +90,25 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
     If no call can be judged, the check uses what the process declared: that it spins and has a
     timer.
     """
-    expected = f"services of the node answer within {format_duration(parameters.within)}"
-    node = parameters.node
-    missing = why_not_node(recording, node) if node else why_no_node(recording)
-    if missing is not None:
-        return missing.finding(expected)
-    nodes = target_nodes(recording) or recording.student_nodes
-    names = [node] if node else [item.name for item in nodes]
+    stop_if(why_no_node(recording))
+    names = [one.name for one in target_nodes(recording) or recording.student_nodes]
     groups = [_answers(recording, name, parameters) for name in dict.fromkeys(names)]
     groups = [group for group in groups if group.judged]
     if not groups:
-        return _unasked(recording, names, expected)
-    bad = [group for group in groups if not group.enough(parameters.share, len(group.late))]
+        return _unasked(recording, names, parameters)
+    bad = [group for group in groups if not group.enough(len(group.late))]
     if not bad:
-        if parameters.typically is not None:
-            expected += f", the median within {format_duration(parameters.typically)}"
-        busy = _why_mostly_late(recording, parameters, groups)
-        if busy is not None:
-            return busy.finding(expected)
+        stop_if(_why_mostly_late(recording, parameters, groups))
         summary = _summary(groups, parameters)
-        return Finding.passed(expected, summary, _evidence(recording, groups))
+        return Finding.passed(parameters.asked_for, summary, _evidence(recording, groups))
     # Of the late calls, those that were late for another reason than what the host took.
     own = [sum(_own_s(recording, call) > parameters.within for call in one.late) for one in bad]
-    if all(one.enough(parameters.share, late) for one, late in zip(bad, own, strict=True)):
-        return Finding.to_repeat(
-            expected, f"{_summary(bad, parameters)}, but the machine took the time from the process"
+    if all(one.enough(late) for one, late in zip(bad, own, strict=True)):
+        return Cause.to_repeat(
+            f"{_summary(bad, parameters)}, but the machine took the time from the process"
         )
     worst = max(bad, key=lambda group: len(group.late) / len(group.judged))
-    return _why_late(recording, worst, parameters).finding(expected)
+    return _why_late(recording, worst, parameters)
 
 
 def _answers(recording: Recording, node: str, parameters: Responsive) -> _Answers:
@@ -229,11 +214,9 @@ def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> 
     )
 
 
-def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
+def _unasked(recording: Recording, names: list[str], parameters: Responsive) -> Finding | Cause:
     """The finding where no call counts, from what the process declared."""
-    ended = why_ended(recording)
-    if ended is not None:
-        return ended.finding(expected)
+    stop_if(why_ended(recording))
     # In this time the graph tells which services a node has, several times over.
     seen = {
         item.name
@@ -258,17 +241,17 @@ def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
             Evidence(moments=nodes_seen(recording)),
             ours=busy,
             disturbed=busy,
-        ).finding(expected)
+        )
     if declarations.declares(recording, "spin") and declarations.declares(recording, "timer"):
         return Finding.passed(
-            expected,
+            parameters.asked_for,
             f"{codes(names)} answered no call that could be judged; the process declared a timer "
             "and that its executor spins",
         )
-    return Finding.error(
-        expected,
+    return Cause(
         f"no call to {codes(executor_services(name)[0] for name in names)} could be judged, of "
         f"{counted(len(recording.calls), 'call')} that the probe sent",
+        ours=True,
     )
 
 
@@ -305,11 +288,13 @@ class Timer(Parameters):
     about = ("timer", "publisher")
     doubt = Doubt.ANSWER_MISSED
 
+    asks = "a timer whose callback publishes on `{self.topic}`"
+
     topic: TopicName = Field(description="Topic on which the callback of a timer publishes.")
 
 
 @check("executor.timer", Subject.RECORDING, Timer, concept="timers")
-def timer(recording: Recording, parameters: Timer) -> Finding:
+def timer(recording: Recording, parameters: Timer) -> Finding | Cause:
     """The process has a timer.
 
     Messages of a thread that sleeps look like those of a timer. So this is judged by what the
@@ -317,13 +302,12 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
     timer with a callback is right, whatever its period. If the process did not declare its
     publisher, the check ends as an error and costs no points.
     """
-    expected = f"a timer whose callback publishes on {code(parameters.topic)}"
     messages = recording.on(parameters.topic)
     if not messages:
-        return why_silent(recording, parameters.topic).finding(expected)
+        return why_silent(recording, parameters.topic)
     if not declarations.declares(recording, "publisher", topic=parameters.topic):
         cause = why_undeclared(recording, f"the publisher on {code(parameters.topic)}")
-        return cause.finding(expected)
+        return cause
     timers = declarations.timers(recording)
     calling = [item for item in timers if item.callback != _NOTHING]
     number = f"{counted(len(messages), 'message was', 'messages were')} published"
@@ -333,12 +317,12 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
         name = f", which calls {code(calling[0].callback)}" if calling[0].callback else ""
         created_s = recording.since_launch_s(calling[0].declared_ns)
         return Finding.passed(
-            expected,
+            parameters.asked_for,
             f"the process declared a timer of {format_duration(calling[0].period_s)}{name}",
             Evidence(moments=(Moment("timer created", created_s),)),
         )
     elif declarations.timer_of_zero(recording):
-        return Finding.passed(expected, "the process declared a timer")
+        return Finding.passed(parameters.asked_for, "the process declared a timer")
     else:
         rate = " but that of a rate, which calls nothing" if timers else ""
         observed = (
@@ -346,4 +330,4 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
             "such as a thread or a loop"
         )
     evidence = Evidence(moments=first_seen(recording, messages))
-    return Finding.failed(expected, observed, _HINT, evidence)
+    return Cause(observed, _HINT, evidence)

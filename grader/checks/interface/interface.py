@@ -117,7 +117,7 @@ class Fields(Defined):
 
 
 @check("interface.fields", Subject.SUBMISSION, Fields, concept="interfaces")
-def fields(submission: SubmissionRecord, parameters: Fields) -> Finding:
+def fields(submission: SubmissionRecord, parameters: Fields) -> Finding | Cause:
     """The interface has the expected fields.
 
     Compares name, type, array bound and order of all fields. Comments, blanks, default values and
@@ -136,7 +136,7 @@ class Constants(Defined):
 
 
 @check("interface.constants", Subject.SUBMISSION, Constants, concept="interfaces")
-def constants(submission: SubmissionRecord, parameters: Constants) -> Finding:
+def constants(submission: SubmissionRecord, parameters: Constants) -> Finding | Cause:
     """The interface has the expected constants.
 
     Compares name, type and value. Their order and additional constants do not matter.
@@ -148,14 +148,13 @@ def _compared(
     submission: SubmissionRecord,
     parameters: Defined,
     differ: Callable[[Section, Section, str], Iterator[Difference]],
-) -> Finding:
+) -> Finding | Cause:
     name, wanted = parameters.parts, parameters.sections
     definition = _definition(submission, parameters)
     try:
         own = sections_of(str(name), definition.text)
     except DefinitionError as error:
-        return Finding.failed(
-            parameters.asked_for,
+        return Cause(
             f"{definition.file}:{error.line} cannot be read: {error}",
             "A line holds a type and a name, such as `float64 x`, or a constant, such as "
             "`uint8 ON=1`; `#` begins a comment.",
@@ -164,8 +163,7 @@ def _compared(
     title = f"{name.file}: as it should be, and yours"
     sides = (Comparison(title, tuple(_lines(wanted)), tuple(_lines(own))),)
     if len(own) != len(wanted):
-        return Finding.failed(
-            parameters.asked_for,
+        return Cause(
             f"{code(definition.file)} has {len(own) - 1} lines `---`, not {len(wanted) - 1}",
             f"The parts of a .{name.kind} file are {listing(_PARTS[len(wanted)])}, with a line "
             "`---` between them.",
@@ -181,8 +179,7 @@ def _compared(
     places = tuple(
         SourceError(definition.file, line, item.text.replace("`", "")) for item, line in differing
     )
-    return Finding.failed(
-        parameters.asked_for,
+    return Cause(
         "; ".join(item.text for item, _ in differing),
         " ".join(dict.fromkeys(item.hint for item, _ in differing[:2])),
         Evidence(places=places[:10], comparisons=sides),
@@ -204,7 +201,7 @@ class Manifest(OfInterface):
 
 
 @check("interface.manifest", Subject.SUBMISSION, Manifest, concept="interfaces")
-def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding:
+def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding | Cause:
     """package.xml names the packages that an interface package needs.
 
     It must have `rosidl_default_generators` as `buildtool_depend` (or `build_depend`, `depend`),
@@ -219,8 +216,7 @@ def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding:
     package = existing_package(submission, parameters.parts.package)
     missing = tuple(_missing(package, used_packages(parameters.parts, definition)))
     if missing:
-        return Finding.failed(
-            parameters.asked_for,
+        return Cause(
             f"package.xml lacks {listing(f'{code(tag)} ({why})' for tag, why in missing)}",
             f"Add to package.xml: {codes(tag for tag, _ in missing)}.",
             Evidence(

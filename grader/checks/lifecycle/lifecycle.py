@@ -45,7 +45,7 @@ class State(Parameters):
 
 
 @check("lifecycle.state", Subject.RECORDING, State)
-def state(recording: Recording, parameters: State) -> Finding:
+def state(recording: Recording, parameters: State) -> Finding | Cause:
     """The lifecycle node goes through the expected states.
 
     Judged by the node's answers to the calls of `get_state` in the scenario
@@ -59,7 +59,7 @@ def state(recording: Recording, parameters: State) -> Finding:
     seen = [_state(call) for call in calls]
     if len(seen) < len(parameters.states):
         text = f"the scenario asks for the state only {counted(len(seen), 'time')}"
-        return Finding.error(parameters.asked_for, text)
+        return Cause(text, ours=True)
     changes = [call for call in recording.calls if call.service == f"{node}/change_state"]
     steps = [(call.requested_ns, f"is {label}") for call, label in zip(calls, seen, strict=True)]
     steps += [(call.requested_ns, f"transition {transition(call)}") for call in changes]
@@ -72,9 +72,7 @@ def state(recording: Recording, parameters: State) -> Finding:
     return Finding.passed(parameters.asked_for, listing(seen, "then"), shown)
 
 
-def _otherwise(
-    parameters: State, observed: str, last_change: list[Call], shown: Evidence
-) -> Finding:
+def _otherwise(parameters: State, observed: str, last_change: list[Call], shown: Evidence) -> Cause:
     """The finding for another state, after the last transition succeeded or failed."""
     hint = "The node must begin unconfigured, and must not change its state by itself."
     for call in last_change:
@@ -84,7 +82,7 @@ def _otherwise(
                 "The callback of a transition (on_configure, on_activate, ...) must return "
                 "TransitionCallbackReturn.SUCCESS, and call super() where it activates publishers."
             )
-    return Finding.failed(parameters.asked_for, observed, hint, shown)
+    return Cause(observed, hint, shown)
 
 
 def _state(call: Call) -> str:

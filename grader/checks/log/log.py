@@ -8,16 +8,16 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.checks.check import NamedFields, Parameters, Subject, check
+from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_log import why_not_logged
 from grader.diagnosis.process.blocked_executor import why_slow
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen
-from grader.findings.value import FieldPath, NoSuchField, value_at
+from grader.findings.value import FieldPath
 from grader.findings.wording import code, codes, counted
 from grader.measure.printed import Echo, Wanted, echoes, quote, wanted_values
-from grader.recording.model import NS, Kind, Message, Recording
+from grader.recording.model import NS, Kind, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
@@ -66,6 +66,16 @@ class Follows(Parameters):
         description="Longest time without such a line while messages come; by default any.",
     )
 
+    def _asked(self) -> str:
+        asked = (
+            f"log lines that show {codes(self.fields)} of at least "
+            f"{counted(self.at_least, 'message')} on {code(self.topic)}{_SENT[self.sent]} "
+            f"(to {counted(self.decimals, 'decimal')}), each within {format_duration(self.within)}"
+        )
+        if self.every is not None:
+            asked += f", and never longer than {format_duration(self.every)} without one"
+        return asked
+
     def named_fields(self) -> Iterator[NamedFields]:
         """The fields whose numbers are logged."""
         for number, field in enumerate(self.fields):
@@ -73,7 +83,7 @@ class Follows(Parameters):
 
 
 @check("log.follows", Subject.RECORDING, Follows)
-def follows(recording: Recording, parameters: Follows) -> Finding:
+def follows(recording: Recording, parameters: Follows) -> Finding | Cause:
     """The node logs what it receives.
 
     Lines on stdout and stderr (rclpy's loggers write to stderr) must follow messages on the topic
@@ -83,11 +93,9 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     from a callback or from a timer.
     """
     carried = recording.carried(parameters.topic)
-    expected = _words(parameters, carried)
     own = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
     if own:
-        return Finding.failed(
-            expected,
+        return Cause(
             f"the node itself publishes on {code(parameters.topic)}, so its log shows nothing of "
             "what it was sent",
             "Only the robot publishes its sensors: remove this publisher, and subscribe.",
@@ -100,12 +108,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         or (parameters.sent == "before_launch") == (message.stamp_ns < recording.launched_ns)
     ]
     ready_ns = recording.matched_ns or recording.launched_ns
-    try:
-        wanted = wanted_values(messages, parameters.fields, ready_ns)
-    except NoSuchField as error:
-        return Finding.error(
-            expected, f"the assignment expects what {messages[0].type} cannot be: {error}"
-        )
+    wanted = wanted_values(messages, parameters.fields, ready_ns)
     within_ns = round(parameters.within * NS)
     found = echoes(recording, wanted, parameters.decimals, within_ns)
     if len(found) < parameters.at_least:
@@ -117,36 +120,18 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
             needed=parameters.at_least,
             decimals=parameters.decimals,
             within_ns=within_ns,
-        ).finding(expected)
-    seldom = _too_seldom(recording, parameters, wanted, found)
-    if seldom is not None:
-        longest = format_duration(parameters.every or 0.0)
-        return seldom.finding(f"{expected}, and never longer than {longest} without one")
+        )
+    stop_if(_too_seldom(recording, parameters, wanted, found))
     lines = [line for echo in found for line in echo.lines]
     last_s = recording.since_launch_s(lines[-1].time_ns)
     number = counted(len(messages), "message")
     return Finding.passed(
-        expected,
+        parameters.asked_for,
         f"log lines follow {len(found)} of {number}: {quote(lines[-1].text)}",
         Evidence(
             moments=(Moment(f"logged a message on {parameters.topic}", last_s),),
             log=tuple(line.text for line in lines[:_SHOWN_LINES]),
         ),
-    )
-
-
-def _words(parameters: Follows, messages: Sequence[Message]) -> str:
-    """What is expected; whole numbers have no decimals to speak of."""
-    try:
-        values = [value_at(messages[0].value, path) for path in parameters.fields]
-        whole = all(isinstance(value, int) for value in values)
-    except (IndexError, NoSuchField):
-        whole = False
-    decimals = "" if whole else f" to {counted(parameters.decimals, 'decimal')}"
-    return (
-        f"log lines that show {codes(parameters.fields)} of at least "
-        f"{counted(parameters.at_least, 'message')} on {code(parameters.topic)}"
-        f"{_SENT[parameters.sent]}{decimals}, each within {format_duration(parameters.within)}"
     )
 
 

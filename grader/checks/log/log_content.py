@@ -9,7 +9,7 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import AfterValidator, Field, model_validator
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.blocked_executor import left_s, why_not_called
@@ -182,6 +182,11 @@ class Contains(Matching):
             key=lambda item: item.time_ns,
         )
 
+    def _asked(self) -> str:
+        low, high = self.at_least, self.at_most
+        bounds = f"{low} or more" if high is None else f"{low} to {high}" if low < high else low
+        return f"{bounds} {self.words}"
+
     @model_validator(mode="after")
     def _sensible(self) -> Contains:
         if self.text is None and self.pattern is None and self.number is None:
@@ -192,28 +197,25 @@ class Contains(Matching):
 
 
 @check("log.contains", Subject.RECORDING, Contains)
-def contains(recording: Recording, parameters: Contains) -> Finding:
+def contains(recording: Recording, parameters: Contains) -> Finding | Cause:
     """The node logs the expected text at the expected level.
 
     Judged by the log records, on /rosout and in the output. Each record counts once. Printed lines
     do not count, except with `printed: true`.
     """
     low, high = parameters.at_least, parameters.at_most
-    bounds = f"{low} or more" if high is None else f"{low} to {high}" if low < high else str(low)
-    expected = f"{bounds} {parameters.words}"
     found = parameters.found(recording)
     if len(found) < low:
-        return _why_lacking(recording, parameters, found).finding(expected)
+        return _why_lacking(recording, parameters, found)
     if high is not None and len(found) > high:
-        return Finding.failed(
-            expected,
+        return Cause(
             f"{len(found)} of them, such as {quote(found[-1].text)}",
             "Log once where it happens, not in every call of a callback: "
             "self.get_logger().info(..., once=True), or throttle_duration_sec=1.0.",
             _evidence(recording, found),
         )
     what = f"{len(found)}, such as {quote(found[0].text)}" if found else "none"
-    return Finding.passed(expected, what, _evidence(recording, found))
+    return Finding.passed(parameters.asked_for, what, _evidence(recording, found))
 
 
 def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]) -> Cause:
@@ -259,26 +261,25 @@ class Worst(Records):
 
     at_most: Level = Field("INFO", description="The most severe level that may be logged.")
 
+    def _asked(self) -> str:
+        return f"nothing logged{f' by {code(self.node)}' if self.node else ''} above {self.at_most}"
+
 
 @check("log.level", Subject.RECORDING, Worst)
-def level(recording: Recording, parameters: Worst) -> Finding:
+def level(recording: Recording, parameters: Worst) -> Finding | Cause:
     """The node logs nothing more severe than allowed.
 
     Judged by the log records, on /rosout and in the output, until SIGINT.
     """
-    whose = f" by {code(parameters.node)}" if parameters.node else ""
-    expected = f"nothing logged{whose} above {parameters.at_most}"
-    missing = parameters.why_no_node(recording)
-    if missing is not None:
-        return missing.finding(expected)
+    stop_if(parameters.why_no_node(recording))
     records = parameters.of(recording)
     above = LEVELS[LEVELS.index(parameters.at_most) + 1 :]
     severe = [item for item in records if item.level in above]
     if not severe:
-        return Finding.passed(expected, f"{counted(len(records), 'log message')}, none above it")
+        seen = f"{counted(len(records), 'log message')}, none above it"
+        return Finding.passed(parameters.asked_for, seen)
     observed = f"{counted(len(severe), 'log message')} above it, the first {severe[0].level}"
-    return Finding.failed(
-        expected,
+    return Cause(
         f"{observed}: {quote(severe[0].text)}",
         "Correct what it warns about; what is no problem is logged with "
         "self.get_logger().info('...') or debug('...').",
@@ -310,17 +311,16 @@ class Rate(Matching):
             return self.rate * (1.0 - self.tolerance), self.rate * (1.0 + self.tolerance)
         return self.at_least or 0.0, math.inf if self.at_most is None else self.at_most
 
-    @property
-    def often(self) -> str:
-        """How often, in words."""
+    def _asked(self) -> str:
         if self.rate is not None:
-            return f"{self.rate:g} Hz (within {percent(self.tolerance)})"
+            return f"{self.words} at {self.rate:g} Hz (within {percent(self.tolerance)})"
         bounds = {"at least": self.at_least, "at most": self.at_most}
-        return " and ".join(f"{name} {hz:g} Hz" for name, hz in bounds.items() if hz is not None)
+        texts = [f"{name} {hz:g} Hz" for name, hz in bounds.items() if hz is not None]
+        return f"{self.words} at {' and '.join(texts)}"
 
 
 @check("log.rate", Subject.RECORDING, Rate)
-def rate(recording: Recording, parameters: Rate) -> Finding:
+def rate(recording: Recording, parameters: Rate) -> Finding | Cause:
     """The node logs at the expected rate.
 
     Judged by the timestamps of the records: their mean rate from the first to the last. With fewer
@@ -328,7 +328,6 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     must log until the end of the observation: the last two periods may be silent.
     """
     low_hz, high_hz = parameters.bounds_hz
-    expected = f"{parameters.words} at {parameters.often}"
     found = parameters.found(recording)
     begin_ns, end_ns = recording.matched_ns or recording.launched_ns, recording.stop_ns
     periods = float(len(found))
@@ -339,27 +338,25 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     seen = f"{counted(len(found), 'log message')}, {rate_hz:.3g} Hz"
     if low_hz <= rate_hz <= high_hz:
         last_ns = found[-1].time_ns if found else recording.stop_ns
-        silent = why_paused(
-            recording,
-            (last_ns, recording.stop_ns),
-            _SILENT_PERIODS / low_hz if low_hz else math.inf,
-            f"{counted(len(found), 'log message')}, but none in the last "
-            f"{format_duration((recording.stop_ns - last_ns) / NS)}",
-            "The node must go on logging: look for a counter or a condition that ends it, for a "
-            "timer that is cancelled, and for a callback that does not return.",
+        stop_if(
+            why_paused(
+                recording,
+                (last_ns, recording.stop_ns),
+                _SILENT_PERIODS / low_hz if low_hz else math.inf,
+                f"{counted(len(found), 'log message')}, but none in the last "
+                f"{format_duration((recording.stop_ns - last_ns) / NS)}",
+                "The node must go on logging: look for a counter or a condition that ends it, for "
+                "a timer that is cancelled, and for a callback that does not return.",
+            )
         )
-        if silent is not None:
-            return silent.finding(expected)
-        return Finding.passed(expected, f"{rate_hz:.3g} Hz", _evidence(recording, found))
+        shown = _evidence(recording, found)
+        return Finding.passed(parameters.asked_for, f"{rate_hz:.3g} Hz", shown)
     if not found:
-        return _why_lacking(recording, parameters, found).finding(expected)
+        return _why_lacking(recording, parameters, found)
     if rate_hz < low_hz and left_s(recording, begin_ns, end_ns) <= len(found) / low_hz:
         stolen_s = recording.stolen_s(begin_ns, end_ns)
-        return Finding.to_repeat(
-            expected, f"{seen}, but the machine took {format_duration(stolen_s)}"
-        )
-    return Finding.failed(
-        expected,
+        return Cause.to_repeat(f"{seen}, but the machine took {format_duration(stolen_s)}")
+    return Cause(
         seen,
         "Log in a timer of that period, or with throttle_duration_sec=1.0 in a faster callback: "
         "self.get_logger().info('...', throttle_duration_sec=1.0).",

@@ -10,10 +10,11 @@ from pydantic import Field
 from grader.checks.check import NamedFields, Parameters, Subject, check, toleranced
 from grader.checks.messages.derived_messages import DerivedMessages, Sample, mistakes
 from grader.checks.need import Recorded
+from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import why_few, why_silent
 from grader.findings.fields import FieldTolerance, within_words
 from grader.findings.finding import Evidence, Finding, Moment, Plot
-from grader.findings.value import FieldPath, NoSuchField
+from grader.findings.value import FieldPath
 from grader.findings.wording import code, codes, counted, listing
 from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
@@ -50,6 +51,11 @@ class Follows(Parameters):
     )
     at_least: int = Field(5, ge=1, description="Least number of messages needed to judge.")
 
+    def _asked(self) -> str:
+        pairs = listing(f"{code(field)} = {code(value)}" for field, value in self.fields.items())
+        of = f"the values of {code(self.source)}: {pairs}{within_words(self.tolerance)}"
+        return f"on {code(self.topic)} {of}"
+
     def named_fields(self) -> Iterator[NamedFields]:
         """The judged fields, and those of the source."""
         for field, text in self.fields.items():
@@ -59,37 +65,31 @@ class Follows(Parameters):
 
 
 @check("messages.follows", Subject.RECORDING, Follows)
-def follows(recording: Recording, parameters: Follows) -> Finding:
+def follows(recording: Recording, parameters: Follows) -> Finding | Cause:
     """The values of the messages follow those of another topic.
 
     Every message must hold the values of one message of the source that was published at most
     `within` before it. Delays of the machine do not count. Angles are compared on the circle. What
     is published before the first message of the source does not count.
     """
-    topic, source = code(parameters.topic), code(parameters.source)
-    pairs = listing(f"{code(field)} = {code(value)}" for field, value in parameters.fields.items())
-    expected = f"on {topic} the values of {source}: {pairs}{within_words(parameters.tolerance)}"
+    source = code(parameters.source)
     messages, sources = recording.on(parameters.topic), recording.on(parameters.source)
     if not messages:
-        return why_silent(recording, parameters.topic).finding(expected)
+        return why_silent(recording, parameters.topic)
     if not sources:
-        return Finding.error(expected, f"nothing was recorded on {source}, so it cannot be judged")
-    try:
-        derived = DerivedMessages.of(sources, parameters.fields, parameters.tolerance)
-        samples = derived.samples(recording, messages, parameters.within)
-    except NoSuchField as error:
-        return Finding.error(expected, f"the assignment expects what does not exist: {error}")
+        return Cause(f"nothing was recorded on {source}, so it cannot be judged", ours=True)
+    derived = DerivedMessages.of(sources, parameters.fields, parameters.tolerance)
+    samples = derived.samples(recording, messages, parameters.within)
     columns = zip(derived.tolerances, zip(*derived.table, strict=True), strict=True)
     if not all(_spread(column) > _CONCLUSIVE * tolerance for tolerance, column in columns):
-        return Finding.error(expected, f"the values on {source} hardly change: it cannot be judged")
+        return Cause(f"the values on {source} hardly change: it cannot be judged", ours=True)
     right = {sample.number for sample in samples if derived.fitting(sample.errors)}
     judged = _judged(recording, parameters, samples, right)
     if len(judged) < parameters.at_least:
         if len(messages) < parameters.at_least:
-            return why_few(recording, parameters.topic, parameters.at_least).finding(expected)
+            return why_few(recording, parameters.topic, parameters.at_least)
         last_s = recording.since_launch_s(messages[-1].stamp_ns)
-        return Finding.failed(
-            expected,
+        return Cause(
             f"of {counted(len(messages), 'message')} only {len(judged)} came after the first one "
             f"on {source}",
             f"Publish from the callback of {source}, or from a timer that goes on.",
@@ -97,17 +97,16 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         )
     wrong = [sample for sample in judged if sample.number not in right]
     if wrong:
-        return _failure(recording, source, derived, judged, wrong, expected)
+        return _failure(recording, source, derived, judged, wrong)
     late = [one for one in judged if not derived.fitting(one.errors[one.excused :])]
     if late:
-        return Finding.to_repeat(
-            expected,
+        return Cause.to_repeat(
             f"{len(late)} of {counted(len(judged), 'message')} have older values, but the machine "
-            "took the time from the process",
+            "took the time from the process"
         )
     plots = tuple(_plot(recording, derived, judged, index) for index in range(len(derived.fields)))
     seen = f"right in all of {counted(len(judged), 'message')}"
-    return Finding.passed(expected, seen, Evidence(plots=plots))
+    return Finding.passed(parameters.asked_for, seen, Evidence(plots=plots))
 
 
 def _judged(
@@ -131,8 +130,7 @@ def _failure(
     derived: DerivedMessages,
     judged: list[Sample],
     wrong: list[Sample],
-    expected: str,
-) -> Finding:
+) -> Cause:
     sample = wrong[len(wrong) // 2]
     newest = derived.table[sample.window[-1]]
     some = wrong[:: max(1, len(wrong) // _MOST_EXPLAINED)]
@@ -168,8 +166,7 @@ def _failure(
         )
     when_s = recording.since_launch_s(sample.message.stamp_ns)
     shown = bad or range(len(derived.fields))
-    return Finding.failed(
-        expected,
+    return Cause(
         f"{observed} ({len(wrong)} of {counted(len(judged), 'message')} wrong)",
         hint,
         Evidence(

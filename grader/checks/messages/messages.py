@@ -8,8 +8,9 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
-from grader.checks.check import NamedFields, Parameters, Subject, check, toleranced
+from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if, toleranced
 from grader.checks.need import Published, Recorded
+from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import explain
 from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
 from grader.diagnosis.wrong_value import FLOAT_HINT, WrongValue, accumulates, was_integer
@@ -26,7 +27,6 @@ from grader.findings.value import (
     EXACT,
     Difference,
     FieldPath,
-    NoSuchField,
     differences,
     expected_leaves,
     item_at,
@@ -78,9 +78,7 @@ class Count(Parameters):
             return self.exactly, self.exactly
         return self.at_least or 0, self.at_most
 
-    @property
-    def words(self) -> str:
-        """What is expected, in words."""
+    def _asked(self) -> str:
         low, high = self.bounds
         if low == high:
             text = f"exactly {counted(low, 'message')}"
@@ -95,19 +93,18 @@ class Count(Parameters):
 
 
 @check("messages.count", Subject.RECORDING, Count)
-def count(recording: Recording, parameters: Count) -> Finding:
+def count(recording: Recording, parameters: Count) -> Finding | Cause:
     """The right number of messages is published.
 
     Counts the messages on the topic in the whole observation, or since the first message of a
     stimulus that they answer. A message that was sent but lost in transit counts as published.
     """
-    expected = parameters.words
     everything = recording.on(parameters.topic)
     messages, each, per = everything, 1, ""
     if parameters.stimulus is not None:
         sent = recording.sent.get(parameters.stimulus, ())
         if not sent:
-            return why_not_sent(recording, parameters.stimulus).finding(expected)
+            return why_not_sent(recording, parameters.stimulus)
         messages = tuple(item for item in everything if item.stamp_ns >= sent[0].stamp_ns)
         each = len(sent)
         per = f" for {counted(each, 'message')} on {code(parameters.stimulus)}"
@@ -115,7 +112,7 @@ def count(recording: Recording, parameters: Count) -> Finding:
     early = len(everything) - len(messages)
     number = published(everything) - early
     if number < low * each:
-        return why_few(recording, parameters.topic, low * each + early).finding(expected)
+        return why_few(recording, parameters.topic, low * each + early)
     evidence = Evidence(
         moments=tuple(
             Moment(f"message {index}", recording.since_launch_s(message.stamp_ns))
@@ -126,7 +123,7 @@ def count(recording: Recording, parameters: Count) -> Finding:
     observed = counted(number, "message") + (f" ({lost} of them lost on the way)" if lost else "")
     observed += per
     if high is None or number <= high * each:
-        return Finding.passed(expected, observed, evidence)
+        return Finding.passed(parameters.asked_for, observed, evidence)
     publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
     if len(publishers) > 1:
         nodes = codes(sorted({item.node for item in publishers}))
@@ -137,7 +134,7 @@ def count(recording: Recording, parameters: Count) -> Finding:
         hint = "Publish once, in the constructor. Create no timer, and call publish() nowhere else."
     else:
         hint = "Look for a second timer, a second publish() or a loop around it."
-    return Finding.failed(expected, observed, hint, evidence)
+    return Cause(observed, hint, evidence)
 
 
 class Equal(Parameters):
@@ -162,9 +159,7 @@ class Equal(Parameters):
         """The expected fields."""
         return toleranced("value", self.topic, self.value, self.tolerance)
 
-    @property
-    def words(self) -> str:
-        """What is expected, in words."""
+    def _asked(self) -> str:
         rest = ", all else 0" if self.rest == "zero" else ""
         enough = f", {self.at_least} or more" if self.at_least > 1 else ""
         return (
@@ -174,25 +169,17 @@ class Equal(Parameters):
 
 
 @check("messages.equal", Subject.RECORDING, Equal)
-def equal(recording: Recording, parameters: Equal) -> Finding:
+def equal(recording: Recording, parameters: Equal) -> Finding | Cause:
     """Every message has the expected values.
 
     Compares each field of each message on the topic. It does not matter whether a number is an
     integer or a float.
     """
     messages = recording.on(parameters.topic)
-    expected = parameters.words
     if not messages:
-        return why_silent(recording, parameters.topic).finding(expected)
-    unreadable = why_unreadable(recording, parameters.topic)
-    if unreadable is not None:
-        return unreadable.finding(expected)
-    try:
-        wanted = expected_leaves(parameters.value, messages[0].value)
-    except NoSuchField as error:
-        return Finding.error(
-            expected, f"the assignment expects what {messages[0].type} cannot be: {error}"
-        )
+        return why_silent(recording, parameters.topic)
+    stop_if(why_unreadable(recording, parameters.topic))
+    wanted = expected_leaves(parameters.value, messages[0].value)
     rest_zero = parameters.rest == "zero"
     found = [
         differences(wanted, item.value, rest_zero=rest_zero, tolerance=parameters.tolerance)
@@ -201,13 +188,13 @@ def equal(recording: Recording, parameters: Equal) -> Finding:
     if any(found):
         return _wrong(recording, parameters, found)
     if len(messages) < parameters.at_least:
-        return why_few(recording, parameters.topic, parameters.at_least).finding(expected)
-    return Finding.passed(expected, f"all of {counted(len(messages), 'message')}")
+        return why_few(recording, parameters.topic, parameters.at_least)
+    return Finding.passed(parameters.asked_for, f"all of {counted(len(messages), 'message')}")
 
 
 def _wrong(
     recording: Recording, parameters: Equal, by_message: list[tuple[Difference, ...]]
-) -> Finding:
+) -> Cause:
     """The finding of messages of which some have differences."""
     messages = recording.on(parameters.topic)
     wrong = sum(map(bool, by_message))
@@ -227,8 +214,7 @@ def _wrong(
     if len(messages) > 1:
         observed += f" ({wrong} of {counted(len(messages), 'message')} wrong)"
     when_s = recording.since_launch_s(message.stamp_ns)
-    return Finding.failed(
-        parameters.words,
+    return Cause(
         observed,
         _hint(found, len(messages), len(messages) - wrong),
         Evidence(
@@ -291,9 +277,7 @@ class Series(Parameters):
                 ("values", number), self.topic, {self.field: value}, tolerance=self.tolerance
             )
 
-    @property
-    def words(self) -> str:
-        """What is expected, in words."""
+    def _asked(self) -> str:
         which = f"{code(self.field)} of the messages on {code(self.topic)}"
         if self.values:
             return f"{which}: {', '.join(map(_text, self.values))}, in this order"
@@ -302,23 +286,17 @@ class Series(Parameters):
 
 
 @check("messages.sequence", Subject.RECORDING, Series)
-def sequence(recording: Recording, parameters: Series) -> Finding:
+def sequence(recording: Recording, parameters: Series) -> Finding | Cause:
     """The values come in the right order.
 
     Compares one field of each message with the value that it should have at its place: counting by
     a `step`, or a list of `values`. A message that was sent but lost in transit keeps its place.
     """
-    expected = parameters.words
     messages = recording.on(parameters.topic)
     if not messages:
-        return why_silent(recording, parameters.topic).finding(expected)
+        return why_silent(recording, parameters.topic)
     read = item_at if parameters.values else number_at
-    try:
-        found = [read(message.value, parameters.field) for message in messages]
-    except NoSuchField as error:
-        return Finding.error(
-            expected, f"the assignment expects what {messages[0].type} cannot be: {error}"
-        )
+    found = [read(message.value, parameters.field) for message in messages]
     # Place of each message in all that its writer published, from 0.
     numbered = is_numbered(messages)
     places = [m.sequence - 1 if numbered else index for index, m in enumerate(messages)]
@@ -334,11 +312,11 @@ def sequence(recording: Recording, parameters: Series) -> Finding:
         return _wrong_order(recording, parameters, found, wanted, wrong[0])
     needed = len(parameters.values) or parameters.at_least
     if len(messages) < needed:
-        return why_few(recording, parameters.topic, needed).finding(expected)
+        return why_few(recording, parameters.topic, needed)
     if parameters.values and len(parameters.values) - 1 not in places:
-        return Finding.to_repeat(expected, "the last of these messages was lost in transit")
+        return Cause.to_repeat("the last of these messages was lost in transit")
     return Finding.passed(
-        expected,
+        parameters.asked_for,
         f"{_text(found[0])} to {_text(found[-1])} in {counted(len(found), 'message')}",
     )
 
@@ -358,7 +336,7 @@ def _wrong_order(
     found: Sequence[Any],
     wanted: Sequence[Any],
     first: int,
-) -> Finding:
+) -> Cause:
     why, hint = _explain_order(parameters, found)
     when_s = recording.since_launch_s(recording.on(parameters.topic)[first].stamp_ns)
     rows = tuple(
@@ -366,8 +344,7 @@ def _wrong_order(
         for number, (want, have) in enumerate(zip(wanted, found, strict=True), start=1)
     )
     title, header = f"{parameters.field} of {parameters.topic}", ("message", "expected", "observed")
-    return Finding.failed(
-        parameters.words,
+    return Cause(
         f"{code(parameters.field)} is {_text(found[first])} instead of {_text(wanted[first])} in "
         f"message {first + 1} of {len(found)}{why}",
         hint,

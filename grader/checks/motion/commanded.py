@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 
 from pydantic import Field
 
-from grader.checks.check import Subject, check
+from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import (
@@ -46,37 +46,32 @@ _HELD_NS = NS
 class WithinLimits(RobotParameters):
     """Parameters of motion.within_limits."""
 
-    share: Ratio = Field(0.0, description="Share of the commands that may exceed a limit.")
+    asks = "commands within the limits of the robot"
 
 
 @check("motion.within_limits", Subject.RECORDING, WithinLimits)
-def within_limits(recording: Recording, parameters: WithinLimits) -> Finding:
+def within_limits(recording: Recording, parameters: WithinLimits) -> Finding | Cause:
     """Every command is within the limits of the robot.
 
     Judged by the commands as they were published. The simulated robot limits its motion itself, so
     only this check sees commands beyond the limits.
     """
-    cause = why_not_judged(recording)
-    scene = recording.scene
-    if cause is not None or scene is None:
-        cause = cause or Cause("there is no world", ours=True)
-        return cause.finding("commands within the limits of the robot")
+    stop_if(why_not_judged(recording))
+    sent, scene = commands(recording), recording.scene
+    assert scene is not None
     expected = (
         f"commands of at most {speed(scene.max_linear_m_s)} and {turn(scene.max_angular_rad_s)}, "
         "either way"
     )
-    sent = commands(recording)
     if not sent:
-        return why_silent(recording, command_topic(recording)).finding(expected)
-    cause = why_rejected(recording)
-    if cause is not None:
-        return cause.finding(expected)
+        return why_silent(recording, command_topic(recording))
+    stop_if(why_rejected(recording))
     beyond = [item for item in sent if _excess(item, scene)[0] > _ROUNDING]
     plots = (
         _plot(recording, sent, "linear.x (m/s)", scene.max_linear_m_s),
         _plot(recording, sent, "angular.z (rad/s)", scene.max_angular_rad_s),
     )
-    if len(beyond) <= parameters.share * len(sent):
+    if not beyond:
         widest = max(sent, key=lambda item: _excess(item, scene)[0])
         return Finding.passed(
             expected,
@@ -112,9 +107,13 @@ class SlowsDown(RobotParameters):
         0.8, description="Speed of the last commands that drive, as a share of the fastest."
     )
 
+    def _asked(self) -> str:
+        most = f"at most {percent(self.share)} of its largest value"
+        return f"linear.x at the end of the way {most}"
+
 
 @check("motion.slows_down", Subject.RECORDING, SlowsDown)
-def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
+def slows_down(recording: Recording, parameters: SlowsDown) -> Finding | Cause:
     """The robot slows down towards the end of its path.
 
     Judged by linear.x of the commands as they were published: the slowest of the last five that
@@ -125,12 +124,7 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     Commands of only two sizes, each sent three times or more, fail: that is on-off control. It is
     no failure if the sizes differ by 0.01 m/s or less, or the lower one is sent for 1 s or less.
     """
-    expected = (
-        f"linear.x at the end of the way at most {percent(parameters.share)} of its largest value"
-    )
-    cause = why_not_moved(recording) or why_cut_short(recording)
-    if cause is not None:
-        return cause.finding(expected)
+    stop_if(why_not_moved(recording) or why_cut_short(recording))
     driving = [item for item in commands(recording) if _size(item) > NO_SPEED_M_S]
     if not driving:
         topic = command_topic(recording)
@@ -140,7 +134,7 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
             "linear.x = gain * distance, on the way to the goal's position.",
             Evidence(moments=first_seen(recording, sent)),
         )
-        return (cause if sent else why_silent(recording, topic)).finding(expected)
+        return cause if sent else why_silent(recording, topic)
     fastest = max(map(_size, driving))
     last = min(driving[-_LAST:], key=_size)
     plot = _plot(recording, driving, "linear.x (m/s)")
@@ -149,16 +143,14 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     levels = Counter(round(_size(item), _DIGITS) for item in driving)
     if len(levels) == _SWITCHED and min(levels.values()) >= _SEVERAL and _stays(driving, levels):
         sizes = " and ".join(speed(size) for size in sorted(levels, reverse=True))
-        return Finding.failed(
-            expected,
+        return Cause(
             f"linear.x is switched between {sizes}, whatever the distance is",
             "linear.x = gain * distance, at most the limit: it becomes less with every command.",
             evidence,
         )
     if _size(last) <= parameters.share * fastest:
-        return Finding.passed(expected, seen, evidence)
-    return Finding.failed(
-        expected,
+        return Finding.passed(parameters.asked_for, seen, evidence)
+    return Cause(
         seen,
         "linear.x = gain * distance: far from the goal the robot is fast, near it slow.",
         evidence,

@@ -8,8 +8,8 @@ from statistics import median
 
 from pydantic import Field
 
-from grader.checks.check import Subject, check
-from grader.checks.motion.robot_check import RobotParameters
+from grader.checks.check import Subject, check, stop_if
+from grader.checks.motion.robot_check import RobotParameters, moved_in
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
@@ -64,9 +64,13 @@ class Drives(RobotParameters):
         "By default it always counts.",
     )
 
+    def _asked(self) -> str:
+        how = f"{speed(self.speed)} (within {percent(self.tolerance)})"
+        return f"drives at {how} while nothing is near ahead"
+
 
 @check("motion.drives", Subject.RECORDING, Drives)
-def drives(recording: Recording, parameters: Drives) -> Finding:
+def drives(recording: Recording, parameters: Drives) -> Finding | Cause:
     """The robot drives ahead at the right speed.
 
     Judged by the true speed while nothing is near ahead. The robot has time to speed up: half a
@@ -74,32 +78,27 @@ def drives(recording: Recording, parameters: Drives) -> Finding:
     median must be within `tolerance` of the expected speed, and so must the speed 90 % of the time.
     """
     wanted, share = parameters.speed, parameters.tolerance
-    expected = f"drives at {speed(wanted)} (within {percent(share)}) while nothing is near ahead"
-    cause = why_not_moved(recording)
-    if cause is not None or recording.scene is None:
-        return (cause or Cause("there is no world", ours=True)).finding(expected)
+    scene = moved_in(recording)
     low, high = sorted((wanted * (1.0 - share), wanted * (1.0 + share)))
-    steps = _free(recording.truth, recording.scene, parameters)
+    steps = _free(recording.truth, scene, parameters)
     plot = speed_plot(recording, (low, high))
     if not steps:
-        cause = why_interrupted(recording) or Cause(
+        return why_interrupted(recording) or Cause(
             f"the robot drove only {metres(way_m(recording.truth))}, too little to judge its speed",
             "Drive on as long as nothing is near ahead. One command holds until the next.",
             _since_departure(recording),
         )
-        return cause.finding(expected)
     middle = median(step.linear_m_s for step in steps)
     good = sum(low <= step.linear_m_s <= high for step in steps) / len(steps)
     seen = f"median {speed(middle)}; the speed is right for {percent(round(good, 3))} of the time"
     if low <= middle <= high and good >= _LEAST_SHARE:
-        return Finding.passed(expected, seen, Evidence(plots=(plot,)))
-    deeper = why_interrupted(recording)
-    if deeper is not None and low <= middle <= high:
-        return deeper.finding(expected)
-    words, hint = _wrong_speed(steps, recording.scene, wanted, middle)
+        return Finding.passed(parameters.asked_for, seen, Evidence(plots=(plot,)))
+    if low <= middle <= high:
+        stop_if(why_interrupted(recording))
+    words, hint = _wrong_speed(steps, scene, wanted, middle)
     off = next((step for step in steps if not low <= step.linear_m_s <= high), steps[0])
     evidence = evidence_at(recording, "first at a wrong speed", off.time_ns, plot)
-    return Finding.failed(expected, f"{seen}: {words}", hint, evidence)
+    return Cause(f"{seen}: {words}", hint, evidence)
 
 
 def _free(truth: Sequence[Truth], scene: Scene, parameters: Drives) -> list[Truth]:
@@ -156,25 +155,23 @@ class KeepsDriving(RobotParameters):
 
     distance: PositiveLength = Field(description="Least forward distance, along its path.")
 
+    def _asked(self) -> str:
+        why = "because nothing is near ahead"
+        return f"drives {metres(self.distance)} ahead without stopping, {why}"
+
 
 @check("motion.keeps_driving", Subject.RECORDING, KeepsDriving)
-def keeps_driving(recording: Recording, parameters: KeepsDriving) -> Finding:
+def keeps_driving(recording: Recording, parameters: KeepsDriving) -> Finding | Cause:
     """The robot drives on while nothing is ahead.
 
     Judged by the forward distance along its true path, minus what it drives backwards.
     """
-    wanted_m = parameters.distance
-    expected = f"drives {metres(wanted_m)} ahead without stopping, because nothing is near ahead"
-    cause = why_not_moved(recording)
-    if cause is not None:
-        return cause.finding(expected)
-    truth = recording.truth
-    gone_m = gone_ahead_m(truth)
-    if gone_m >= wanted_m - _WAY_TOLERANCE_M:
+    stop_if(why_not_moved(recording))
+    gone_m = gone_ahead_m(recording.truth)
+    if gone_m >= parameters.distance - _WAY_TOLERANCE_M:
         evidence = Evidence(plots=(speed_plot(recording),))
-        return Finding.passed(expected, f"went {metres(gone_m)} ahead", evidence)
-    cause = why_interrupted(recording) or _why_not_ahead(recording, gone_m)
-    return cause.finding(expected)
+        return Finding.passed(parameters.asked_for, f"went {metres(gone_m)} ahead", evidence)
+    return why_interrupted(recording) or _why_not_ahead(recording, gone_m)
 
 
 def _why_not_ahead(recording: Recording, gone_m: float) -> Cause:
@@ -237,18 +234,18 @@ class Straight(RobotParameters):
         0.035, description="Largest change of the heading since the start, in both directions."
     )
 
+    def _asked(self) -> str:
+        return f"drives straight: angular.z is zero (within {turn(self.tolerance)})"
+
 
 @check("motion.straight", Subject.RECORDING, Straight)
-def straight(recording: Recording, parameters: Straight) -> Finding:
+def straight(recording: Recording, parameters: Straight) -> Finding | Cause:
     """The robot drives straight ahead.
 
     Judged by the active commands and by the true heading: `angular.z` is always zero, and the
     heading stays the same as at the start.
     """
-    expected = f"drives straight: angular.z is zero (within {turn(parameters.tolerance)})"
-    cause = why_not_moved(recording)
-    if cause is not None:
-        return cause.finding(expected)
+    stop_if(why_not_moved(recording))
     truth = recording.truth
     plot = over_time(
         recording,
@@ -261,8 +258,7 @@ def straight(recording: Recording, parameters: Straight) -> Finding:
     if turning:
         worst = max((step.command_rad_s for step in turning), key=abs)
         when_s = recording.since_launch_s(turning[0].time_ns)
-        return Finding.failed(
-            expected,
+        return Cause(
             f"angular.z = {turn(worst)} was commanded (from {when_s:.2f} s after launch, "
             f"{percent(len(turning) / len(truth))} of the time)",
             "The speed ahead is linear.x, the turn is angular.z: leave angular.z at 0.0.",
@@ -272,12 +268,11 @@ def straight(recording: Recording, parameters: Straight) -> Finding:
     off_rad = max(turned, key=abs)
     if abs(off_rad) > parameters.heading:
         first = next(i for i, angle in enumerate(turned) if abs(angle) > parameters.heading)
-        return Finding.failed(
-            expected,
+        return Cause(
             f"the heading changed by {degrees(off_rad)}, through commands of less than "
             f"{turn(parameters.tolerance)} that add up",
             "Leave angular.z at exactly 0.0.",
             evidence_at(recording, "the heading is too far off", truth[first].time_ns, plot),
         )
     seen = f"heading within {degrees(off_rad)} of the start"
-    return Finding.passed(expected, seen, Evidence(plots=(plot,)))
+    return Finding.passed(parameters.asked_for, seen, Evidence(plots=(plot,)))

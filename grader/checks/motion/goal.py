@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from itertools import accumulate, pairwise
+from itertools import accumulate
 from operator import sub
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from grader.checks.check import Subject, check
+from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import GoalParameters, RobotParameters
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.missed_heading import why_not_aligned
-from grader.diagnosis.motion.no_motion import approach, why_not_moved
+from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted, why_off_course, why_unsteered
 from grader.findings.finding import Evidence, Finding, Plot
 from grader.findings.first_seen import until_the_end
@@ -38,6 +38,9 @@ class Reaches(GoalParameters):
         None, description="Largest heading error; by default the heading does not count."
     )
 
+    def _asked(self) -> str:
+        return f"at rest within {metres(self.position)} of the goal"
+
 
 @check("motion.reaches", Subject.RECORDING, Reaches)
 def reaches(recording: Recording, parameters: Reaches) -> Finding:
@@ -46,10 +49,7 @@ def reaches(recording: Recording, parameters: Reaches) -> Finding:
     Judged by the true pose at the end of the run: at rest, near the position, and with the
     heading (a full turn more or less is the same heading).
     """
-    run = approach(recording, parameters.goal)
-    heading = parameters.heading
-    if isinstance(run, Cause):
-        return run.finding(f"at rest within {metres(parameters.position)} of the goal")
+    run, heading = parameters.approach(recording), parameters.heading
     expected = (
         f"at rest within {metres(parameters.position)} of {point(run.goal.x_m, run.goal.y_m)}"
     )
@@ -89,41 +89,36 @@ class Settles(RobotParameters):
         description="Longest simulated time from the beginning until the robot rests for good."
     )
 
+    def _asked(self) -> str:
+        return f"comes to rest for good within {format_duration(self.within)}"
+
 
 @check("motion.settles", Subject.RECORDING, Settles)
-def settles(recording: Recording, parameters: Settles) -> Finding:
+def settles(recording: Recording, parameters: Settles) -> Finding | Cause:
     """The robot comes to rest in time.
 
     Judged by the true motion, from the beginning of simulated time (when the node is first
     connected) until the robot comes to rest for good. motion.reaches judges where it rests.
     """
-    expected = f"comes to rest for good within {format_duration(parameters.within)}"
-    cause = why_not_moved(recording)
-    if cause is not None:
-        return cause.finding(expected)
+    stop_if(why_not_moved(recording))
     truth = recording.truth
     rest = final_rest(truth)
     evidence = Evidence(plots=(speed_plot(recording),))
     end = truth[-1] if rest is None else truth[rest]
     took_s = (end.time_ns - truth[0].time_ns) / NS
     if rest is not None and took_s <= parameters.within:
-        return Finding.passed(expected, f"at rest after {format_duration(took_s)}", evidence)
-    deeper = why_interrupted(recording)
-    if deeper is not None:
-        return deeper.finding(expected)
+        seen = f"at rest after {format_duration(took_s)}"
+        return Finding.passed(parameters.asked_for, seen, evidence)
+    stop_if(why_interrupted(recording))
     lost_s = stolen_s(recording, truth[0].time_ns, end.time_ns)
     if lost_s > 0.0 and took_s - lost_s <= parameters.within:
         seen = f"at rest after {format_duration(took_s)}" if rest is not None else "never at rest"
-        return Finding.to_repeat(
-            expected, f"{seen}; the machine took up to {format_duration(lost_s)} from the run"
-        )
-    deeper = why_unsteered(recording)
-    if deeper is None and rest is None:
-        deeper = _restless(recording, end, f"after {format_duration(took_s)} it is")
-    if deeper is not None:
-        return deeper.finding(expected)
-    return Finding.failed(
-        expected,
+        took = f"{seen}; the machine took up to {format_duration(lost_s)} from the run"
+        return Cause.to_repeat(took)
+    stop_if(why_unsteered(recording))
+    if rest is None:
+        return _restless(recording, end, f"after {format_duration(took_s)} it is")
+    return Cause(
         f"at rest after {format_duration(took_s)}",
         "With larger gains the robot is faster. With gains that are too large it overshoots.",
         evidence_at(recording, "at rest", end.time_ns, *evidence.plots),
@@ -135,28 +130,24 @@ class PathLength(GoalParameters):
 
     most: Ratio = Field(description="How much longer than the straight line the path may be.")
 
+    def _asked(self) -> str:
+        path = f"a path at most {percent(self.most)} longer than the straight line"
+        return f"within {metres(self.position)} of the goal, on {path}"
+
 
 @check("motion.path_length", Subject.RECORDING, PathLength)
-def path_length(recording: Recording, parameters: PathLength) -> Finding:
+def path_length(recording: Recording, parameters: PathLength) -> Finding | Cause:
     """The path to the goal is not much longer than the straight line.
 
     Judged by the true path of the whole run, against the straight line from its start to the
     goal.
     """
-    run = approach(recording, parameters.goal)
-    path = f"on a path at most {percent(parameters.most)} longer than the straight line"
-    if isinstance(run, Cause):
-        return run.finding(f"within {metres(parameters.position)} of the goal, {path}")
-    near = f"within {metres(parameters.position)} of {point(run.goal.x_m, run.goal.y_m)}"
-    expected = f"{near}, {path}"
+    run = parameters.approach(recording)
     straight_m = run.distance_m(run.truth[0])
     if straight_m <= parameters.position:
-        return Finding.error(
-            expected, f"the start is {metres(straight_m)} from the goal: there is no path to judge"
-        )
-    cause = why_not_there(run, parameters.position)
-    if cause is not None:
-        return cause.finding(expected)
+        start = f"the start is {metres(straight_m)} from the goal"
+        return Cause(f"{start}: there is no path to judge", ours=True)
+    stop_if(why_not_there(run, parameters.position))
     gone_m = way_m(run.truth)
     longer = gone_m / straight_m - 1.0
     words = f"{percent(round(longer, 3))} longer" if longer >= 0.0 else "not longer"
@@ -164,17 +155,15 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding:
     evidence = Evidence(plots=(run.distance_plot,))
     more_m = gone_m - straight_m * (1.0 + parameters.most)
     if more_m <= 0.0:
-        return Finding.passed(expected, seen, evidence)
+        return Finding.passed(parameters.asked_for, seen, evidence)
     lost_s = stolen_s(recording, run.truth[0].time_ns, run.truth[-1].time_ns)
     # What it drives on without a command, it has to come back.
     if lost_s > 0.0 and 2.0 * lost_s * max(abs(step.linear_m_s) for step in run.truth) >= more_m:
-        return Finding.to_repeat(
-            expected,
+        return Cause.to_repeat(
             f"{seen}; the machine took up to {format_duration(lost_s)} from the run, which may "
-            "explain it",
+            "explain it"
         )
-    return Finding.failed(
-        expected,
+    return Cause(
         seen,
         "Does the robot turn to the goal at once, and the short way? Wrap the error "
         "atan2(dy, dx) - yaw to [-pi, pi]. Its gain must be several times the gain of the "
@@ -200,79 +189,45 @@ def _farthest(run: Approach) -> Truth:
 class Overshoot(GoalParameters):
     """Parameters of motion.overshoot."""
 
-    most: PositiveLength | None = Field(
-        None, description="Largest distance that it may drive away again from its nearest point."
-    )
-    heading: Angle | None = Field(
-        None, description="How far it may turn beyond the goal's heading after it arrived."
+    most: PositiveLength = Field(
+        description="Largest distance that it may drive away again from its nearest point."
     )
 
-    @model_validator(mode="after")
-    def _something(self) -> Overshoot:
-        if self.most is None and self.heading is None:
-            raise ValueError("say what is limited: most (a length) or heading (an angle)")
-        return self
+    def _asked(self) -> str:
+        return f"at most {metres(self.most)} past the goal"
 
 
 @check("motion.overshoot", Subject.RECORDING, Overshoot)
-def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
+def overshoot(recording: Recording, parameters: Overshoot) -> Finding | Cause:
     """The robot does not go past its goal.
 
-    Judged by the true motion. Position: how much the distance from the goal grows again after
-    the robot has come near. Heading: how far it turns beyond the goal's heading after it has
-    stopped driving.
+    Judged by the true motion: how much the distance from the goal grows again after the robot has
+    come near.
     """
-    most_m, most_rad = parameters.most, parameters.heading
-    limits = []
-    if most_m is not None:
-        limits.append(f"at most {metres(most_m)} past the goal")
-    if most_rad is not None:
-        limits.append(f"at most {degrees(most_rad)} beyond its heading")
-    expected = " and ".join(limits)
-    run = approach(recording, parameters.goal)
-    if isinstance(run, Cause):
-        return run.finding(expected)
-    arrival = run.arrival(parameters.position)
-    if arrival is None:
-        cause = why_not_there(run, parameters.position)
-        return (cause or Cause("never near the goal")).finding(expected)
-    off: dict[str, int] = {}
-    seen, plots = [], []
-    if most_m is not None:
-        past_m = _past_m(run, arrival)
-        far = max(past_m, key=past_m.__getitem__)
-        seen.append(f"{metres(past_m[far])} past the goal")
-        # In the unit of the text.
-        unit, factor = ("cm", 100.0) if past_m[far] < 0.1 else ("m", 1.0)
-        plots.append(_plot(run, f"past the goal ({unit})", past_m, most_m, factor))
-        off |= {seen[-1]: far} if past_m[far] > most_m else {}
-    if most_rad is not None:
-        beyond_rad = _beyond_rad(run, parameters.position)
-        far = max(beyond_rad, key=beyond_rad.__getitem__)
-        seen.append(f"{degrees(beyond_rad[far])} beyond its heading")
-        plots.append(_plot(run, "beyond its heading (°)", beyond_rad, most_rad, math.degrees(1.0)))
-        off |= {seen[-1]: far} if beyond_rad[far] > most_rad else {}
-    evidence = Evidence(plots=tuple(plots))
-    if not off:
-        return Finding.passed(expected, " and ".join(seen), evidence)
-    cause = why_off_course(recording) or Cause(
-        " and ".join(seen),
+    run = parameters.approach(recording)
+    past_m = _past_m(run, parameters.arrival(run))
+    far = max(past_m, key=past_m.__getitem__)
+    seen, plot = f"{metres(past_m[far])} past the goal", _plot(run, past_m, parameters.most)
+    if past_m[far] <= parameters.most:
+        return Finding.passed(parameters.asked_for, seen, Evidence(plots=(plot,)))
+    return why_off_course(recording) or Cause(
+        seen,
         "Compute linear.x as a gain times the distance: then the robot slows down before the goal. "
         "Make the gain smaller, so that linear.x is below its limit before the robot arrives.",
-        evidence_at(recording, *next(iter(off.items())), *evidence.plots),
+        evidence_at(recording, seen, far, plot),
     )
-    return cause.finding(expected)
 
 
-def _plot(run: Approach, label: str, off: dict[int, float], most: float, factor: float) -> Plot:
-    """How far it is off by time, with the largest that is allowed; the largest is always drawn."""
-    times = [*off][:: max(1, len(off) // _MOST_POINTS)]
-    times = sorted({*times, max(off, key=off.__getitem__)})
+def _plot(run: Approach, past_m: dict[int, float], most_m: float) -> Plot:
+    """How far it is past the goal by time, with the largest that is allowed and that is reached."""
+    far = max(past_m, key=past_m.__getitem__)
+    times = sorted({*[*past_m][:: max(1, len(past_m) // _MOST_POINTS)], far})
+    # In the unit of the text.
+    unit, factor = ("cm", 100.0) if past_m[far] < 0.1 else ("m", 1.0)
     x = tuple(map(run.recording.since_launch_s, times))
-    y = tuple(off[time_ns] * factor for time_ns in times)
-    return Plot(
-        f"How far {label}", "time since launch (s)", label, x, y, (-math.inf, most * factor)
-    )
+    y = tuple(past_m[time_ns] * factor for time_ns in times)
+    label, band = f"past the goal ({unit})", (-math.inf, most_m * factor)
+    return Plot(f"How far {label}", "time since launch (s)", label, x, y, band)
 
 
 def _past_m(run: Approach, arrival: int) -> dict[int, float]:
@@ -281,20 +236,3 @@ def _past_m(run: Approach, arrival: int) -> dict[int, float]:
     distances = [run.distance_m(step) for step in steps]
     grown = map(sub, distances, accumulate(distances, min))
     return {step.time_ns: past_m for step, past_m in zip(steps, grown, strict=True)}
-
-
-def _beyond_rad(run: Approach, position_m: float) -> dict[int, float]:
-    """How far beyond the goal's heading it has turned, by time, from when driving had ended.
-
-    Negative on the side that it comes from; only the last step, with 0, where it crosses nothing.
-    """
-    driven = run.driven(position_m)
-    steps = run.truth[driven:] if driven is not None else ()
-    errors = [run.heading_error_rad(step) for step in steps]
-    for index, (before, after) in enumerate(pairwise(errors), start=1):
-        # Through half a turn the sign changes as well.
-        if before * after < 0.0 and abs(before) < math.pi / 2.0:
-            side = math.copysign(1.0, before)
-            crossed = zip(steps[index - 1 :], errors[index - 1 :], strict=True)
-            return {step.time_ns: -side * error for step, error in crossed}
-    return {run.truth[-1].time_ns: 0.0}

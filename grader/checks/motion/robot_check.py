@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.checks.check import Parameters
+from grader.checks.check import Parameters, Unmet, stop_if
 from grader.checks.need import Doubt, SimulatedRobot
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.motion.missed_goal import why_not_there
+from grader.diagnosis.motion.no_motion import approach, why_not_moved
 from grader.findings.reference import GoalPose
+from grader.measure.motion.approach import Approach
+from grader.recording.model import Recording
+from grader.recording.simulated import Scene
 from grader.spec.quantity import PositiveLength
 
 
@@ -26,3 +32,24 @@ class GoalParameters(RobotParameters):
         "random values."
     )
     position: PositiveLength = Field(0.1, description="How near the goal counts as reached.")
+
+    def approach(self, recording: Recording) -> Approach:
+        """The way to the goal; ends the check if the robot never moved."""
+        run = approach(recording, self.goal)
+        if isinstance(run, Cause):
+            raise Unmet(run)
+        return run
+
+    def arrival(self, run: Approach) -> int:
+        """Index of the first step near the goal; ends the check if there is none."""
+        found = run.arrival(self.position)
+        if found is None:
+            raise Unmet(why_not_there(run, self.position) or Cause("never near the goal"))
+        return found
+
+
+def moved_in(recording: Recording) -> Scene:
+    """What the robot drove in; ends the check if it never moved."""
+    stop_if(why_not_moved(recording))
+    assert recording.scene is not None
+    return recording.scene

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from grader.checks.check import Subject, check, stop_if
-from grader.checks.motion.robot_check import RobotParameters
+from grader.checks.motion.robot_check import RobotParameters, moved_in
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_off_course
@@ -169,15 +169,13 @@ class KeepsDistance(RobotParameters):
 
 
 @check("motion.keeps_distance", Subject.RECORDING, KeepsDistance)
-def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding:
+def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding | Cause:
     """The robot keeps its distance from a wall.
 
     Judged by the true distance to the nearest obstacle, from the moment at which it is right for
     the first time. Way counts, not time: standing still neither helps nor costs.
     """
-    stop_if(why_not_moved(recording))
-    scene = recording.scene
-    assert scene is not None
+    scene = moved_in(recording)
     truth = recording.truth[::_STRIDE]
     kept = [_is_right(scene, step, parameters) for step in truth]
     band = (
@@ -189,12 +187,11 @@ def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding:
     )
     begin = next((index for index, is_right in enumerate(kept) if is_right), None)
     if begin is None:
-        cause = why_off_course(recording) or Cause(
+        return why_off_course(recording) or Cause(
             "it never was at this distance",
             "Look at the plot of the distance: which range does the node compare?",
             evidence_at(recording, "the run began", truth[0].time_ns, plot),
         )
-        return cause.finding(parameters.asked_for)
     steps = list(zip(truth[begin:], truth[begin + 1 :], kept[begin + 1 :], strict=False))
     whole_m = sum(way_m((a, b)) for a, b, _ in steps)
     right_m = sum(way_m((a, b)) for a, b, is_right in steps if is_right)
@@ -203,13 +200,12 @@ def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding:
     evidence = evidence_at(recording, "first at this distance", truth[begin].time_ns, plot)
     if right_m >= parameters.way and ratio >= parameters.share:
         return Finding.passed(parameters.asked_for, seen, evidence)
-    cause = why_off_course(recording) or Cause(
+    return why_off_course(recording) or Cause(
         seen,
         "Turn towards the wall where it is too far, and away where it is too near: angular.z is a "
         "gain times the error, with the sign of REP-103 (positive is left).",
         evidence,
     )
-    return cause.finding(parameters.asked_for)
 
 
 def _distance(scene: Scene) -> Callable[[Truth], float | None]:

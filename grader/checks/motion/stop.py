@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.checks.check import Subject, check
-from grader.checks.motion.robot_check import RobotParameters
+from grader.checks.check import Subject, check, stop_if
+from grader.checks.motion.robot_check import RobotParameters, moved_in
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why_not_moved
@@ -25,7 +25,6 @@ from grader.measure.motion.track import (
     REST_M_S,
     evidence_at,
     first_rest,
-    has_moved,
     over_time,
     speed_plot,
     way_m,
@@ -45,41 +44,38 @@ class Stops(RobotParameters):
     early: Length = Field(0.03, description="How much farther away the robot may stop.")
     late: Length = Field(0.05, description="How much nearer the robot may stop.")
 
+    def _asked(self) -> str:
+        return (
+            f"comes to rest with the obstacle ahead at {metres(self.distance)} (up to "
+            f"{metres(self.early)} earlier, {metres(self.late)} later)"
+        )
+
 
 @check("motion.stops", Subject.RECORDING, Stops)
-def stops(recording: Recording, parameters: Stops) -> Finding:
+def stops(recording: Recording, parameters: Stops) -> Finding | Cause:
     """The robot stops at the right distance from the obstacle ahead.
 
     Judged by the true distance from the LiDAR, straight ahead, at the moment the robot came to rest
     after it had moved. Delays of the machine cost no points.
     """
-    wanted_m = parameters.distance
-    expected = (
-        f"comes to rest with the obstacle ahead at {metres(wanted_m)} (up to "
-        f"{metres(parameters.early)} earlier, {metres(parameters.late)} later)"
-    )
-    cause = why_not_moved(recording)
-    scene = recording.scene
-    if cause is not None or scene is None:
-        return (cause or Cause("there is no world", ours=True)).finding(expected)
+    scene, wanted_m = moved_in(recording), parameters.distance
     rest = first_rest(recording.truth)
     deeper = why_interrupted(recording)
     if rest is None:
-        return (deeper or _never_stopped(recording, scene)).finding(expected)
+        return deeper or _never_stopped(recording)
     step = recording.truth[rest]
     sight = ahead(scene, step)
     evidence = _evidence(recording, scene, rest, parameters)
     off_m = None if sight is None or step.contact else sight.distance_m - wanted_m
     if sight is not None and off_m is not None and -parameters.late <= off_m <= parameters.early:
-        return Finding.passed(expected, f"{sight.name} at {metres(sight.distance_m)}", evidence)
-    if deeper is not None:
-        return deeper.finding(expected)
+        seen = f"{sight.name} at {metres(sight.distance_m)}"
+        return Finding.passed(parameters.asked_for, seen, evidence)
+    stop_if(deeper)
     if sight is not None and off_m is not None and off_m < 0.0:
-        return _late(recording, scene, rest, sight, parameters).finding(expected)
+        return _late(recording, scene, rest, sight, parameters)
     misread = misreading(recording, step)
     where = f"{sight.name} still {metres(sight.distance_m)} ahead" if sight else "nothing ahead"
-    return Finding.failed(
-        expected,
+    return Cause(
         f"stopped early, with {where}{f': {misread.words}' if misread else ''}",
         misread.hint
         if misread
@@ -89,9 +85,9 @@ def stops(recording: Recording, parameters: Stops) -> Finding:
     )
 
 
-def _never_stopped(recording: Recording, scene: Scene) -> Cause:
+def _never_stopped(recording: Recording) -> Cause:
     last = recording.truth[-1]
-    sight = ahead(scene, last)
+    sight = ahead(recording.scene, last)
     where = (
         f"{sight.name} is still {metres(sight.distance_m)} ahead"
         if sight
@@ -163,38 +159,38 @@ class StaysAtRest(RobotParameters):
     )
     tolerance: Speed = Field(0.001, description="Speed that still counts as rest.")
 
+    def _asked(self) -> str:
+        return "does not move at all" if self.after == "start" else "stays where it stopped"
+
 
 @check("motion.stays_at_rest", Subject.RECORDING, StaysAtRest)
-def stays_at_rest(recording: Recording, parameters: StaysAtRest) -> Finding:
+def stays_at_rest(recording: Recording, parameters: StaysAtRest) -> Finding | Cause:
     """The robot stays at rest.
 
     Judged by the true speed: with `after: start` in the whole run, with `after: stop` from the
     moment it first came to rest after it had moved (for half a second or more) to the end.
     """
     is_start = parameters.after == "start"
-    expected = "does not move at all" if is_start else "stays where it stopped"
-    cause = why_not_judged(recording) or why_no_node(recording) if is_start else None
-    cause = cause or (None if is_start else why_not_moved(recording))
-    if cause is not None or recording.scene is None:
-        return (cause or Cause("there is no world", ours=True)).finding(expected)
+    if is_start:
+        stop_if(why_not_judged(recording) or why_no_node(recording))
+    else:
+        stop_if(why_not_moved(recording))
     truth = recording.truth
     rest = 0 if is_start else first_rest(truth)
     if rest is None:
-        cause = why_interrupted(recording) or _never_stopped(recording, recording.scene)
-        return cause.finding(expected)
+        return why_interrupted(recording) or _never_stopped(recording)
     moved = next((step for step in truth[rest:] if _moves(step, parameters.tolerance)), None)
     if moved is None:
         if is_start and (ended := exited(recording)):
-            return why_it_exited(recording, ended[0]).finding(expected)
+            return why_it_exited(recording, ended[0])
         watched = format_duration((truth[-1].time_ns - truth[rest].time_ns) / NS)
         evidence = Evidence(plots=() if is_start else (speed_plot(recording),))
-        return Finding.passed(expected, f"at rest for {watched}, to the end", evidence)
-    cause = None if is_start else why_cut_short(recording)
-    if cause is not None:
-        return cause.finding(expected)
-    seen = scans(recording)
-    is_blind = is_start and bool(seen) and moved.time_ns < seen[0].stamp_ns
-    return _set_off(recording, truth[rest:], moved, is_blind, is_start).finding(expected)
+        seen = f"at rest for {watched}, to the end"
+        return Finding.passed(parameters.asked_for, seen, evidence)
+    stop_if(None if is_start else why_cut_short(recording))
+    heard = scans(recording)
+    is_blind = is_start and bool(heard) and moved.time_ns < heard[0].stamp_ns
+    return _set_off(recording, truth[rest:], moved, is_blind, is_start)
 
 
 def _moves(step: Truth, tolerance_m_s: float) -> bool:
@@ -232,31 +228,20 @@ def _set_off(
 class NoContact(RobotParameters):
     """Parameters of motion.no_contact."""
 
-    moving: bool = Field(
-        True,
-        description="Whether the robot must also have moved. A robot that never moves touches "
-        "nothing.",
-    )
+    asks = "touches nothing"
 
 
 @check("motion.no_contact", Subject.RECORDING, NoContact)
-def no_contact(recording: Recording, parameters: NoContact) -> Finding:
+def no_contact(recording: Recording, parameters: NoContact) -> Finding | Cause:
     """The robot touches nothing.
 
     Judged by the simulator. An obstacle that drives into a robot at rest does not count. A robot
-    that never moved does not pass, unless `moving` is false.
+    that never moved does not pass.
     """
-    expected = "touches nothing"
     touched = why_touched(recording)
     if touched is not None:
         cause = why_cut_short(recording)
-        return (cause.after(touched.observed) if cause else touched).finding(expected)
-    cause = why_not_moved(recording) if parameters.moving else why_not_judged(recording)
-    if cause is None and not parameters.moving:
-        cause = why_no_node(recording)
-        if cause is None and not has_moved(recording.truth):
-            cause = why_cut_short(recording)
-    if cause is not None:
-        return cause.finding(expected)
+        return cause.after(touched.observed) if cause else touched
+    stop_if(why_not_moved(recording))
     way, evidence = metres(way_m(recording.truth)), Evidence(plots=(speed_plot(recording),))
-    return Finding.passed(expected, f"no contact on a path of {way}", evidence)
+    return Finding.passed(parameters.asked_for, f"no contact on a path of {way}", evidence)

@@ -7,11 +7,10 @@ from itertools import pairwise
 
 from pydantic import Field
 
-from grader.checks.check import Subject, check
+from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import GoalParameters
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.missed_goal import why_not_there
-from grader.diagnosis.motion.no_motion import approach
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import counted
@@ -37,9 +36,12 @@ class TwoPhases(GoalParameters):
     position: PositiveLength = Field(description="How near the goal counts as reached.")
     speed: Speed = Field(0.01, description="Commanded speed that still counts as none.")
 
+    def _asked(self) -> str:
+        return f"no linear motion once within {metres(self.position)} of the goal, only turning"
+
 
 @check("motion.two_phases", Subject.RECORDING, TwoPhases, concept="angles")
-def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
+def two_phases(recording: Recording, parameters: TwoPhases) -> Finding | Cause:
     """At the goal's position the robot turns and no longer drives.
 
     Judged by the active commands and the true path. Within `position` of the goal, the robot may
@@ -47,33 +49,24 @@ def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
     nor after it has turned away on the spot. Odometry comes late, so 2 cm are allowed, or what the
     robot drives in 0.09 s at full speed if that is more.
     """
-    expected = (
-        f"no linear motion once within {metres(parameters.position)} of the goal, only turning"
-    )
-    run = approach(recording, parameters.goal)
-    if isinstance(run, Cause):
-        return run.finding(expected)
-    arrival = run.arrival(parameters.position)
-    if arrival is None:
-        cause = why_not_there(run, parameters.position)
-        return (cause or Cause("never near the goal")).finding(expected)
-    stray = _stray(run, arrival, parameters.speed)
+    run = parameters.approach(recording)
+    stray = _stray(run, parameters.arrival(run), parameters.speed)
     evidence = Evidence(plots=(speed_plot(recording), run.distance_plot))
     way = sum(way_m(pair) for pair in stray)
     fastest = 0.0 if recording.scene is None else recording.scene.max_linear_m_s
     if way <= max(_RUN_OUT_M, _RUN_OUT_S * fastest):
-        return Finding.passed(expected, f"drove {metres(way)} after it had begun to turn", evidence)
+        seen = f"drove {metres(way)} after it had begun to turn"
+        return Finding.passed(parameters.asked_for, seen, evidence)
     first = stray[0][1]
     fastest = max((abs(after.command_m_s) for _, after in stray))
     when_s = recording.since_launch_s(first.time_ns)
-    cause = why_off_course(recording) or Cause(
+    return why_off_course(recording) or Cause(
         f"drove {metres(way)} while it turned at the goal, commanded with up to {speed(fastest)} "
         f"(from {when_s:.2f} s after launch)",
         "In the second phase linear.x is 0.0. Remember in a flag that the position was reached, so "
         "that the node does not fall back into the first phase.",
         evidence_at(recording, "drives again", first.time_ns, *evidence.plots),
     )
-    return cause.finding(expected)
 
 
 def _stray(run: Approach, arrival: int, none_m_s: float) -> list[tuple[Truth, Truth]]:
@@ -108,6 +101,8 @@ def _turns_away(run: Approach, step: Truth) -> bool:
 class ShortWay(GoalParameters):
     """Parameters of motion.short_way."""
 
+    asks = "turns the short way, never more than half a turn"
+
     tolerance: Angle = Field(
         math.radians(30.0),
         description="How far it may turn the wrong way before it passes half a turn. Near half a "
@@ -116,17 +111,14 @@ class ShortWay(GoalParameters):
 
 
 @check("motion.short_way", Subject.RECORDING, ShortWay, concept="angles")
-def short_way(recording: Recording, parameters: ShortWay) -> Finding:
+def short_way(recording: Recording, parameters: ShortWay) -> Finding | Cause:
     """The robot always turns the short way.
 
     Judged by the true heading, in the first phase against the direction of the goal, in the second
     (once driving has ended near the goal) against the goal's heading. The long way goes away from
     the goal direction and through half a turn. Overshooting by less is not the long way.
     """
-    expected = "turns the short way, never more than half a turn"
-    run = approach(recording, parameters.goal)
-    if isinstance(run, Cause):
-        return run.finding(expected)
+    run = parameters.approach(recording)
     arrival, driven = run.arrival(parameters.position), run.driven(parameters.position)
     tolerance_rad = parameters.tolerance
     detours = [
@@ -141,21 +133,18 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
     evidence = Evidence(plots=(run.heading_plot,))
     if not detours:
         # A robot that drives off has shown nothing of how it turns to this goal.
-        cause = why_not_there(run, parameters.position) if arrival is None else None
-        if cause is not None:
-            return cause.finding(expected)
-        return Finding.passed(expected, "it never turned the long way", evidence)
+        stop_if(why_not_there(run, parameters.position) if arrival is None else None)
+        return Finding.passed(parameters.asked_for, "it never turned the long way", evidence)
     what, error_rad, step = detours[0]
     when_s = recording.since_launch_s(step.time_ns)
     more = f", and {counted(len(detours) - 1, 'more time')}" if len(detours) > 1 else ""
-    cause = why_off_course(recording) or Cause(
+    return why_off_course(recording) or Cause(
         f"turned away from {what} through half a turn: {degrees(math.tau - abs(error_rad))} "
         f"{_sense(-error_rad)} where {degrees(abs(error_rad))} {_sense(error_rad)} would do "
         f"({when_s:.2f} s after launch{more})",
         WRAP_HINT,
         evidence_at(recording, "turns the long way", step.time_ns, *evidence.plots),
     )
-    return cause.finding(expected)
 
 
 def _sense(angle_rad: float) -> str:

@@ -64,7 +64,7 @@ class NodeExists(Parameters):
 
 
 @check("node.exists", Subject.RECORDING, NodeExists, concept="names")
-def exists(recording: Recording, parameters: NodeExists) -> Finding:
+def exists(recording: Recording, parameters: NodeExists) -> Finding | Cause:
     """The node appears under its name.
 
     Judged by the ROS graph: a node of the student with this fully qualified name was seen.
@@ -73,8 +73,7 @@ def exists(recording: Recording, parameters: NodeExists) -> Finding:
     publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.publishes)
     others = sorted({item.node for item in publishers} - {parameters.name})
     if parameters.publishes is not None and others:
-        return Finding.failed(
-            parameters.asked_for,
+        return Cause(
             f"{code(parameters.name)} is there, but {codes(others)} publishes on "
             f"{code(parameters.publishes)}",
             "Create the publisher with self.create_publisher(...) in the node that is asked for.",
@@ -192,7 +191,7 @@ class Ends(Parameters):
 
 
 @check("node.ends", Subject.RECORDING, Ends, concept="nodes")
-def ends(recording: Recording, parameters: Ends) -> Finding:
+def ends(recording: Recording, parameters: Ends) -> Finding | Cause:
     """The process ends by itself after Ctrl-C.
 
     Judged by the process: after SIGINT it must end in time and leave no process behind. Its exit
@@ -205,7 +204,7 @@ def ends(recording: Recording, parameters: Ends) -> Finding:
     stuck = [process.name for process in processes if process.exited_ns is None]
     if stuck:
         text = f"{codes(stuck)} could not be ended, not even by SIGKILL"
-        return Finding.error(parameters.asked_for, text)
+        return Cause(text, ours=True)
     asked = [process for process in processes if not _was_killed(recording, process)]
     slow = [process for process in asked if not _in_time(process, parameters)]
     if slow:
@@ -213,15 +212,14 @@ def ends(recording: Recording, parameters: Ends) -> Finding:
     for process in processes:
         if process.survivors:
             number = counted(len(process.survivors), "process", "processes")
-            return Finding.failed(
-                parameters.asked_for,
+            return Cause(
                 f"{code(process.name)} left {number} running behind it: {codes(process.survivors)}",
                 "End child processes before main() returns: process.terminate(), then "
                 "process.wait().",
                 Evidence(moments=(_end(recording, process),)),
             )
     if not asked:
-        return Finding.error(parameters.asked_for, "a stimulus of the scenario had ended it before")
+        return Cause("a stimulus of the scenario had ended it before", ours=True)
     observed = f"ended {format_duration(max(map(took_s, asked)))} after SIGINT"
     sigint = Moment("SIGINT", recording.since_launch_s(recording.stop_ns))
     return Finding.passed(parameters.asked_for, observed, Evidence(moments=(sigint,)))

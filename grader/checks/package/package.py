@@ -51,7 +51,7 @@ class PackageFound(OfPackage):
 
 
 @check("package.found", Subject.SUBMISSION, PackageFound, concept="packages")
-def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding:
+def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding | Cause:
     """The package is there and has a valid package.xml.
 
     Judged by the submitted files: a valid package.xml with this name and the expected build type.
@@ -61,13 +61,12 @@ def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding:
     package = existing_package(submission, parameters.package)
     if breach := breach_of_rep_144(package.name):
         seen = f"found in {code(package.path)}{breach}"
-        return Finding.failed(parameters.asked_for, seen, "Give the package another name.")
+        return Cause(seen, "Give the package another name.")
     if not parameters.build_type or package.build_type in parameters.build_type:
         return Finding.passed(parameters.asked_for, f"found in {code(package.path)}")
     manifest = SourceError(package.file("package.xml"), None, f"build type {package.build_type}")
     tags = (f"<export><build_type>{one}</build_type></export>" for one in parameters.build_type)
-    return Finding.failed(
-        parameters.asked_for,
+    return Cause(
         f"its build type is {package.build_type}",
         f"Write {' or '.join(tags)} in package.xml.",
         Evidence(places=(manifest,)),
@@ -166,7 +165,7 @@ class Dependencies(OfPackage):
 
 
 @check("package.dependencies", Subject.SUBMISSION, Dependencies, concept="packages")
-def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Finding:
+def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Finding | Cause:
     """package.xml declares the ROS packages that the code uses.
 
     Every ROS package that the Python code imports, whose headers the C++ code includes or that
@@ -197,8 +196,7 @@ def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Find
         if tags
         else []
     )
-    return Finding.failed(
-        parameters.asked_for,
+    return Cause(
         "; ".join(seen),
         " ".join([*add, *filter(None, hints)]),
         Evidence(places=places, tables=(Table("package.xml", ("what", "write"), rows),)),

@@ -7,6 +7,7 @@ from pydantic import Field
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.need import StudentTests
 from grader.checks.package.package import OfPackage
+from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import why_not_built
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes, counted
@@ -27,7 +28,7 @@ class Tests(OfPackage):
 
 
 @check("package.tests", Subject.SUBMISSION, Tests)
-def tests(submission: SubmissionRecord, parameters: Tests) -> Finding:
+def tests(submission: SubmissionRecord, parameters: Tests) -> Finding | Cause:
     """The student's own tests of the package pass.
 
     They are run with pytest after the build, in the sandbox of the build. The linters that `ros2
@@ -37,16 +38,16 @@ def tests(submission: SubmissionRecord, parameters: Tests) -> Finding:
     runs = submission.build.tests if submission.build else ()
     run = next((one for one in runs if one.package == parameters.package), None)
     if run is None:
-        return Finding.error(parameters.asked_for, "the tests were not run: grade again")
+        return Cause("the tests were not run: grade again", ours=True)
     if run.problem is not None:
         hint = "Put tests into `test/test_*.py`, in functions with names that begin with `test_`."
-        return Finding.failed(parameters.asked_for, run.problem, f"{hint} {_HINT}")
+        return Cause(run.problem, f"{hint} {_HINT}")
     if run.failed:
         names = codes(name for name, _ in run.failed)
         seen = f"{counted(run.passed, 'test')} passed, {len(run.failed)} failed: {names}"
         log = tuple(f"{name} - {message}" for name, message in run.failed)
-        return Finding.failed(parameters.asked_for, seen, _HINT, Evidence(log=log))
+        return Cause(seen, _HINT, Evidence(log=log))
     if run.passed < parameters.at_least:
         seen = f"there {'is' if run.passed == 1 else 'are'} {counted(run.passed, 'test')}"
-        return Finding.failed(parameters.asked_for, seen, "Write more tests.")
+        return Cause(seen, "Write more tests.")
     return Finding.passed(parameters.asked_for, f"{counted(run.passed, 'test')} passed")

@@ -86,7 +86,7 @@ class Declared(OfParameter):
 
 
 @check("parameter.declared", Subject.RECORDING, Declared)
-def declared(recording: Recording, parameters: Declared) -> Finding:
+def declared(recording: Recording, parameters: Declared) -> Finding | Cause:
     """The node declares the parameter.
 
     Judged by the node's own parameter services, which the probe asked (`read_parameters` or
@@ -104,8 +104,7 @@ def declared(recording: Recording, parameters: Declared) -> Finding:
         if not values:
             stop_if(why_not_asked(recording, parameters.node, "its value was not read"))
         if not same_value(parameters.default, values[0].value):
-            return Finding.failed(
-                parameters.asked_for,
+            return Cause(
                 f"it is {value_text(values[0].value)} at first",
                 "Its default is the second argument: self.declare_parameter("
                 f"'{parameters.name}', {wanted_text(parameters.default)}).",

@@ -76,7 +76,7 @@ class TakesEffect(OfSetting):
 
 
 @check("parameter.takes_effect", Subject.RECORDING, TakesEffect)
-def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding:
+def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding | Cause:
     """Setting the parameter changes what the node does.
 
     Judged by the messages from `within` after the node accepted the value until the same parameter
@@ -87,8 +87,7 @@ def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding:
     when = Moment(f"set to {value_text(item.value)}", recording.since_launch_s(set_ns))
     shown = Evidence(moments=(when,))
     if not item.accepted:
-        return Finding.failed(
-            parameters.asked_for,
+        return Cause(
             f"the value was {refusal(item)}",
             "Look at the callback of add_on_set_parameters_callback() and at the range.",
             shown,

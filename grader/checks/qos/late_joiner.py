@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Joined
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unpublished
@@ -42,9 +42,7 @@ class LateJoiner(Parameters):
         ge=0, description="How many of the messages from before it joined the late joiner must get."
     )
 
-    @property
-    def words(self) -> str:
-        """What is expected, in words."""
+    def _asked(self) -> str:
         who = f"a late joiner on {code(self.topic)} gets"
         if self.last == 0:
             return f"{who} no message published before it"
@@ -52,7 +50,7 @@ class LateJoiner(Parameters):
 
 
 @check("qos.late_joiner", Subject.RECORDING, LateJoiner, concept="qos")
-def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
+def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding | Cause:
     """A late joiner gets the last messages, and no more.
 
     Judged by behaviour: a subscription of the probe joins in the middle of the run, and gets the
@@ -67,13 +65,10 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     """
     join = next((item for item in recording.joins if item.name == parameters.joiner), None)
     if join is None:
-        cause = _why_not_judged(recording, parameters, "the run ended before it joined")
-        return cause.finding(parameters.words)
+        return _why_not_judged(recording, parameters, "the run ended before it joined")
     case = _Case.of(recording, parameters, join)
-    wrong = _why_wrong(case)
-    if wrong is not None:
-        return wrong.finding(parameters.words)
-    return Finding.passed(parameters.words, case.seen, case.evidence)
+    stop_if(_why_wrong(case))
+    return Finding.passed(parameters.asked_for, case.seen, case.evidence)
 
 
 @dataclass(frozen=True)

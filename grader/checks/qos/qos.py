@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from grader.checks.check import Parameters, Subject, check
-from grader.checks.need import Joined
-from grader.diagnosis.destroyed_endpoint import why_unpublished
+from grader.checks.check import Parameters, Subject, check, stop_if
+from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.undeclared import why_undeclared
 from grader.findings.finding import Evidence, Finding
@@ -25,7 +24,7 @@ from grader.measure.compatibility import (
     sides,
 )
 from grader.recording.model import NS, Endpoint, Kind, Qos, Recording
-from grader.spec.name import Durability, Id, Reliability, TopicName
+from grader.spec.name import Durability, Reliability, TopicName
 from grader.spec.quantity import Duration
 
 # Messages that tell whether a queue was always full.
@@ -55,7 +54,9 @@ _HINT = (
 
 
 class Profile(Parameters):
-    """Parameters of qos.offered and qos.requested."""
+    """Part of the parameters of qos.offered and qos.requested."""
+
+    kind: ClassVar[Kind]
 
     topic: TopicName = Field(description="Fully qualified topic name.")
     reliability: Reliability | None = Field(None, description="Expected reliability.")
@@ -73,6 +74,10 @@ class Profile(Parameters):
             raise ValueError(f"name a policy: {', '.join(_POLICIES)}")
         return self
 
+    def _asked(self) -> str:
+        wanted = ", ".join(f"{name} {_words(item)}" for name, item in self.policies.items())
+        return f"the {self.kind.value} on {code(self.topic)} {_WORDS[self.kind][0]} {wanted}"
+
     @property
     def policies(self) -> dict[str, Any]:
         """Policy -> expected value, those that are asked for only."""
@@ -84,33 +89,42 @@ class Profile(Parameters):
         return Qos(**{_ATTRIBUTES.get(name, name): item for name, item in self.policies.items()})
 
 
-@check("qos.offered", Subject.RECORDING, Profile, concept="qos")
-def offered(recording: Recording, parameters: Profile) -> Finding:
+class Offered(Profile):
+    """Parameters of qos.offered."""
+
+    kind = Kind.PUBLISHER
+
+
+@check("qos.offered", Subject.RECORDING, Offered, concept="qos")
+def offered(recording: Recording, parameters: Offered) -> Finding | Cause:
     """Publishers on the topic offer the expected QoS.
 
     Judged by what DDS discovered of every publisher of the student's on the topic; only the
     policies that are named in the parameters count. Queue depth is judged by qos.depth.
     """
-    return _judge(recording, parameters, Kind.PUBLISHER)
+    return _judge(recording, parameters)
 
 
-@check("qos.requested", Subject.RECORDING, Profile, concept="qos")
-def requested(recording: Recording, parameters: Profile) -> Finding:
+class Requested(Profile):
+    """Parameters of qos.requested."""
+
+    kind = Kind.SUBSCRIPTION
+
+
+@check("qos.requested", Subject.RECORDING, Requested, concept="qos")
+def requested(recording: Recording, parameters: Requested) -> Finding | Cause:
     """Subscriptions to the topic request the expected QoS.
 
     Judged by what DDS discovered of every subscription of the student's to the topic; only the
     policies that are named in the parameters count.
     """
-    return _judge(recording, parameters, Kind.SUBSCRIPTION)
+    return _judge(recording, parameters)
 
 
-def _judge(recording: Recording, parameters: Profile, kind: Kind) -> Finding:
+def _judge(recording: Recording, parameters: Profile) -> Finding | Cause:
+    kind = parameters.kind
     has, did, other_end = _WORDS[kind]
-    wanted = ", ".join(f"{name} {_words(item)}" for name, item in parameters.policies.items())
-    expected = f"the {kind.value} on {code(parameters.topic)} {has} {wanted}"
-    cause = why_no_endpoint(recording, kind, parameters.topic)
-    if cause is not None:
-        return cause.finding(expected)
+    stop_if(why_no_endpoint(recording, kind, parameters.topic))
     endpoints = recording.student_endpoints(kind, parameters.topic)
     profiles = [(item.node, item.qos) for item in endpoints]
     source = ""
@@ -132,11 +146,10 @@ def _judge(recording: Recording, parameters: Profile, kind: Kind) -> Finding:
         seen = endpoints_seen(recording, own) or first_seen(
             recording, recording.on(parameters.topic)
         )
-        return Finding.failed(
-            expected,
+        return Cause(
             f"the {kind.value} of {code(node)} {has} {differences}{source}"
             + still.format(f"{other_end} the expected profile"),
-            _hint(parameters, kind, wrong),
+            _hint(parameters, wrong),
             Evidence(moments=seen),
         )
     hidden = [
@@ -146,8 +159,9 @@ def _judge(recording: Recording, parameters: Profile, kind: Kind) -> Finding:
     ]
     if hidden or not profiles:
         names = ", ".join(hidden) or "QoS"
-        return Finding.error(expected, f"{names} of the {kind.value} was not discovered")
-    return Finding.passed(expected, f"{did} by {counted(len(profiles), kind.value)}{source}")
+        return Cause(f"{names} of the {kind.value} was not discovered", ours=True)
+    observed = f"{did} by {counted(len(profiles), kind.value)}{source}"
+    return Finding.passed(parameters.asked_for, observed)
 
 
 def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
@@ -164,7 +178,7 @@ def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
     return found
 
 
-def _hint(parameters: Profile, kind: Kind, wrong: Collection[str]) -> str:
+def _hint(parameters: Profile, wrong: Collection[str]) -> str:
     asked = parameters.policies
     if all(_DEFAULTS.get(name) == item for name, item in asked.items()):
         hint = "A number as QoS, such as 10, is the default profile: reliable and volatile."
@@ -180,7 +194,8 @@ def _hint(parameters: Profile, kind: Kind, wrong: Collection[str]) -> str:
         for name, item in asked.items()
     }
     arguments = ", ".join(f"{_ARGUMENTS.get(name, name)}={item}" for name, item in values.items())
-    return f"Give create_{kind.value} a profile: QoSProfile(depth=10, {arguments}), from rclpy.qos."
+    create = f"create_{parameters.kind.value}"
+    return f"Give {create} a profile: QoSProfile(depth=10, {arguments}), from rclpy.qos."
 
 
 def _words(value: Any) -> str:
@@ -196,9 +211,12 @@ class Depth(Parameters):
         "publisher", description="Which endpoint of the student to judge."
     )
 
+    def _asked(self) -> str:
+        return f"queue depth {self.depth} of the {self.kind} on {code(self.topic)}"
+
 
 @check("qos.depth", Subject.RECORDING, Depth, concept="qos")
-def depth(recording: Recording, parameters: Depth) -> Finding:
+def depth(recording: Recording, parameters: Depth) -> Finding | Cause:
     """The queue has the expected depth.
 
     Discovery does not include history and depth. So this is judged by what the process declared
@@ -206,10 +224,7 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
     keeps: they count more.
     """
     kind = Kind(parameters.kind)
-    expected = f"queue depth {parameters.depth} of the {kind.value} on {code(parameters.topic)}"
-    cause = why_no_endpoint(recording, kind, parameters.topic)
-    if cause is not None:
-        return cause.finding(expected)
+    stop_if(why_no_endpoint(recording, kind, parameters.topic))
     declared = declarations.queues(recording, kind, parameters.topic)
     shown = _kept(recording, parameters)
     observed = _wrong_depth(parameters, declared, shown)
@@ -218,20 +233,19 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
         messages = recording.on(parameters.topic)
         seen = endpoints_seen(recording, own) or first_seen(recording, messages)
         third = "third" if kind is Kind.PUBLISHER else "fourth"
-        return Finding.failed(
-            expected,
+        return Cause(
             observed,
             f"The {third} argument of create_{kind.value} is the depth, or a QoSProfile that has "
             f"it beside the other policies: QoSProfile(depth={parameters.depth}, ...).",
             Evidence(moments=seen),
         )
     if any(queue.depth is None for queue in declared):
-        return Finding.error(expected, "the depth cannot be seen: the process declared no number")
+        return Cause("the depth cannot be seen: the process declared no number", ours=True)
     if not declared and shown is None:
         what = f"the {kind.value} on {code(parameters.topic)}"
-        return why_undeclared(recording, what).finding(expected)
+        return why_undeclared(recording, what)
     source = "declared by the process" if declared else "as the heartbeats of the publisher show"
-    return Finding.passed(expected, f"depth {parameters.depth}, {source}")
+    return Finding.passed(parameters.asked_for, f"depth {parameters.depth}, {source}")
 
 
 def _wrong_depth(
@@ -274,83 +288,60 @@ def _kept(recording: Recording, parameters: Depth) -> int | None:
 class Compatible(Parameters):
     """Parameters of qos.compatible."""
 
-    needs = (Joined(),)
-
     topic: TopicName = Field(description="Fully qualified topic name.")
     kind: Literal["publisher", "subscription"] = Field(
         description="Which endpoint is the student's. The peer is the other one."
     )
-    joiner: Id | None = Field(
-        None,
-        description="The peer is this late joiner (the `name` of a `join`) with the QoS that it "
-        "requests. Then the real match counts too.",
-    )
-    reliability: Reliability | None = Field(
-        None, description="Reliability of the peer, by default reliable."
-    )
-    durability: Durability | None = Field(
-        None, description="Durability of the peer, by default volatile."
-    )
+    reliability: Reliability = Field("reliable", description="Reliability of the peer.")
+    durability: Durability = Field("volatile", description="Durability of the peer.")
     deadline: Duration | None = Field(None, description="Deadline of the peer.")
-    liveliness: Literal["automatic", "manual_by_topic"] | None = Field(
-        None, description="Liveliness of the peer, by default automatic."
+    liveliness: Literal["automatic", "manual_by_topic"] = Field(
+        "automatic", description="Liveliness of the peer."
     )
     lease: Duration | None = Field(None, description="Lease duration of the peer's liveliness.")
     expect: Literal["match", "refuse"] = Field(
         "match", description="Whether the two must match, or must not."
     )
 
-    @model_validator(mode="after")
-    def _one_peer(self) -> Compatible:
-        own = ("reliability", "durability", "deadline", "liveliness", "lease")
-        given = [name for name in own if getattr(self, name) is not None]
-        if self.joiner is not None and given:
-            raise ValueError(f"the late joiner's QoS is in its stimulus: leave {given[0]!r} out")
-        if self.joiner is not None and self.kind == "subscription":
-            raise ValueError("a late joiner subscribes: the student's end is the publisher")
-        return self
+    def _asked(self) -> str:
+        verb = "matches" if self.expect == "match" else "does not match"
+        profile = _profile_words(self.peer)
+        return f"a {self.other} ({profile}) {verb} the {self.kind} on {code(self.topic)}"
 
-    def peer(self, recording: Recording) -> Qos | None:
-        """The peer's profile; None if the late joiner never joined."""
-        if self.joiner is not None:
-            return next((item.qos for item in recording.joins if item.name == self.joiner), None)
+    @property
+    def other(self) -> str:
+        """Kind of the peer."""
+        return "subscription" if self.kind == "publisher" else "publisher"
+
+    @property
+    def peer(self) -> Qos:
+        """The peer's profile."""
         return Qos(
-            reliability=self.reliability or "reliable",
-            durability=self.durability or "volatile",
+            reliability=self.reliability,
+            durability=self.durability,
             deadline_s=self.deadline,
-            liveliness=self.liveliness or "automatic",
+            liveliness=self.liveliness,
             liveliness_lease_s=self.lease,
         )
 
 
 @check("qos.compatible", Subject.RECORDING, Compatible, concept="qos")
-def compatible(recording: Recording, parameters: Compatible) -> Finding:
+def compatible(recording: Recording, parameters: Compatible) -> Finding | Cause:
     """A given peer matches or does not match, by the rules of DDS.
 
     Judged by what DDS discovered of every endpoint of the student's on the topic, by the rule
     "requested against offered": reliability, durability, deadline, liveliness and its lease
-    duration. With a late joiner as the peer, it is judged by whether the two did match. A
-    subscription with the policy "best available" matches every publisher: it requests what the
-    publishers offer that are there when it is created. Only the process itself can declare that.
+    duration. A subscription with the policy "best available" matches every publisher: it requests
+    what the publishers offer that are there when it is created. Only the process itself can declare
+    that.
     """
-    kind = Kind(parameters.kind)
-    other = "subscription" if kind is Kind.PUBLISHER else "publisher"
-    peer = parameters.peer(recording)
-    verb = "matches" if parameters.expect == "match" else "does not match"
-    profile = f" ({_profile_words(peer)})" if peer else ""
-    expected = f"a {other}{profile} {verb} the {kind.value} on {code(parameters.topic)}"
-    cause = why_no_endpoint(recording, kind, parameters.topic)
-    if cause is not None:
-        return cause.finding(expected)
+    kind, other = Kind(parameters.kind), parameters.other
+    stop_if(why_no_endpoint(recording, kind, parameters.topic))
     endpoints = recording.student_endpoints(kind, parameters.topic)
-    if peer is None:
-        return Finding.error(
-            expected, f"the run ended before {code(parameters.joiner or '')} joined"
-        )
     if not endpoints:
-        return Finding.error(expected, f"the {kind.value} was not discovered")
+        return Cause(f"the {kind.value} was not discovered", ours=True)
     for endpoint in endpoints:
-        pair = sides(kind, endpoint.qos, peer)
+        pair = sides(kind, endpoint.qos, parameters.peer)
         refused = refusals(*pair)
         own = f"the {kind.value} of {code(endpoint.node)}"
         left_open = _left_open(recording, endpoint, pair)
@@ -375,21 +366,10 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
         evidence = Evidence(
             moments=endpoints_seen(recording, (endpoint,)), tables=(compatibility_table(*pair),)
         )
-        return Finding.failed(expected, observed, hint, evidence)
-    join = next((item for item in recording.joins if item.name == parameters.joiner), None)
-    matched = join is not None and join.matched_ns is not None
-    if join is not None and matched is not (parameters.expect == "match"):
-        # What happened to the late joiner is not what the rules say.
-        destroyed = why_unpublished(recording, parameters.topic, "they did not match")
-        if destroyed is not None and not matched:
-            return destroyed.finding(expected)
-        did = "matched" if matched else "was never matched"
-        return Finding.to_repeat(
-            expected, f"by the rules of DDS it is so, but {code(join.name)} {did}"
-        )
-    pair = sides(kind, endpoints[0].qos, peer)
+        return Cause(observed, hint, evidence)
+    pair = sides(kind, endpoints[0].qos, parameters.peer)
     return Finding.passed(
-        expected,
+        parameters.asked_for,
         ", ".join(refusals(*pair)) or "every policy is compatible",
         Evidence(tables=(compatibility_table(*pair),)),
     )

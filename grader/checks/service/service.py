@@ -195,7 +195,7 @@ class Concurrent(Parameters):
 
 
 @check("service.concurrent", Subject.RECORDING, Concurrent, concept="executors")
-def concurrent(recording: Recording, parameters: Concurrent) -> Finding:
+def concurrent(recording: Recording, parameters: Concurrent) -> Finding | Cause:
     """A second call during a slow call is processed as expected.
 
     Judged by the answers to calls that the probe sent at once. Parallel calls are answered
@@ -209,7 +209,7 @@ def concurrent(recording: Recording, parameters: Concurrent) -> Finding:
     ]
     if not pairs:
         text = "the scenario never calls the service twice at once"
-        return Finding.error(parameters.asked_for, text)
+        return Cause(text, ours=True)
     # Time enough for the slower of both, one after the other.
     stop_if(why_slow(recording, calls, 2.0 * len(calls) * parameters.takes))
     for pair in pairs:

@@ -170,7 +170,7 @@ class Docstrings(_Share):
 
 
 @check("source.docstrings", Subject.SUBMISSION, Docstrings)
-def docstrings(submission: SubmissionRecord, parameters: Docstrings) -> Finding:
+def docstrings(submission: SubmissionRecord, parameters: Docstrings) -> Finding | Cause:
     """Classes and functions have docstrings.
 
     Judged by the syntax of the package's Python files. Names that begin with an underscore need
@@ -220,7 +220,7 @@ class TypeHints(_Share):
 
 
 @check("source.type_hints", Subject.SUBMISSION, TypeHints)
-def type_hints(submission: SubmissionRecord, parameters: TypeHints) -> Finding:
+def type_hints(submission: SubmissionRecord, parameters: TypeHints) -> Finding | Cause:
     """Functions have type hints.
 
     Judged by the syntax of the package's Python files: every parameter and every return value.
@@ -247,7 +247,7 @@ def _lacking(one: SourceFunction, returns: bool) -> str:
 
 def _shared(
     parameters: _Share, judged: Sequence[tuple[bool, SourceError]], what: str, hint: str
-) -> Finding:
+) -> Finding | Cause:
     """The finding by the share of items that have what they need."""
     lacking = [place for good, place in judged if not good]
     having = len(judged) - len(lacking)
@@ -257,7 +257,7 @@ def _shared(
         return Finding.passed(parameters.asked_for, observed)
     first = f"the first without is {lacking[0]}" if lacking else "there is nothing to judge"
     shown = Evidence(places=tuple(lacking[:_MOST_PLACES]))
-    return Finding.failed(parameters.asked_for, f"{observed}; {first}", hint, shown)
+    return Cause(f"{observed}; {first}", hint, shown)
 
 
 class NoPrint(OfPython):
@@ -267,7 +267,7 @@ class NoPrint(OfPython):
 
 
 @check("source.no_print", Subject.SUBMISSION, NoPrint)
-def no_print(submission: SubmissionRecord, parameters: NoPrint) -> Finding:
+def no_print(submission: SubmissionRecord, parameters: NoPrint) -> Finding | Cause:
     """The code does not call print(): the node logs.
 
     Judged by the syntax of the package's Python files: `print` is neither called nor passed as a
@@ -280,8 +280,7 @@ def no_print(submission: SubmissionRecord, parameters: NoPrint) -> Finding:
     if not places:
         return Finding.passed(parameters.asked_for, "no print()")
     number = counted(len(places), "place")
-    return Finding.failed(
-        parameters.asked_for,
+    return Cause(
         f"{number} with print(), the first at {places[0].file}:{places[0].line}",
         "Write self.get_logger().info('...'): it has a level and the node's name, and goes to "
         "/rosout as well.",
@@ -327,7 +326,7 @@ class Ruff(OfPython):
 
 
 @check("source.ruff", Subject.SUBMISSION, Ruff)
-def ruff(submission: SubmissionRecord, parameters: Ruff) -> Finding:
+def ruff(submission: SubmissionRecord, parameters: Ruff) -> Finding | Cause:
     """The code follows the given rules of ruff.
 
     Judged by `ruff check` on the package's Python files, with lines of up to 99 characters as in
@@ -337,14 +336,13 @@ def ruff(submission: SubmissionRecord, parameters: Ruff) -> Finding:
     lint = _judged_package(submission, parameters.package).lint
     if lint is None or lint.problem is not None:
         why = "ruff was not asked" if lint is None else lint.problem
-        return Finding.error(parameters.asked_for, f"the style was not looked at: {why}")
+        return Cause(f"the style was not looked at: {why}", ours=True)
     found = [item for item in lint.findings if parameters.is_broken_by(item.code)]
     if len(found) <= parameters.at_most:
         observed = counted(len(found), "place") if found else "none"
         return Finding.passed(parameters.asked_for, observed)
     places = [SourceError(item.file, item.line, f"{item.code} {item.message}") for item in found]
-    return Finding.failed(
-        parameters.asked_for,
+    return Cause(
         f"{counted(len(places), 'place')}, the first at {places[0]}",
         f"`ruff check --select {','.join(parameters.rules)}` shows them all, "
         f"`ruff rule {found[0].code}` explains this one.",

@@ -15,6 +15,7 @@ from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.messages import following, messages
 from grader.checks.need import Need, OwnTransform, Recorded, SimulatedRobot
 from grader.checks.timing import timing
+from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import cause_of, explain
 from grader.diagnosis.wrong_transform import (
     BadTransform,
@@ -128,7 +129,7 @@ class Broadcast(EdgeParameters):
 
 
 @check("tf.broadcast", Subject.RECORDING, Broadcast, concept="stamps")
-def broadcast(recording: Recording, parameters: Broadcast) -> Finding:
+def broadcast(recording: Recording, parameters: Broadcast) -> Finding | Cause:
     """A transform is broadcast at the right rate, with stamps of the node's clock.
 
     A stamp must be within 1 s of the moment of publishing, or be that of a message that the node
@@ -142,7 +143,7 @@ def broadcast(recording: Recording, parameters: Broadcast) -> Finding:
     if found.credit and parameters.moving and all(one.value == first.value for one in others):
         seen = f"{found.observed}, but the transform is always the same"
         hint = "Compute translation and rotation again in each call of the callback."
-        return Finding.failed(parameters.asked_for, seen, hint, found.evidence)
+        return Cause(seen, hint, found.evidence)
     return replace(found, expected=parameters.asked_for)
 
 

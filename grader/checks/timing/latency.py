@@ -8,8 +8,9 @@ from statistics import median
 
 from pydantic import Field, model_validator
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Published, Recorded
+from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_messages import why_not_sent, why_silent
 from grader.diagnosis.process.blocked_executor import left_s
@@ -68,9 +69,7 @@ class Latency(Parameters):
                 raise ValueError(f"'{name}' is more than 'within': raise 'within'")
         return self
 
-    @property
-    def words(self) -> str:
-        """What is expected, in words."""
+    def _asked(self) -> str:
         limits = {"median": self.median, "each": self.most}
         texts = [f"{name} {format_duration(most)}" for name, most in limits.items() if most]
         return (
@@ -87,20 +86,19 @@ class Latency(Parameters):
 
 
 @check("timing.latency", Subject.RECORDING, Latency)
-def latency(recording: Recording, parameters: Latency) -> Finding:
+def latency(recording: Recording, parameters: Latency) -> Finding | Cause:
     """The node answers soon.
 
     The latency is the time from the probe's publishing of a message to the source timestamp of the
     node's answer. Answers are taken in their order, one for each message. Delays by the machine are
     measured and cost no points.
     """
-    expected = parameters.words
     sent = recording.sent.get(parameters.stimulus, ())
     answers = recording.on(parameters.topic)
     if not answers:
-        return why_silent(recording, parameters.topic).finding(expected)
+        return why_silent(recording, parameters.topic)
     if not sent:
-        return why_not_sent(recording, parameters.stimulus).finding(expected)
+        return why_not_sent(recording, parameters.stimulus)
     within_ns = round(parameters.within * NS)
     found = answers_to(sent, answers, within_ns)
     waits = [(a.stamp_ns, b.stamp_ns) for a, b in zip(sent, found, strict=True) if b is not None]
@@ -110,37 +108,34 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
     evidence = _evidence(recording, parameters, waits, missing)
     is_missing = len(missing) > parameters.unanswered
     if not is_missing and not parameters.is_too_slow(times):
-        return Finding.passed(expected, figures, evidence)
+        return Finding.passed(parameters.asked_for, figures, evidence)
     observed = (
         f"{len(missing)} of {counted(len(found), 'message')} on {code(parameters.stimulus)} "
         f"had no answer within {format_duration(parameters.within)}"
     )
     if is_missing:
         last_ns = missing[-1 - parameters.unanswered]
-        destroyed = why_unsubscribed(recording, parameters.stimulus, observed, last_ns)
-        if destroyed is not None:
-            return destroyed.finding(expected)
+        stop_if(why_unsubscribed(recording, parameters.stimulus, observed, last_ns))
     own_s = [max(0.0, left_s(recording, *wait)) for wait in waits]
     unexcused = sum(recording.stolen_s(at, at + within_ns) <= 0.0 for at in missing)
     if unexcused <= parameters.unanswered and not parameters.is_too_slow(own_s):
         stolen_s = recording.stolen_s(sent[0].stamp_ns, recording.stop_ns)
-        return Finding.to_repeat(
-            expected,
+        return Cause.to_repeat(
             f"{figures}; the machine took up to {format_duration(stolen_s)} from the process "
-            "meanwhile, which may explain it",
+            "meanwhile, which may explain it"
         )
     if not is_missing:
         hint = (
             "Publish the answer in the subscription's callback itself, not from a timer. Let the "
             "callback return soon: no time.sleep(), no wait, no loop over what is there already."
         )
-        return Finding.failed(expected, figures, hint, evidence)
+        return Cause(figures, hint, evidence)
     hint = (
         "Publish one answer in every call of the subscription's callback, with no condition that "
         "leaves one out."
     )
     observed += f"; of the others {figures}" if times else ""
-    return Finding.failed(expected, observed, hint, evidence)
+    return Cause(observed, hint, evidence)
 
 
 def _figures(times_s: Sequence[float]) -> str:

@@ -9,7 +9,7 @@ from statistics import median
 
 from pydantic import Field, model_validator
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Recorded
 from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.diagnosis.cause import Cause
@@ -81,6 +81,12 @@ class Period(Parameters):
     )
     at_least: int = Field(5, ge=1, description="Least number of intervals needed to judge.")
 
+    def _asked(self) -> str:
+        return (
+            f"a message on {code(self.topic)} every {format_duration(self.period)} "
+            f"(median within {self.tolerance}, intervals within {self.spread})"
+        )
+
     @property
     def limits(self) -> PeriodLimits:
         """The same in seconds."""
@@ -89,7 +95,7 @@ class Period(Parameters):
 
 
 @check("timing.period", Subject.RECORDING, Period, concept="timers")
-def period(recording: Recording, parameters: Period) -> Finding:
+def period(recording: Recording, parameters: Period) -> Finding | Cause:
     """Messages come at the expected period.
 
     Judged by source timestamps, which the publisher's process sets in `publish()`, so a slow grader
@@ -100,23 +106,16 @@ def period(recording: Recording, parameters: Period) -> Finding:
     the observation. Delays by the machine are measured and cost no points.
     """
     limits = parameters.limits
-    expected = (
-        f"a message on {code(parameters.topic)} every {format_duration(parameters.period)} "
-        f"(median within {parameters.tolerance}, intervals within {parameters.spread})"
-    )
     messages = recording.on(parameters.topic)[: MOST_INTERVALS + 1]
     if len(messages) <= parameters.at_least and not _too_slow(messages, limits):
         cause = why_few(recording, parameters.topic, parameters.at_least + 1)
-        return cause.finding(expected)
-    unbelievable = _why_not_believed(recording, messages)
-    if unbelievable is not None:
-        return unbelievable.finding(expected)
+        return cause
+    stop_if(_why_not_believed(recording, messages))
     measured = intervals(messages)
     if len(measured) < min(parameters.at_least, len(messages) - 1):
-        return Finding.to_repeat(
-            expected,
+        return Cause.to_repeat(
             f"of {counted(len(messages), 'message')} so many neighbours were lost on their way to "
-            f"the probe that only {counted(len(measured), 'interval')} can be judged",
+            f"the probe that only {counted(len(measured), 'interval')} can be judged"
         )
     verdict = judge([item.seconds for item in measured], limits)
     observed = _figures(measured, verdict)
@@ -132,14 +131,13 @@ def period(recording: Recording, parameters: Period) -> Finding:
             f"{format_duration((recording.stop_ns - last_ns) / NS)} of the observation",
             ENDED_HINT,
         )
-        return silent.finding(expected) if silent else Finding.passed(expected, observed, evidence)
+        return silent or Finding.passed(parameters.asked_for, observed, evidence)
     forgivable = verdict.period_good or not _is_declared(recording, verdict, limits)
     if forgivable and judge(forgiven(recording, measured, limits), limits).good:
         stolen_s = recording.stolen_s(measured[0].begin_ns, measured[-1].end_ns)
-        return Finding.to_repeat(
-            expected,
+        return Cause.to_repeat(
             f"{observed}; the machine took up to {format_duration(stolen_s)} from the process "
-            "meanwhile, which may explain it",
+            "meanwhile, which may explain it"
         )
     if verdict.period_good:
         number = len(verdict.irregular)
@@ -150,7 +148,7 @@ def period(recording: Recording, parameters: Period) -> Finding:
         )
     cause = cause_of(WrongRhythm(recording, parameters.topic, measured, verdict, limits))
     observed += f": {cause.observed}" if cause.observed else ""
-    return Finding.failed(expected, observed, cause.hint, evidence)
+    return Cause(observed, cause.hint, evidence)
 
 
 def _is_declared(recording: Recording, verdict: PeriodVerdict, limits: PeriodLimits) -> bool:
@@ -231,9 +229,7 @@ class Rate(Parameters):
             raise ValueError("at_least is more than at_most")
         return self
 
-    @property
-    def words(self) -> str:
-        """The bounds, in words."""
+    def _asked(self) -> str:
         bounds = {"at least": self.at_least, "at most": self.at_most}
         texts = [f"{name} {hz:g} Hz" for name, hz in bounds.items() if hz is not None]
         words = f"{' and '.join(texts)} on {code(self.topic)}"
@@ -243,7 +239,7 @@ class Rate(Parameters):
 
 
 @check("timing.rate", Subject.RECORDING, Rate, concept="timers")
-def rate(recording: Recording, parameters: Rate) -> Finding:
+def rate(recording: Recording, parameters: Rate) -> Finding | Cause:
     """Messages come at a rate within bounds.
 
     The rate is the number of messages after the first, divided by the time from the first to the
@@ -251,13 +247,10 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     timing.period), except that `pause` limits the pauses. Messages that were sent but lost in
     transit count. Delays by the machine are measured and cost no points.
     """
-    expected = parameters.words
     messages = recording.on(parameters.topic)
     if len(messages) < parameters.messages:
-        return why_few(recording, parameters.topic, parameters.messages).finding(expected)
-    unbelievable = _why_not_believed(recording, messages)
-    if unbelievable is not None:
-        return unbelievable.finding(expected)
+        return why_few(recording, parameters.topic, parameters.messages)
+    stop_if(_why_not_believed(recording, messages))
     first, last = messages[0], messages[-1]
     span_s = (last.stamp_ns - first.stamp_ns) / NS
     # Messages after the first, with those that were lost on their way.
@@ -269,20 +262,17 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     if is_slow and number >= (parameters.at_least or 0.0) * left_s(
         recording, first.stamp_ns, last.stamp_ns
     ):
-        return Finding.to_repeat(
-            expected, f"{observed}, but the machine took time from the process"
-        )
+        return Cause.to_repeat(f"{observed}, but the machine took time from the process")
     if is_slow or (parameters.at_most is not None and found_hz > parameters.at_most):
-        return Finding.failed(
-            expected,
+        return Cause(
             observed,
             "Publish once in every call of the callback: look for a condition that leaves calls "
             "out, for a time.sleep(), and for a second timer or publish(). create_timer takes its "
             "period in seconds: 1 / rate.",
             evidence,
         )
-    paused = _why_paused(recording, parameters, messages)
-    return paused.finding(expected) if paused else Finding.passed(expected, observed, evidence)
+    stop_if(_why_paused(recording, parameters, messages))
+    return Finding.passed(parameters.asked_for, observed, evidence)
 
 
 def _why_paused(

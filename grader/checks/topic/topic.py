@@ -9,6 +9,7 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Recorded
+from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_endpoint import misnamed, why_no_endpoint
 from grader.diagnosis.no_node import why_no_node
 from grader.findings.finding import Evidence, Finding, Status
@@ -22,7 +23,7 @@ PROBE = "rosgrade_probe"
 
 
 class Topic(Parameters):
-    """Parameters of topic.published and topic.subscribed, and part of those of topic.type."""
+    """Part of the parameters of the checks of one topic."""
 
     topic: TopicName = Field(description="Fully qualified topic name.")
     remap: bool = Field(
@@ -33,8 +34,14 @@ class Topic(Parameters):
     )
 
 
-@check("topic.published", Subject.RECORDING, Topic, concept="names")
-def published(recording: Recording, parameters: Topic) -> Finding:
+class Published(Topic):
+    """Parameters of topic.published."""
+
+    asks = "a publisher on `{self.topic}`"
+
+
+@check("topic.published", Subject.RECORDING, Published, concept="names")
+def published(recording: Recording, parameters: Published) -> Finding:
     """The node publishes on the topic.
 
     Judged by the ROS graph: the student's node had a publisher. Other checks judge its messages.
@@ -42,8 +49,14 @@ def published(recording: Recording, parameters: Topic) -> Finding:
     return _presence(recording, Kind.PUBLISHER, parameters)
 
 
-@check("topic.subscribed", Subject.RECORDING, Topic, concept="names")
-def subscribed(recording: Recording, parameters: Topic) -> Finding:
+class Subscribed(Topic):
+    """Parameters of topic.subscribed."""
+
+    asks = "a subscription on `{self.topic}`"
+
+
+@check("topic.subscribed", Subject.RECORDING, Subscribed, concept="names")
+def subscribed(recording: Recording, parameters: Subscribed) -> Finding:
     """The node subscribes to the topic.
 
     Judged by the ROS graph: the student's node had a subscription.
@@ -52,28 +65,28 @@ def subscribed(recording: Recording, parameters: Topic) -> Finding:
 
 
 def _presence(recording: Recording, kind: Kind, parameters: Topic) -> Finding:
-    expected = f"a {kind.value} on {code(parameters.topic)}"
-    absent = _absence(recording, kind, parameters, expected)
+    absent = _absence(recording, kind, parameters)
     if absent is not None:
         return absent
     endpoints = recording.student_endpoints(kind, parameters.topic)
     if not endpoints:
-        return Finding.passed(expected, "messages came from one, but too briefly for the ROS graph")
+        seen = "messages came from one, but too briefly for the ROS graph"
+        return Finding.passed(parameters.asked_for, seen)
     first = min(endpoints, key=lambda item: item.appeared_ns)
     nodes, when_s = {item.node for item in endpoints}, recording.since_launch_s(first.appeared_ns)
     return Finding.passed(
-        expected,
+        parameters.asked_for,
         f"{codes(sorted(nodes))} has one, seen {when_s:.2f} s after launch",
         Evidence(moments=endpoints_seen(recording, [first])),
     )
 
 
-def _absence(recording: Recording, kind: Kind, parameters: Topic, expected: str) -> Finding | None:
+def _absence(recording: Recording, kind: Kind, parameters: Topic) -> Finding | None:
     """The finding of an endpoint that is not there, or only under another name."""
     topic = parameters.topic
     cause = why_no_endpoint(recording, kind, topic)
     if cause is not None:
-        finding = cause.finding(expected)
+        finding = cause.finding(parameters.asked_for)
         remap = misnamed(recording, kind, topic) if parameters.remap else ""
         return replace(finding, remap=remap) if finding.status is Status.FAILED else finding
     for remap in recording.remaps if parameters.remap else ():
@@ -81,7 +94,7 @@ def _absence(recording: Recording, kind: Kind, parameters: Topic, expected: str)
         if name == topic:
             endpoints = recording.student_endpoints(kind, name)
             failed = Finding.failed(
-                expected,
+                parameters.asked_for,
                 f"one on {code(found)} instead; everything else was judged in a second run, with "
                 f"`--ros-args -r {remap}` to correct the name",
                 f"Write the topic's name as '{name.lstrip('/')}'.",
@@ -94,6 +107,7 @@ def _absence(recording: Recording, kind: Kind, parameters: Topic, expected: str)
 class Type(Topic):
     """Parameters of topic.type."""
 
+    asks = "a {self.kind} of `{self.type}` on `{self.topic}`"
     needs = (Recorded(type="type", kind="kind"),)
 
     type: InterfaceName = Field(description="Interface, such as geometry_msgs/msg/Twist.")
@@ -103,25 +117,23 @@ class Type(Topic):
 
 
 @check("topic.type", Subject.RECORDING, Type, concept="interfaces")
-def type_(recording: Recording, parameters: Type) -> Finding:
+def type_(recording: Recording, parameters: Type) -> Finding | Cause:
     """The topic has the expected message type.
 
     Judged by the ROS graph, for every endpoint of the student's nodes on the topic.
     """
     kind, topic, wanted = Kind(parameters.kind), parameters.topic, parameters.type
-    expected = f"a {kind.value} of {code(wanted)} on {code(topic)}"
-    absent = _absence(recording, kind, parameters, expected)
+    absent = _absence(recording, kind, parameters)
     if absent is not None:
         return absent
     endpoints = recording.student_endpoints(kind, topic)
     types = sorted({item.type for item in endpoints or recording.on(topic)[:1]})
     wrong = [name for name in types if name != wanted]
     if not wrong:
-        return Finding.passed(expected, f"the type is {codes(types)}")
+        return Finding.passed(parameters.asked_for, f"the type is {codes(types)}")
     which = f"another {kind.value} on the topic" if wanted in types else f"the {kind.value}"
     package, _, short = wanted.split("/")
-    return Finding.failed(
-        expected,
+    return Cause(
         f"{which} has the type {code(wrong[0])}",
         "A publisher and a subscription meet only if their types are the same: "
         f"`from {package}.msg import {short}`.",
@@ -142,7 +154,7 @@ class Untouched(Parameters):
 
 
 @check("topic.untouched", Subject.RECORDING, Untouched, concept="names")
-def untouched(recording: Recording, parameters: Untouched) -> Finding:
+def untouched(recording: Recording, parameters: Untouched) -> Finding | Cause:
     """Only the robot publishes its sensors.
 
     Judged by the ROS graph: no node of the student has a publisher on a topic of the robot, or the
@@ -152,8 +164,7 @@ def untouched(recording: Recording, parameters: Untouched) -> Finding:
     stop_if(why_no_node(recording))
     for endpoint in recording.student_endpoints(Kind.PUBLISHER):
         if endpoint.topic in parameters.topics:
-            return Finding.failed(
-                parameters.asked_for,
+            return Cause(
                 f"the node {code(endpoint.node)} publishes on {code(endpoint.topic)}, which "
                 "belongs to the robot",
                 "To read the sensor use create_subscription; what you compute goes to a topic of "
@@ -162,8 +173,7 @@ def untouched(recording: Recording, parameters: Untouched) -> Finding:
             )
     for node in recording.student_nodes:
         if node.name.rpartition("/")[2] == PROBE:
-            return Finding.failed(
-                parameters.asked_for,
+            return Cause(
                 f"a node of the submission is called {code(node.name)}, which is the name of the "
                 "node that watches the run",
                 "Give your node the name that the assignment asks for.",
