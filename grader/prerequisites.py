@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import platform
 import shutil
-import subprocess
 import sysconfig
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -50,25 +49,15 @@ def diagnose() -> Iterator[Part]:
     yield _sandbox()
     if installation is not None:
         yield from _underlays(installation)
-    chosen = os.environ.get("ROS_DOMAIN_ID")
-    shown = f"{chosen} in this shell" if chosen else "not set in this shell"
-    yield Part("ROS_DOMAIN_ID", True, f"{shown}; every run gets a free one from 1 to 101")
-    load = f"{os.getloadavg()[0]:.2f} on {cpu_count()} CPUs (1 min average)"
-    yield Part("load", True, load)
+    yield Part("load", True, f"{os.getloadavg()[0]:.2f} on {cpu_count()} CPUs (1 min average)")
     if installation is not None:
         yield _discovery(installation)
 
 
 def _rmw(installation: ros.RosInstallation) -> Part:
-    chosen = os.environ.get("RMW_IMPLEMENTATION", "")
-    other = f"; RMW_IMPLEMENTATION={chosen} of this shell is not used" if chosen else ""
-    return Part(
-        "rmw",
-        "rmw_fastrtps_cpp" in installation.packages,
-        f"rmw_fastrtps_cpp{other}",
-        "install rmw_fastrtps_cpp: sudo apt install ros-jazzy-rmw-fastrtps-cpp",
-        required=True,
-    )
+    name = "rmw_fastrtps_cpp"
+    remedy = f"install {name}: sudo apt install ros-jazzy-rmw-fastrtps-cpp"
+    return Part("rmw", name in installation.packages, name, remedy, required=True)
 
 
 def _colcon() -> Part:
@@ -81,10 +70,7 @@ def _colcon() -> Part:
 
 def _program(name: str, command: str, purpose: str) -> Part:
     path = shutil.which(command)
-    if path is None:
-        return Part(name, False, remedy=f"sudo apt install {command} ({purpose})")
-    shown = subprocess.run([path, "--version"], capture_output=True, text=True, check=False)
-    return Part(name, True, shown.stdout.partition("\n")[0] or path)
+    return Part(name, path is not None, str(path), f"sudo apt install {command} ({purpose})")
 
 
 def _sandbox() -> Part:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -90,15 +91,5 @@ def _names(data: Any, path: str, loaded: LoadedAssignment) -> bool:
     defined = {
         name for name, one in own.items() if one.judge.__module__.rpartition(".")[2] == module
     }
-    return any(path in text or text in defined for text in _texts(data))
-
-
-def _texts(data: Any) -> Iterator[str]:
-    if isinstance(data, str):
-        yield data
-    elif isinstance(data, dict):
-        for item in data.values():
-            yield from _texts(item)
-    elif isinstance(data, list):
-        for item in data:
-            yield from _texts(item)
+    texts = json.dumps(data, ensure_ascii=False, default=str)
+    return path in texts or any(f'"{name}"' in texts for name in defined)

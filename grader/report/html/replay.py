@@ -6,7 +6,6 @@ are integers. What changes little is kept as differences from the value before.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from operator import sub
@@ -95,10 +94,9 @@ def with_goals(replay: Replay, assignment: Assignment, scenario: str) -> Replay:
 
 def embedded(data: Any) -> Markup:
     """Write data into a script element: nothing in it can end the element."""
-    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-    for sign, escape in (("<", "\\u003c"), (">", "\\u003e"), ("&", "\\u0026")):
-        text = text.replace(sign, escape)
-    return Markup(text)
+    from jinja2.utils import htmlsafe_json_dumps
+
+    return htmlsafe_json_dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
 def _milli(value: float) -> int:
