@@ -18,7 +18,7 @@ from grader.report.formats.markdown import render_markdown
 from grader.report.model.class_row import RowStatus
 from grader.report.model.result_model import Result
 from grader.report.model.student import for_student
-from grader.report.text.summary import summary
+from grader.report.text.explanation import summary
 from grader.safe_text import one_line
 
 FEEDBACK_FOLDER = "rosgrade-feedback"

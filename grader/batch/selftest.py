@@ -146,7 +146,9 @@ def run_trial(
 
 def _starter_verdict(grade: Grade) -> MutantVerdict:
     not_judged = tuple(
-        Difference(result.id, Status.FAILED, result.status) for result in grade.of(Status.ERROR)
+        Difference(result.id, Status.FAILED, result.status)
+        for result in grade.results
+        if result.status is Status.ERROR
     )
     problem = ""
     if grade.score > MOST_FOR_STARTER * grade.max_score:

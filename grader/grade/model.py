@@ -102,10 +102,6 @@ class Grade:
         """Whether it is graded and no point was lost."""
         return self.graded and self.score == self.max_score
 
-    def of(self, status: Status) -> tuple[CheckResult, ...]:
-        """Results of one status, in the author's order."""
-        return tuple(result for result in self.results if result.status is status)
-
     def result(self, check: str) -> CheckResult:
         """The result of the check of that id."""
         for result in self.results:

@@ -16,7 +16,7 @@ from collections.abc import Mapping
 
 from grader.report.formats.gradebook import DOWNLOAD
 from grader.report.model.result_model import Result
-from grader.report.text.summary import summary
+from grader.report.text.explanation import summary
 
 
 def is_download(name: str) -> bool:

@@ -176,3 +176,27 @@ def headline(result: Result) -> str:
         text += f"; {counted(withheld.checks, 'hidden check')}, "
         text += f"{counted_points(withheld.points)}, {verb} at grading"
     return f"{text}."
+
+
+def summary(result: Result) -> str:
+    """The score with its adjustments, what failed and why, and what persons wrote.
+
+    Args:
+        result: As far as the student may see it.
+    """
+    head = f"{one_line(result.assignment.id)}: {score(result)}"
+    lines = [head, headline(result)]
+    lines += [f"  {additions.line(one)}" for one in result.adjustments]
+    blocks = ["\n".join(lines)]
+    if result.submission.problem:
+        blocks.append(f"It could not be read: {one_line(result.submission.problem)}")
+    for check in (*result.of(Status.FAILED), *result.of(Status.ERROR)):
+        lines = [f"{one_line(check.title)} ({points(check)} points)"]
+        rows = explain(check, result)
+        lines += [f"  {row.name}: {row.text}" for row in rows if row.name != "printed"]
+        blocks.append("\n".join(lines))
+    for comment in result.comments:
+        where = additions.place(comment)
+        who = f"{one_line(comment.by)}{f' ({where})' if where else ''}"
+        blocks.append(f"{who}:\n{clean(comment.text)}")
+    return "\n\n".join(blocks) + "\n"
