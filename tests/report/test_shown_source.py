@@ -83,6 +83,14 @@ def test_a_place_without_a_line_is_found_where_the_file_says_it(place, line):
     assert (found and found.line) == line
 
 
+def test_colours_at_the_begin_of_a_line_are_no_text():
+    # Without an indent: the first tag of the line stands at its very begin.
+    html = lost_points().html(source={PLACE.file: "def main():\n    pass\n" * 15})
+    assert '<span class="k">def</span>' in html and "&lt;span" not in html
+    text = " ".join(Page(html).text.split())
+    assert "17 def main(): 18 pass" in text
+
+
 def test_source_is_text_whatever_it_holds():
     attack = "</code><script>alert(1)</script>\x1b[2J\u202e"
     html = lost_points().html(source={PLACE.file: f"{attack}\n" * 20})

@@ -46,7 +46,8 @@ class ShownSource:
         indent = re.compile(rf"^((?:<span [^>]*>)?) {{{found.indent}}}")
         code = self._lines(place.file)[found.first - 1 :][: len(found.texts)]
         return name, [
-            (number, Markup(indent.sub(r"\1", line)), number == found.line)
+            # As plain text: else the first tag of a line would be escaped again.
+            (number, Markup(indent.sub(r"\1", str(line))), number == found.line)
             for number, line in enumerate(code, start=found.first)
         ]
 
