@@ -62,15 +62,12 @@ class AssignmentError(RosgradeError):
         """
         self.file = file
         self.problems = tuple(problems)
-        super().__init__("\n".join(self._lines()))
-
-    def _lines(self) -> list[str]:
         lines = []
         for problem in self.problems:
-            place = f"{self.file}:{problem.line}" if problem.line else f"{self.file}"
+            place = f"{file}:{problem.line}" if problem.line else f"{file}"
             where = f"{problem.where}: " if problem.where else ""
             lines.append(f"{place}: {where}{problem.message}")
-        return lines
+        super().__init__("\n".join(lines))
 
 
 class SubmissionError(RosgradeError):

@@ -165,23 +165,15 @@ def _grade_all(queue: Sequence[Job], at_once: int) -> list[tuple[Job, TrialResul
 
 
 def _summary(results: list[tuple[Job, TrialResult]], wall_s: float) -> int:
-    counts: dict[str, Counter[str]] = {}
-    for job, result in results:
-        count = counts.setdefault(job.name, Counter())
-        count["runs"] += 1
-        count["changed"] += bool(differences(job.alone, result.grade))
-        count["not graded"] += not result.graded
-        count["run again"] += result.repeated
-    columns = ("runs", "changed", "not graded", "run again")
-    print("submission".ljust(40), *(f"{column:>10}" for column in columns))
-    for name, count in sorted(counts.items()):
-        print(name.ljust(40), *(f"{count[column]:>10}" for column in columns))
-    total = sum(counts.values(), Counter())
+    changed = Counter(j.name for j, result in results if differences(j.alone, result.grade))
+    for name, times in changed.most_common():
+        print(f"{name}: changed {times} times")
     print(
-        f"{len(results)} grades in {wall_s:.0f} s: {total['changed']} changed, "
-        f"{total['not graded']} not graded, {total['run again']} run again"
+        f"{len(results)} grades in {wall_s:.0f} s: {changed.total()} changed, "
+        f"{sum(not result.graded for _, result in results)} not graded, "
+        f"{sum(result.repeated for _, result in results)} run again"
     )
-    return 1 if total["changed"] else 0
+    return 1 if changed else 0
 
 
 if __name__ == "__main__":

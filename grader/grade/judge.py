@@ -11,7 +11,6 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from graphlib import TopologicalSorter
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from grader.assignment.model import CheckSpec, Counts
@@ -47,7 +46,7 @@ def grade(
     loaded: LoadedAssignment,
     submission: SubmissionRecord,
     recordings: Mapping[str, Recording],
-    faults: Mapping[str, str] = MappingProxyType({}),
+    faults: Mapping[str, str] = {},
 ) -> Grade:
     """Judge a submission, with its names in the places of the assignment's variables.
 

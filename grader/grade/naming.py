@@ -6,7 +6,6 @@ import json
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import PurePosixPath
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from grader.diagnosis.no_endpoint import ACTION, PUBLISHER, SERVICE, SUBSCRIPTION, NoEndpoint
@@ -27,13 +26,12 @@ _WORDS = {
     "actions": ACTION,
 }
 _MOST_PLACES = 10
-_NONE: Mapping[str, Recording] = MappingProxyType({})
 
 
 def named(
     loaded: LoadedAssignment,
     submission: SubmissionRecord,
-    recordings: Mapping[str, Recording] = _NONE,
+    recordings: Mapping[str, Recording] = {},
 ) -> tuple[LoadedAssignment, Finding | None]:
     """The assignment with the names of a submission in it.
 

@@ -16,7 +16,7 @@ from grader.grade import Grade, grade
 from grader.recording.event import Breach, Disturbance
 from grader.recording.model import NS, Call, LogLine, Message, Node, Owner, Process, Recording
 from grader.report.html.replay import Replay
-from grader.report.html.report import NO_REPLAYS, render_report
+from grader.report.html.report import render_report
 from grader.report.model.facts import RunFacts
 from grader.report.model.result import make_result
 from grader.report.model.result_model import AdjustmentPart, AttemptPart, CommentPart, Result
@@ -71,7 +71,7 @@ class Sample:
         made = make_result(self.grade, self.recordings, self.facts)
         return made.model_copy(update=dict(self.added))
 
-    def html(self, references: Mapping[str, Replay] = NO_REPLAYS, **options: Any) -> str:
+    def html(self, references: Mapping[str, Replay] = {}, **options: Any) -> str:
         return render_report(self.grade, self.result, self.recordings, references, **options)
 
     def printed(

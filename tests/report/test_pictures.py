@@ -85,7 +85,7 @@ class TestMotion:
             return (0.1, 0.0) if pose.x_m < 0.2 else (0.0, 0.5)
 
         run = drive(on_odometry(law), seconds=6.0, rest_s=None)
-        found = [phase.what for phase in phases(run)]
+        found = [phase.kind for phase in phases(run)]
         assert found[0] in ("rests", "drives")
         assert [what for what in found if what not in ("rests", "drives and turns")] == [
             "drives",

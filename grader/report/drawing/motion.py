@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from itertools import groupby
 
 from markupsafe import Markup
@@ -22,6 +22,7 @@ from grader.report.drawing.axes import (
     unit_of,
     value_axis,
 )
+from grader.report.drawing.lanes import Bar
 
 STRIP, PANEL, BETWEEN = 18, 110, 34
 STRIDE = 4
@@ -31,15 +32,6 @@ MOST = 1e6
 """Speeds beyond it are not drawn to scale."""
 SHORTEST_S = 0.25
 """A phase shorter than this belongs to the one before."""
-
-
-@dataclass(frozen=True)
-class Phase:
-    """What the robot did for a while; times in seconds since launch."""
-
-    what: str
-    begin_s: float
-    end_s: float
 
 
 def draw_motion(recording: Recording, name: str) -> svg.Figure | None:
@@ -69,22 +61,22 @@ def draw_motion(recording: Recording, name: str) -> svg.Figure | None:
         "robot, where it is near. Above: what the robot did."
     )
     described = "; ".join(
-        f"{phase.what} from {phase.begin_s:.1f} to {phase.end_s:.1f} s" for phase in found[:20]
+        f"{phase.kind} from {phase.begin_s:.1f} to {phase.end_s:.1f} s" for phase in found[:20]
     )
     title = f"Commands and true speeds in the scenario {recording.scenario}"
     return svg.figure(name, title, caption, draw, f"{caption} The robot {described}.")
 
 
-def phases(recording: Recording) -> list[Phase]:
-    """Divide a run into what the robot did."""
-    found: list[Phase] = []
+def phases(recording: Recording) -> list[Bar]:
+    """Divide a run into what the robot did, in words."""
+    found: list[Bar] = []
     end_s = recording.since_launch_s(recording.truth[0].time_ns)
     for what, group in groupby(recording.truth, key=_what):
         begin_s, end_s = end_s, recording.since_launch_s(list(group)[-1].time_ns)
-        if found and (end_s - begin_s < SHORTEST_S or found[-1].what == what):
-            found[-1] = Phase(found[-1].what, found[-1].begin_s, end_s)
+        if found and (end_s - begin_s < SHORTEST_S or found[-1].kind == what):
+            found[-1] = replace(found[-1], end_s=end_s)
         else:
-            found.append(Phase(what, begin_s, end_s))
+            found.append(Bar(begin_s, end_s, what))
     return found
 
 
@@ -95,15 +87,15 @@ def _what(step: Truth) -> str:
     return "drives" if drives else "turns" if turns else "rests"
 
 
-def _strip(found: Sequence[Phase], x: Scale) -> list[Markup]:
+def _strip(found: Sequence[Bar], x: Scale) -> list[Markup]:
     drawn = []
     for phase in found:
         begin, end = x.clipped(phase.begin_s), x.clipped(phase.end_s)
         width = max(1.0, end - begin - 1.5)
-        kind = f"phase {phase.what.replace(' ', '-')}"
+        kind = f"phase {phase.kind.replace(' ', '-')}"
         drawn.append(svg.element("rect", x=begin, y=0, width=width, height=STRIP, class_=kind))
-        if len(phase.what) * svg.LETTER + 8 < width:
-            drawn.append(svg.label(phase.what, (begin + end) / 2.0, 13, "on-phase", "middle"))
+        if len(phase.kind) * svg.LETTER + 8 < width:
+            drawn.append(svg.label(phase.kind, (begin + end) / 2.0, 13, "on-phase", "middle"))
     return drawn
 
 

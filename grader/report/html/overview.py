@@ -19,7 +19,6 @@ from grader.report.model.cluster import Cluster
 from grader.report.model.result_model import ScenarioPart
 from grader.safe_text import one_line
 
-NO_LINKS: Mapping[str, str] = {}
 MOST_DISTURBED = 50
 MOST_SHOWN = 500
 """Rows of the table until all are asked for."""
@@ -44,7 +43,7 @@ def render_overview(
     vanished: Sequence[str] = (),
     pages: Sequence[str] = (),
     link: Callable[[ClassRow], str] | None = None,
-    links: Mapping[str, str] = NO_LINKS,
+    links: Mapping[str, str] = {},
 ) -> str:
     """Render the overview of a class; its links are relative to the folder that it lies in.
 

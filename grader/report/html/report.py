@@ -33,8 +33,6 @@ from grader.report.model.target import targets
 from grader.report.text import explanation
 from grader.submission.record import BuildRecord
 
-NO_REPLAYS: Mapping[str, Replay] = {}
-NO_SOURCE: Mapping[str, str] = {}
 CONTEXT = 6
 """Lines of a build log that are shown around the student's own."""
 MOST_PLACES = 3
@@ -45,9 +43,9 @@ def render_report(
     grade: Grade,
     result: Result,
     recordings: Mapping[str, Recording],
-    references: Mapping[str, Replay] = NO_REPLAYS,
-    before: Mapping[str, Replay] = NO_REPLAYS,
-    source: Mapping[str, str] = NO_SOURCE,
+    references: Mapping[str, Replay] = {},
+    before: Mapping[str, Replay] = {},
+    source: Mapping[str, str] = {},
     root: Path | None = None,
 ) -> str:
     """Render the report of one submission.

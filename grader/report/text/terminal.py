@@ -7,7 +7,6 @@ cleaned and wrapped in a :class:`rich.text.Text`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 from rich.cells import cell_len
@@ -40,14 +39,13 @@ _INDENT = 12
 _LOG_LINES = 8
 _COLORS = {"theme": "ansi_dark", "background_color": "default"}
 _LOOK: dict[str, Any] = {**_COLORS, "line_numbers": True}
-_NO_SOURCE: Mapping[str, str] = MappingProxyType({})
 
 
 def print_grade(
     console: Console,
     title: str,
     result: Result,
-    source: Mapping[str, str] = _NO_SOURCE,
+    source: Mapping[str, str] = {},
 ) -> None:
     """Print a grade.
 
@@ -70,7 +68,7 @@ def print_changes(
     before: Result,
     after: Result,
     scores: Sequence[float | None] = (),
-    source: Mapping[str, str] = _NO_SOURCE,
+    source: Mapping[str, str] = {},
 ) -> None:
     """Print in one line what changed since an earlier grade, and what to fix now.
 
