@@ -26,7 +26,7 @@ from grader.assignment.own_check import FOLDER, lesson_checks
 from grader.assignment.stimuli.stimulus import stimulus_models
 from grader.checks import window
 from grader.checks.catalogue import CATALOGUE, families
-from grader.checks.check import Check, Subject
+from grader.checks.check import Check
 from grader.checks.tolerance import TimeTolerance
 from grader.diagnosis.explanation import explanations
 from grader.findings import finding
@@ -197,18 +197,10 @@ def _sentence(symptom: type[Any]) -> str:
 
 def check_markdown(check: Check) -> str:
     """One check: what it asks for, what it explains, its parameters."""
-    parts = [f"## {check.name}", _outside_code(check.documentation)]
-    if check.subject is Subject.SUBMISSION:
-        parts.append("A check of what was handed in: it has no `scenarios`.")
+    text, table = _outside_code(check.documentation), ""
     if check.parameters.model_fields:
-        parts.append(_fields_table(check.parameters))
-    if check.parameters.only:
-        parts.append(
-            f"Reads {check.parameters.only} only: a package in another language is an error."
-        )
-    if check.parameters.needs:
-        parts.append(f"Needs {'; '.join(map(str, check.parameters.needs))}.")
-    return "\n\n".join(parts)
+        table = _fields_table(check.parameters)
+    return _rendered("check.md", check=check, text=text, fields=table).rstrip("\n")
 
 
 def _class_section(one: type) -> str:

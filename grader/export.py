@@ -15,6 +15,7 @@ from grader import resources
 from grader.assignment.load import LoadedAssignment
 from grader.errors import UsageError
 from grader.report.files import refuse_inputs, refuse_part, write_whole
+from grader.starter import rendered
 from grader.visible_files import files_in, grading_files, visible_files
 
 _CHECKOUT = ("pyproject.toml", "requirements.lock", "README.md", "LICENSE")
@@ -81,10 +82,10 @@ def github(loaded: LoadedAssignment, out: Path, action: str, tag: str = "") -> P
         name = f".github/rosgrade/{loaded.assignment.id}"
         for inside, content in visible_files(loaded).items():
             write_whole(out / name / inside, content)
-    text = _read_template("github-workflow.yml", name)
     file = out / ".github" / "workflows" / "rosgrade.yml"
     tags = f"\n    tags: [{json.dumps(tag)}]" if tag else ""
-    write_whole(file, text.replace("@ACTION@", action).replace("@TAGS@", tags))
+    values = {"assignment": name, "action": action, "tags": tags}
+    write_whole(file, rendered("export/github-workflow.yml", **values))
     return file
 
 
@@ -117,12 +118,8 @@ def checkout(assignments: Mapping[str, Mapping[str, bytes]]) -> dict[str, Member
 
 
 def _template(name: str, loaded: LoadedAssignment, *, executable: bool = False) -> Member:
-    return Member(_read_template(name, loaded.assignment.id).encode(), executable)
-
-
-def _read_template(name: str, assignment: str) -> str:
-    text = (resources.templates() / "export" / name).read_text(encoding="utf-8")
-    return text.replace("@ASSIGNMENT@", assignment)
+    text = rendered(f"export/{name}", assignment=loaded.assignment.id)
+    return Member(text.encode(), executable)
 
 
 def _zipped(members: Mapping[str, Member]) -> bytes:

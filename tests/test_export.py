@@ -132,7 +132,7 @@ def test_every_action_runs_on_a_node_that_github_still_has():
     # The first versions on Node 24; GitHub took Node 20 from its runners in September 2026.
     first = {"checkout": 5, "setup-python": 6, "cache": 5, "upload-artifact": 6}
     files = (
-        *("action.yml", ".github/workflows/test.yml", "templates/export/github-workflow.yml"),
+        *("action.yml", ".github/workflows/test.yml", "templates/export/github-workflow.yml.j2"),
         "templates/course/workflow.yml.j2",
     )
     form = re.compile(r"uses: actions/([\w-]+)(?:/\w+)?@v(\d+)\n")
