@@ -30,7 +30,6 @@ from grader.submission.kept_source import SOURCE_FOLDER
 from grader.submission.prepare import fingerprint
 
 FAULTS_FILE = "faults.log"
-NOT_YET = "not graded yet: the batch was interrupted"
 _MOST_NAMED = 5
 RETRY_ALL, RETRY_ERRORS = "all", "errors"
 
@@ -122,18 +121,6 @@ class Batch:
                     yield from self._finished(key, fresh=True)
         finally:
             self._write()
-
-    def left(self, done: Iterable[Done]) -> list[Done]:
-        """Rows that an interrupted batch has not graded, each with its earlier grade if any."""
-        finished = {item.entry.key for item in done}
-        left = []
-        for key in self._entries.keys() - finished:
-            entry, result = self._entries[key], self.ledger.result(key)
-            version = (entry.sha256, self.loaded.sha256)
-            if result is None or (result.submission.sha256, result.assignment.sha256) != version:
-                entry, result = entry.with_problem(NOT_YET), None
-            left.append(Done(entry, result, fresh=False))
-        return left
 
     def _identified(self, entry: Entry, path: Path) -> Entry:
         try:

@@ -28,7 +28,7 @@ from grader.safe_text import one_line
 GRADES_FILE = "grades.csv"
 OVERVIEW_FILE = "index.html"
 INSTRUCTOR_FOLDER = "instructor"
-NO_RESULT = "it has no result; run the batch again"
+NO_RESULT = "not graded yet; run the batch again"
 _MOST_TWINS = 5
 
 
@@ -69,11 +69,16 @@ def _note(done: Done, same: Sequence[Entry]) -> str:
 def standing(ledger: Ledger, entry: Entry) -> Done:
     """A row of a batch with the result in the batch's folder."""
     result = ledger.result(entry.key) if not entry.fault else None
-    if result is not None and entry.sha256 in ("", result.submission.sha256):
+    if result is not None and entry.sha256 == result.submission.sha256:
         return Done(entry, result, fresh=False)
     if entry.sha256 and not entry.fault:
         entry = entry.with_problem(NO_RESULT)
     return Done(entry, None, fresh=False)
+
+
+def all_standing(ledger: Ledger) -> list[Done]:
+    """The rows of a batch as they are now."""
+    return [standing(ledger, entry) for entry in ledger.read().entries]
 
 
 def class_rows(done: Sequence[Done], ledger: Ledger | None = None) -> list[ClassRow]:
@@ -143,12 +148,8 @@ def find_reports(out: Path) -> tuple[Path, ...]:
 
 
 def _of_batch(ledger: Ledger) -> tuple[Path, ...]:
-    found = []
-    for entry in ledger.read().entries:
-        folder, result = ledger.folder(entry.key), ledger.result(entry.key)
-        is_of_it = result is None or result.submission.sha256 == entry.sha256
-        if not entry.fault and is_of_it and (folder / RESULT_FILE).is_file():
-            found.append(folder)
+    graded = (one.entry for one in all_standing(ledger) if one.result is not None)
+    found = [ledger.folder(entry.key) for entry in graded]
     if not found:
         raise UsageError(f"{ledger.out}: nothing of this batch is graded yet")
     return tuple(sorted(found))
@@ -161,7 +162,6 @@ def read_class(out: Path) -> list[ClassRow]:
         # Refuses a batch without a grade.
         _of_batch(ledger)
         adjust = ClassAdjustments(ledger)
-        rows = (standing(ledger, entry) for entry in ledger.read().entries)
-        return class_rows([adjust.row(row) for row in rows], ledger)
+        return class_rows([adjust.row(row) for row in all_standing(ledger)], ledger)
     results = (for_class(read_result(folder / RESULT_FILE)) for folder in find_reports(out))
     return class_rows([Done(Entry(one.submission.id), one, fresh=False) for one in results])

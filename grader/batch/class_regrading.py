@@ -9,7 +9,7 @@ from pathlib import Path
 from grader.assignment.load import LoadedAssignment
 from grader.batch.adjusting import ClassAdjustments
 from grader.batch.batch import Done
-from grader.batch.class_files import GRADES_FILE, NO_RESULT, write_class
+from grader.batch.class_files import GRADES_FILE, NO_RESULT, all_standing, write_class
 from grader.batch.files import RESULT_FILE, write_graded
 from grader.batch.ledger import Entry, Ledger, keep_earlier
 from grader.batch.regrading import compare, find, refuse_other, regrade
@@ -55,24 +55,19 @@ def regrade_class(
     is written: a preview of who gains and who loses.
     """
     written = ledger.read()
-    entries = written.entries
     adjust = ClassAdjustments(ledger)
     # What people wrote must be readable before anything is written.
     adjust.vanished()
     refuse_other(ledger.out, written.assignment, loaded)
-    for entry in entries:
-        before = ledger.result(entry.key)
-        if entry.fault:
-            yield Regraded(Done(entry, None, fresh=False), None, problem=entry.fault)
-        elif before is not None and entry.sha256 in ("", before.submission.sha256):
-            yield _regrade(loaded, ledger, entry, before, adjust, write=write)
-        elif entry.sha256:
-            yield _not_judged(entry, None, NO_RESULT)
+    for row in all_standing(ledger):
+        if row.result is not None:
+            yield _regrade(loaded, ledger, row.entry, row.result, adjust, write=write)
         else:
-            yield Regraded(Done(entry, None, fresh=False), None)
+            why = row.entry.fault or (NO_RESULT if row.entry.sha256 else "")
+            yield Regraded(row, None, problem=why)
     if write:
         version = (loaded.assignment.id, loaded.sha256, loaded.location)
-        ledger.write(entries, *version, written.course)
+        ledger.write(written.entries, *version, written.course)
 
 
 def write_regraded(rows: Sequence[Regraded], ledger: Ledger) -> Path:
@@ -95,7 +90,9 @@ def _regrade(
     try:
         found = find(folder)
     except RosgradeError as error:
-        return _not_judged(entry, before, str(error).partition("\n")[0])
+        why = str(error).partition("\n")[0]
+        noted = entry.with_problem(f"not judged again: {why}")
+        return Regraded(Done(noted, before, fresh=False), before, problem=why)
     graded = regrade(loaded, found)
     changes = tuple(compare(before, graded.grade))
     if not write:
@@ -107,8 +104,3 @@ def _regrade(
         keep_earlier(folder / RESULT_FILE)
         write_graded(graded, folder, Clock(), amended=adjust)
     return Regraded(Done(entry, ledger.result(entry.key), fresh=True), before, changes)
-
-
-def _not_judged(entry: Entry, before: Result | None, why: str) -> Regraded:
-    noted = entry.with_problem(f"not judged again: {why}")
-    return Regraded(Done(noted, before, fresh=False), before, problem=why)

@@ -70,13 +70,13 @@ def new_place(ledger: Ledger) -> Path:
 
 def load_before(ledger: Ledger) -> LoadedAssignment | None:
     """The assignment before the one that the class is graded with; None if that is the first."""
-    file = Path(ledger.read().location or "").parent / _BEFORE
-    return _load(ledger, json.loads(file.read_text())["location"]) if file.is_file() else None
-
-
-def _load(ledger: Ledger, location: str | None) -> LoadedAssignment:
-    out, name = ledger.out, ledger.read().assignment
-    return load_assignment(stored_assignment(out, name, location, "regrade", str(out)))
+    out, used = ledger.out, ledger.read()
+    file = Path(used.location or "").parent / _BEFORE
+    if not file.is_file():
+        return None
+    words = ("regrade", str(out))
+    before = json.loads(file.read_text())["location"]
+    return load_assignment(stored_assignment(out, used.assignment, before, *words))
 
 
 def _span(loaded: LoadedAssignment, check: str, lines: list[str]) -> tuple[int, int]:

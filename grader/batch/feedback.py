@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.batch.adjusting import ClassAdjustments
-from grader.batch.class_files import class_rows, standing
+from grader.batch.class_files import all_standing, class_rows
 from grader.batch.files import REPORT_FILE, STUDENT_FILE
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.rendering import NOT_UP_TO_DATE, bring_up_to_date
@@ -40,7 +40,7 @@ def class_feedback(out: Path) -> tuple[list[Feedback], list[str]]:
     """
     ledger = Ledger(out)
     # As after a batch, also reports are written that show checks which are released by now.
-    done = (replace(standing(ledger, one), fresh=True) for one in ledger.read().entries)
+    done = (replace(one, fresh=True) for one in all_standing(ledger))
     now = bring_up_to_date(done, ledger)
     visible, entries = ClassAdjustments(ledger).visible, {one.entry.key: one.entry for one in now}
     found, problems = [], []

@@ -48,37 +48,29 @@ class FoundRecordings:
     @property
     def location(self) -> str | None:
         """Where that assignment lay; None for one of rosgrade's own, or where it is not known."""
-        result = self.result
-        beside = self.folder.parent / RESULT_FILE
-        if result is None and self.folder.name == RECORDINGS_FOLDER and beside.is_file():
-            # One recording of a report was named.
-            result = read_result(beside)
-        return result.assignment.location if result is not None else None
+        return self.result.assignment.location if self.result is not None else None
 
 
 def find(path: Path) -> FoundRecordings:
     """Find the recordings at a path."""
     if not path.exists():
         raise UsageError(f"{path}: does not exist")
-    if path.is_file():
-        recording = read_recording(path)
-        files = {recording.scenario: path}
-        return FoundRecordings(
-            path.parent, {recording.scenario: recording}, files, recording.submission, None
-        )
-    folder = path / RECORDINGS_FOLDER if (path / RECORDINGS_FOLDER).is_dir() else path
+    folder = path.parent if path.is_file() else path
+    if (path / RECORDINGS_FOLDER).is_dir():
+        folder = path / RECORDINGS_FOLDER
+    report = folder.parent if folder.name == RECORDINGS_FOLDER else folder
     recordings, files = {}, {}
-    for file in sorted(folder.glob("*.mcap")):
+    for file in [path] if path.is_file() else sorted(folder.glob("*.mcap")):
         recording = read_recording(file)
         recordings[recording.scenario] = recording
         files[recording.scenario] = file
     facts = folder / SUBMISSION_FILE
-    if not recordings and not facts.is_file():
+    if path.is_dir() and facts.is_file():
+        submission = read_record(facts)
+    elif recordings:
+        submission = next(iter(recordings.values())).submission
+    else:
         raise UsageError(f"{path}: there are no recordings in it")
-    submission = (
-        read_record(facts) if facts.is_file() else next(iter(recordings.values())).submission
-    )
-    report = folder.parent if folder.name == RECORDINGS_FOLDER else folder
     result = read_result(report / RESULT_FILE) if (report / RESULT_FILE).is_file() else None
     return FoundRecordings(report, recordings, files, submission, result)
 

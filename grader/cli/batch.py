@@ -69,7 +69,7 @@ def batch(
     from grader.assignment.load import load_assignment
     from grader.batch.adjusting import ClassAdjustments, course_of
     from grader.batch.batch import Batch
-    from grader.batch.class_files import GRADES_FILE, write_class
+    from grader.batch.class_files import GRADES_FILE, all_standing, write_class
     from grader.batch.executor import DaskExecutor, ExecutorLost, LocalExecutor
     from grader.batch.groups import strangers
     from grader.batch.ledger import Ledger
@@ -133,7 +133,7 @@ def batch(
                     f"interrupted; {len(done)} of {len(entries)} are in {out}. Run the same "
                     "command again to grade the others"
                 )
-                write_class(bring_up_to_date([*done, *work.left(done)], ledger), ledger)
+                write_class(bring_up_to_date(all_standing(ledger), ledger), ledger)
                 signal.signal(signal.SIGINT, signal.default_int_handler)
                 signal.signal(signal.SIGTERM, signal.default_int_handler)
                 raise

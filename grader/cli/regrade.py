@@ -61,15 +61,17 @@ def _one(path: Path, assignment: str | None, *, write: bool) -> None:
     loaded = load_assignment(
         assignment or stored_assignment(path, found.assignment, found.location, *words)
     )
-    if found.result is not None:
-        refuse_other(found.folder, found.result.assignment.id, loaded)
+    # One recording says nothing of the checks of other scenarios.
+    before = found.result if path.is_dir() else None
+    if before is not None:
+        refuse_other(found.folder, before.assignment.id, loaded)
     clock = Clock()
     graded = judge_again(loaded, found)
     say(f"Assignment: {loaded.file}")
     result = make_result(graded.grade, graded.recordings, RunFacts(clock.started, clock.elapsed_s))
     print_grade(output_console(), loaded.assignment.title, result)
-    if found.result is not None:
-        for line in compare(found.result, graded.grade) or ["no check changed"]:
+    if before is not None:
+        for line in compare(before, graded.grade) or ["no check changed"]:
             say(line)
         if not write:
             say(NOTHING_WRITTEN)

@@ -36,7 +36,7 @@ def report(
     `rosgrade review` added, and so are the gradebook and the overview.
     """
     from grader.batch.adjusting import ClassAdjustments
-    from grader.batch.class_files import find_reports, standing, write_class
+    from grader.batch.class_files import all_standing, find_reports, write_class
     from grader.batch.files import REPORT_FILE, RESULT_FILE
     from grader.batch.grading import RECORDINGS_FOLDER
     from grader.batch.ledger import Ledger
@@ -61,5 +61,5 @@ def report(
         formats.write(render_again(folder, assignment, adjust))
         say(f"Report: {folder / REPORT_FILE}")
     if ledger is not None:
-        rows = [standing(ledger, entry) for entry in ledger.read().entries]
-        say(f"Overview: {write_class(bring_up_to_date(rows, ledger), ledger)}")
+        rows = bring_up_to_date(all_standing(ledger), ledger)
+        say(f"Overview: {write_class(rows, ledger)}")

@@ -7,7 +7,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 
 from grader.assignment.load import LoadedAssignment
-from grader.batch.class_files import standing, write_class
+from grader.batch.class_files import all_standing, write_class
 from grader.batch.class_regrading import Regraded, regrade_class, write_regraded
 from grader.batch.rendering import bring_up_to_date
 from grader.errors import RosgradeError
@@ -67,8 +67,7 @@ class Background:
     def _refresh(self) -> None:
         try:
             with self._ledger.opened() as ledger:
-                rows = [standing(ledger, entry) for entry in ledger.read().entries]
-                write_class(bring_up_to_date(rows, ledger), ledger)
+                write_class(bring_up_to_date(all_standing(ledger), ledger), ledger)
             self.problem = ""
         except Exception as error:
             # Also that of a check of the assignment's own; what was written down is safe.

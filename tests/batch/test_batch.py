@@ -17,8 +17,8 @@ import pytest
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.variable import Variable
-from grader.batch.batch import NOT_YET, Batch, Done
-from grader.batch.class_files import class_rows, copies, find_reports
+from grader.batch.batch import Batch, Done
+from grader.batch.class_files import NO_RESULT, all_standing, class_rows, copies, find_reports
 from grader.batch.executor import BatchExecutor, ExecutorLost, LocalExecutor
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
@@ -299,10 +299,10 @@ def test_an_interrupted_batch_knows_what_it_has_not_come_to(course: Class) -> No
         batch = Batch(course.loaded, course.ledger, frozenset({"ana"}))
         _, to_do = batch.read(take_in(course.folder / "class", course.folder))
         assert set(to_do) == {"ana", "ben", "dee"}
-        left = {item.entry.key: item for item in batch.left(())}
+        left = {item.entry.key: item for item in all_standing(course.ledger)}
     graded = {key for key, item in left.items() if item.result is not None}
     assert graded == {"ana", "ben (attempt 1)", "cai"}
-    assert left["ben"].entry.problem == left["dee"].entry.problem == NOT_YET
+    assert left["ben"].entry.problem == left["dee"].entry.problem == NO_RESULT
 
 
 @pytest.mark.parametrize(("team", "same_as"), [("red", "ana"), ("blue", "")])

@@ -473,7 +473,7 @@ def test_what_cannot_be_judged_again_is_no_loss_of_points(
         (tmp_path / "recordings").rename(partial / "recordings")
         write_graded(first, partial, Clock())
         ledger.put("ada", partial)
-        ledger.write([Entry("ada")], "lesson", lesson.sha256)
+        ledger.write([Entry("ada", sha256=first.grade.submission.sha256)], "lesson", lesson.sha256)
         (ledger.folder("ada") / "recordings" / "run.mcap").unlink()
         (row,) = regrade_class(lesson, ledger)
     assert row.changes[0].startswith("alive: passed -> error: ")
@@ -503,7 +503,7 @@ def test_what_cannot_be_read_again_keeps_its_grade_and_is_reported(
     assert ada.done.entry.problem == f"not judged again: {ada.problem}"
     assert not cai.problem and cai.done.fresh
     for row in (ben, dee):
-        assert row.problem == "it has no result; run the batch again"
+        assert row.problem == "not graded yet; run the batch again"
         assert row.done.result is None
     assert not eli.problem and eli.done.entry.problem == "handed in nothing"
     assert ledger.read().entries[0].problem == ""
