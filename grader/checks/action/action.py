@@ -89,10 +89,6 @@ def is_undisturbed(goal: Goal) -> bool:
     return goal.cancel_after_s is None and not goal.preempted
 
 
-def _is_to_cancel(goal: Goal) -> bool:
-    return goal.cancel_after_s is not None
-
-
 def why_rejected(recording: Recording, goal: Goal) -> Cause | None:
     """Why a goal that should have been accepted was not, or None if it was."""
     if goal.accepted is not False:
@@ -251,9 +247,8 @@ class Result(OfGoals):
     )
     status: str = Field(
         "succeeded",
-        pattern="^(succeeded|aborted|canceled)$",
-        description="How the goal ends: `succeeded`, `aborted`, or `canceled` (then the goals with "
-        "`cancel_after` are judged).",
+        pattern="^(succeeded|aborted)$",
+        description="How the goal ends: `succeeded` or `aborted`; see action.cancels.",
     )
     tolerance: FieldTolerance = EXACT
     within: Duration = Field(description="Longest time from the goal to its result.")
@@ -272,12 +267,9 @@ class Result(OfGoals):
 def result(recording: Recording, parameters: Result) -> Finding:
     """The action ends with the expected result.
 
-    Judged by the results of the accepted goals that were not canceled or preempted; or with
-    `status: canceled` of those that the probe asked to cancel.
+    Judged by the results of the accepted goals that were not canceled or preempted.
     """
-    is_canceled = parameters.status == "canceled"
-    is_judged = _is_to_cancel if is_canceled else is_undisturbed
-    goals = answered_goals(recording, parameters, is_judged)
+    goals = answered_goals(recording, parameters, is_undisturbed)
     for goal in goals:
         stop_if(why_rejected(recording, goal))
         stop_if(_why_no_result(recording, goal, parameters.within))
@@ -292,7 +284,7 @@ def _why_other_status(recording: Recording, goal: Goal, parameters: Result) -> C
         return None
     seen = f"{the_goal(goal)} {goal.status or 'has no status'}"
     is_aborted = goal.status == "aborted"
-    call = {"succeeded": "succeed", "aborted": "abort", "canceled": "canceled"}[parameters.status]
+    call = {"succeeded": "succeed", "aborted": "abort"}[parameters.status]
     raised = why_raised(recording, seen, goal.sent_ns) if is_aborted else None
     return raised or Cause(
         seen,
