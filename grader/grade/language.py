@@ -8,51 +8,48 @@ from __future__ import annotations
 import re
 from collections.abc import Collection
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
+import yaml
+
 from grader.findings.finding import Finding
-from grader.spec.source import Model, read_source
 from grader.submission.record import CPP, SubmissionRecord
 
+_FILE = Path(__file__).with_name("cpp_words.yaml")
 _PLACE = re.compile(r"(?<!\$)\{(\w+)\}")
 
 
-class Words(Model):
-    """One row of the table; ``{name}`` stands for any text, the same on both sides."""
-
-    python: str
-    cpp: str
-
-    def pattern(self, number: int) -> str:
-        """A regular expression for the words of Python, as a group of this number."""
-        literal, *rest = _PLACE.split(self.python)
-        found = re.escape(literal)
-        for name, after in zip(rest[::2], rest[1::2], strict=True):
-            found += rf"(?P<{name}_{number}>(?:[^()]|\([^()]*\))+?){re.escape(after)}"
-        # A word is not replaced within a longer one.
-        begin = r"(?<![\w.])" if self.python[0].isalnum() else ""
-        end = r"(?!\w)" if self.python[-1].isalnum() else ""
-        return f"{begin}(?P<row_{number}>{found}){end}"
+@cache
+def _table() -> tuple[list[str], re.Pattern[str]]:
+    """The words of C++ of each row, and what finds those of Python: ``row_0`` is the first."""
+    # Read late: most submissions are in Python.
+    rows = yaml.safe_load(_FILE.read_text(encoding="utf-8"))["words"]
+    patterns = [_pattern(number, row["python"]) for number, row in enumerate(rows)]
+    return [row["cpp"] for row in rows], re.compile("|".join(patterns))
 
 
-class WordTable(Model):
-    """The whole of ``cpp_words.yaml``; where several rows match, the first wins."""
-
-    words: tuple[Words, ...]
-
-
-WORDS = read_source(Path(__file__).with_name("cpp_words.yaml")).read(WordTable).words
-_ANY = re.compile("|".join(row.pattern(number) for number, row in enumerate(WORDS)))
+def _pattern(number: int, python: str) -> str:
+    """A regular expression for the words of one row, in which ``{name}`` stands for any text."""
+    literal, *rest = _PLACE.split(python)
+    found = re.escape(literal)
+    for name, after in zip(rest[::2], rest[1::2], strict=True):
+        found += rf"(?P<{name}_{number}>(?:[^()]|\([^()]*\))+?){re.escape(after)}"
+    # A word is not replaced within a longer one.
+    begin = r"(?<![\w.])" if python[0].isalnum() else ""
+    end = r"(?!\w)" if python[-1].isalnum() else ""
+    return f"{begin}(?P<row_{number}>{found}){end}"
 
 
 def in_cpp(text: str) -> str:
-    """A text in the words of C++."""
-    return _ANY.sub(_translated, text)
+    """A text in the words of C++; where several rows match, the first wins."""
+    cpp, pattern = _table()
 
+    def translated(found: re.Match[str]) -> str:
+        number = next(n for n in range(len(cpp)) if found[f"row_{n}"] is not None)
+        return _PLACE.sub(lambda place: in_cpp(found[f"{place[1]}_{number}"]), cpp[number])
 
-def _translated(found: re.Match[str]) -> str:
-    number = next(n for n in range(len(WORDS)) if found[f"row_{n}"] is not None)
-    return _PLACE.sub(lambda place: in_cpp(found[f"{place[1]}_{number}"]), WORDS[number].cpp)
+    return pattern.sub(translated, text)
 
 
 def is_cpp(submission: SubmissionRecord, names: Collection[str]) -> bool:

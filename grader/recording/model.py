@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 from grader.recording.event import Breach, Disturbance, Intervention, Wait
@@ -406,8 +407,8 @@ class Recording:
         all samples that overlap the interval.
         """
         # The first sample after the beginning covers it; the first after the end is the last.
-        first = bisect_left(self.disturbance, begin_ns, key=_time_ns)
-        last = bisect_left(self.disturbance, end_ns, key=_time_ns)
+        first = bisect_left(self.disturbance, begin_ns, key=attrgetter("time_ns"))
+        last = bisect_left(self.disturbance, end_ns, key=attrgetter("time_ns"))
         samples = self.disturbance[first : last + 1]
         waited = sum(sample.waited_ns for sample in samples)
         late = max((sample.late_ns for sample in samples), default=0)
@@ -418,7 +419,3 @@ def to_json(fact: Any) -> bytes:
     """A dataclass of the model as compact JSON."""
     plain = dataclasses.asdict(fact)
     return json.dumps(plain, separators=(",", ":"), sort_keys=True).encode()
-
-
-def _time_ns(sample: Disturbance) -> int:
-    return sample.time_ns
