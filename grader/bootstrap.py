@@ -172,7 +172,7 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
         "root": str(root),
         "ros": chosen.ros,
         "python": _dotted(chosen.interpreter.version),
-        "lock": _digest(lock_text),
+        "lock": hashlib.sha256(lock_text.encode()).hexdigest(),
         "pyproject": "",
     }
     is_kit = not (root / "pyproject.toml").exists()
@@ -348,10 +348,6 @@ def _write_stamp(venv: Path, stamp: Mapping[str, str]) -> None:
 def _remove(venv: Path) -> None:
     if venv.exists():
         shutil.rmtree(str(venv))
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _dotted(version: Optional[Version]) -> str:

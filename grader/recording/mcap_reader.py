@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import cache, lru_cache
 from operator import itemgetter
 from pathlib import Path
@@ -197,8 +196,8 @@ def read_inputs(file: Path, recording: Recording) -> tuple[RawMessage, ...]:
                 is_ours = is_sent or channel.topic in simulated
                 if is_ours and schema is not None and channel.message_encoding == "cdr":
                     times = message.publish_time, message.log_time, message.sequence
-                    raw = RawMessage(channel.topic, schema.name, message.data, *times)
-                    found.append(replace(raw, is_sent=is_sent))
+                    raw = (channel.topic, schema.name, message.data, *times)
+                    found.append(RawMessage(*raw, is_sent=is_sent))
     except OSError as error:
         raise UsageError(f"{file}: {error.strerror or error}") from error
     return tuple(sorted(found, key=lambda message: message.stamp_ns))

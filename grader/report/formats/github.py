@@ -58,23 +58,18 @@ def summary(result: Result, used_bytes: int = 0) -> str:
 def outputs(result: Result, delimiter: str) -> str:
     """Lines for ``$GITHUB_OUTPUT``.
 
-    They set ``score`` (empty where there is none), ``max-score``, ``status`` and ``summary``.
+    They set ``score`` (empty where there is none), ``max-score``, ``status`` (``passed`` with full
+    points, ``failed`` without, ``error`` where there is no grade) and ``summary``.
     """
     copy = for_student(result)
+    ended = "passed" if copy.known_score == copy.known_max_score else "failed"
     values = {
         "score": number(copy.known_score) if copy.known_score is not None else "",
         "max-score": number(copy.known_max_score),
-        "status": status(copy),
+        "status": ended if copy.graded else "error",
         "summary": explanation.headline(copy),
     }
     return "".join(f"{name}<<{delimiter}\n{value}\n{delimiter}\n" for name, value in values.items())
-
-
-def status(result: Result) -> str:
-    """``passed`` with full points, ``failed`` without, ``error`` where there is no grade."""
-    if not result.graded:
-        return "error"
-    return "passed" if result.known_score == result.known_max_score else "failed"
 
 
 def command(name: str, message: str, **properties: str) -> str:
