@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Sequence
+from operator import itemgetter
 
 from markupsafe import Markup
 
@@ -105,17 +106,13 @@ def _apart(points: Sequence[svg.Point]) -> list[svg.Point]:
 
 def _thinned(points: Sequence[svg.Point], x: Scale) -> list[svg.Point]:
     """The lowest and the highest point of every pixel column, by abscissa."""
-    columns: dict[int, tuple[svg.Point, svg.Point]] = {}
-    for column, point in zip(
-        map(round, x.all_clipped([a for a, _ in points])), points, strict=True
-    ):
-        lowest, highest = columns.get(column, (point, point))
-        if point[1] < lowest[1]:
-            lowest = point
-        if point[1] > highest[1]:
-            highest = point
-        columns[column] = lowest, highest
-    return sorted({point for pair in columns.values() for point in pair})
+    columns: defaultdict[int, list[svg.Point]] = defaultdict(list)
+    for pixel, point in zip(x.all_clipped([a for a, _ in points]), points, strict=True):
+        columns[round(pixel)].append(point)
+    extremes = (
+        extreme(found, key=itemgetter(1)) for found in columns.values() for extreme in (min, max)
+    )
+    return sorted(set(extremes))
 
 
 def _bars(values: Sequence[float], y: Scale, left: float, right: float) -> list[Markup]:

@@ -20,7 +20,6 @@ from grader.report.model.mistakes import only_shown
 from grader.report.model.result_model import Result
 
 _ENDINGS = {Status.FAILED: "failure", Status.ERROR: "error", Status.SKIPPED: "skipped"}
-_TYPES = {"failure": "check", "error": "grader", "skipped": "requirement"}
 
 
 def render(result: Result, *, xunit1: bool = False) -> str:
@@ -38,8 +37,6 @@ def render(result: Result, *, xunit1: bool = False) -> str:
         result=result,
         elements=elements,
         count=Counter(elements.values()),
-        endings=_ENDINGS,
-        types=_TYPES,
         timestamp=timestamp[0] if timestamp else "",
         xunit1=int(xunit1),
     )

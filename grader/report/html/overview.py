@@ -121,12 +121,7 @@ def _why_ungraded(row: ClassRow) -> str:
 
 def _disturbed(rows: Sequence[ClassRow]) -> list[tuple[ClassRow, ScenarioPart]]:
     """The runs that were repeated or could not be used, the most repeated first."""
-    found = [
-        (row, run)
-        for row in rows
-        if row.result is not None
-        for run in row.result.scenarios
-        if run.disturbed
-    ]
+    found = [(row, run) for row in rows if row.result is not None for run in row.result.scenarios]
+    found = [(row, run) for row, run in found if run.disturbed]
     found.sort(key=lambda item: (-item[1].runs, -item[1].disturbance.taken_s))
     return found[:MOST_DISTURBED]
