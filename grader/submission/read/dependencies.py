@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable
+from difflib import get_close_matches
 from functools import lru_cache
 
 from grader.submission.read.rosdistro import NOT_IN_JAZZY, PACKAGES, ROSDEP_KEYS
@@ -22,6 +23,8 @@ rclpy rclcpp std_msgs geometry_msgs sensor_msgs nav_msgs std_srvs example_interf
 visualization_msgs action_msgs tf2_ros turtlesim launch_ros ament_index_python ament_cmake
 """
 _COMMON = frozenset(_OFTEN.split())
+# Ratios of :mod:`difflib`: high, since many packages have names alike.
+_CUTOFF, _CUTOFF_OFTEN = 0.9, 0.8
 
 
 def is_known(name: str, *, installed: Collection[str], submitted: Collection[str]) -> bool | None:
@@ -43,51 +46,19 @@ def is_known(name: str, *, installed: Collection[str], submitted: Collection[str
 def meant(name: str, more: Iterable[str] = ()) -> str | None:
     """The ROS package that was most likely meant by a name that is none, or None.
 
-    It differs only in case, hyphens, a plural or a part such as ``.msg``, or by one letter (two in
-    long names).
+    It begins with the same letter, and differs only in case, hyphens, a plural, a part such as
+    ``.msg``, or few letters.
     """
     key = _folded(re.split(r"[./:\s]", _APT_NAME.sub("", name.strip()), maxsplit=1)[0])
-    near = []
-    for candidate in (*PACKAGES, *more):
-        folded, most = _folded(candidate), _most_wrong(candidate)
-        if abs(len(folded) - len(key)) <= most:
-            distance = _distance(key, folded, most)
-            if distance is not None:
-                near.append((distance, candidate))
-    return min(near)[1] if near else None
+    folded = {_folded(one): one for one in sorted({*PACKAGES, *more})}
+    names = {one: package for one, package in folded.items() if one[:1] == key[:1]}
+    often = [one for one, package in names.items() if package in _COMMON]
+    near = get_close_matches(key, names, 1, _CUTOFF)
+    near = near or get_close_matches(key, often, 1, _CUTOFF_OFTEN)
+    return names[near[0]] if near else None
 
 
 @lru_cache(maxsize=4096)
 def _folded(name: str) -> str:
     """A name without case, separators and plural."""
     return re.sub(r"[^a-z0-9]", "", name.lower()).removesuffix("s")
-
-
-def _most_wrong(candidate: str) -> int:
-    """How many letters may differ: few, since many packages have names alike."""
-    stem = candidate.removesuffix("_msgs").removesuffix("_interfaces")
-    if candidate in _COMMON:
-        return 2 if len(stem) > 5 else 1
-    if len(stem) < 5:
-        return 0
-    return 1 if len(stem) < 10 else 2
-
-
-def _distance(left: str, right: str, most: int) -> int | None:
-    """Count the letters changed, missing, added or swapped, or None if more than ``most``."""
-    if not most:
-        return 0 if left == right else None
-    before: list[int] = []
-    row = list(range(len(right) + 1))
-    for i, char in enumerate(left, start=1):
-        last, before_last = row, before
-        row = [i]
-        for j, other in enumerate(right, start=1):
-            cost = min(last[j] + 1, row[j - 1] + 1, last[j - 1] + (char != other))
-            if i > 1 and j > 1 and char == right[j - 2] and left[i - 2] == other:
-                cost = min(cost, before_last[j - 2] + 1)
-            row.append(cost)
-        before = last
-        if min(row) > most:
-            return None
-    return row[-1] if row[-1] <= most else None

@@ -29,8 +29,8 @@ def fetch(
     folder: Path,
     answer_s: float,
     on_progress: Callable[[str], None],
-) -> tuple[Path, str]:
-    """The files of a repository and its commit.
+) -> Path:
+    """The files of a repository.
 
     Args:
         folder: The folder of underlays.
@@ -60,7 +60,7 @@ def fetch(
             f"{name}: the tag {version} of {url} is the commit {commit}, not {repository.commit}, "
             "which this underlay was made for: it was moved, or this is another repository"
         )
-    return place / _FILES, commit
+    return place / _FILES
 
 
 def _fetch(repository: Repository, folder: Path, answer_s: float) -> None:

@@ -58,13 +58,11 @@ class Installed:
 
     Attributes:
         ros: The prefix of the ROS installation that it was built on.
-        commits: Repository -> commit.
     """
 
     name: str
     ros: str
     packages: tuple[str, ...]
-    commits: dict[str, str]
 
 
 _INSTALLED = TypeAdapter(Installed)
@@ -148,13 +146,13 @@ class UnderlayStore:
             self._say(f"{underlay.name}: this ROS has its packages, nothing is built")
             return done
         with Scratch("underlay") as staging:
-            folder, ros, commits = underlay.folder, self._ros, dict[str, str]()
+            folder, ros = underlay.folder, self._ros
             if folder is None:
                 key = self._key(underlay)
                 if self._kept.find(key) and (self._entry(key) / _NOTE).is_file():
                     self._say(f"{underlay.name}: is there already")
                     return done
-                commits = self._fetch(underlay, staging, answer_s)
+                self._fetch(underlay, staging, answer_s)
                 below = [path for one in _required(underlay) for path in self._prefixes(one)]
                 folder, ros = staging, on_top(ros, below)
             else:
@@ -163,7 +161,7 @@ class UnderlayStore:
         mine, packages = str(self._ros.prefixes[0]), _indexed(self._entry(key) / INSTALL)
         # What was built of it before is thrown away.
         self.remove(underlay.name, besides=key)
-        note = Installed(underlay.name, mine, tuple(sorted(packages)), commits)
+        note = Installed(underlay.name, mine, tuple(sorted(packages)))
         (self._entry(key) / _NOTE).write_bytes(_INSTALLED.dump_json(note, indent=1))
         return [*done, underlay.name]
 
@@ -281,13 +279,12 @@ class UnderlayStore:
         whole = [_RECIPE, installation, *parts]
         return hashlib.sha256(json.dumps(whole).encode()).hexdigest()
 
-    def _fetch(self, underlay: Underlay, staging: Path, answer_s: float) -> dict[str, str]:
-        """Put the packages of all repositories side by side; the commits."""
+    def _fetch(self, underlay: Underlay, staging: Path, answer_s: float) -> None:
+        """Put the packages of all repositories side by side."""
         assert underlay.repos is not None
-        commits: dict[str, str] = {}
         places: dict[str, str] = {}
         for name, repository in underlay.repos.repositories.items():
-            files, commits[name] = fetch(name, repository, self._folder, answer_s, self._say)
+            files = fetch(name, repository, self._folder, answer_s, self._say)
             there, version = packages_in(files), f"{name} {repository.version}"
             for package in repository.packages or sorted(there):
                 if package not in there:
@@ -301,7 +298,6 @@ class UnderlayStore:
                     )
                 if package in self._wanted(underlay) or not underlay.listed:
                     shutil.copytree(there[package], staging / package, symlinks=True)
-        return commits
 
     def _build(
         self,

@@ -16,7 +16,7 @@ from tests.submission.underlay.conftest import Repository
 
 def fetched(
     url: str, version: str, cache: Path, commit: str | None = None, answer_s: float = 20.0
-) -> tuple[Path, str]:
+) -> Path:
     wanted = Wanted.model_validate(
         {"type": "git", "url": url, "version": version, "commit": commit}
     )
@@ -27,18 +27,16 @@ def test_a_tag_is_fetched_without_git_s_own_files_and_only_once(
     repository: Repository, tmp_path: Path
 ) -> None:
     commit = repository.commit("arm", tag="1.0.0")
-    files, found = fetched(repository.url, "1.0.0", tmp_path / "cache", commit)
-    assert found == commit
+    files = fetched(repository.url, "1.0.0", tmp_path / "cache", commit)
     assert sorted(path.name for path in files.iterdir()) == ["arm"]
     shutil.rmtree(repository.folder)
-    assert fetched(repository.url, "1.0.0", tmp_path / "cache", commit) == (files, commit)
+    assert fetched(repository.url, "1.0.0", tmp_path / "cache", commit) == files
 
 
 def test_a_commit_that_no_tag_names_is_fetched(repository: Repository, tmp_path: Path) -> None:
     commit = repository.commit("arm", tag="1.0.0")
     repository.commit("leg", tag="2.0.0")
-    files, found = fetched(repository.url, commit, tmp_path)
-    assert found == commit
+    files = fetched(repository.url, commit, tmp_path)
     assert not (files / "leg").exists()
 
 
