@@ -1,10 +1,14 @@
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
+import tarfile
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from grader.errors import GraderFault, SubmissionError, UsageError
 from grader.submission.intake.locate import opened, submission_id
@@ -69,6 +73,87 @@ def test_an_archive_is_opened_and_named_without_its_suffix(tmp_path: Path, name:
 def test_a_folder_and_an_archive_of_it_have_the_same_hash(tree: Tree, tmp_path: Path) -> None:
     (tmp_path / "bob.zip").write_bytes(as_zip())
     assert sha256(tree.package(folder=".")) == sha256(tmp_path / "bob.zip")
+
+
+def link(path: str, target: str) -> tuple[tarfile.TarInfo, bytes]:
+    return tar_member(path, type=tarfile.SYMTYPE, linkname=target)
+
+
+@pytest.mark.parametrize("target", ["/etc/passwd", "/nowhere", "..", "../x", "b/../../x"])
+def test_an_archive_with_a_link_out_is_refused(tmp_path: Path, target: str) -> None:
+    content = tar_bytes(tar_member("b/c.py"), link("a", target))
+    linked = zip_bytes(("a", target.encode()), mode=0o120777)
+    for name, data in (("eve.tar.gz", content), ("eve.zip", linked)):
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(SubmissionError, match=r"^a: the link to .* leads out"):
+            sha256(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "ws/build/bot/package.xml",
+        "ws/install/bot/lib/bot",
+        "ws/log/latest",
+        "install/x",
+        "ws/src/bot/log/x",
+        "mine/bin/python",
+    ],
+)
+def test_links_out_of_what_colcon_and_venv_left_behind_are_left_out(
+    tmp_path: Path, path: str
+) -> None:
+    present = ("ws/src/bot/package.xml", "ws/src/bot/log/COLCON_IGNORE", "mine/pyvenv.cfg")
+    out = link(path, "/home/student/ros2_ws/src/bot/package.xml")
+    (tmp_path / "ada.tar.gz").write_bytes(tar_bytes(*map(tar_member, present), out))
+    with opened(tmp_path / "ada.tar.gz") as located:
+        assert not [file for file in located.files if file.link is not None]
+
+
+def test_in_a_package_a_folder_called_log_is_not_colcon_s(tmp_path: Path) -> None:
+    content = tar_bytes(tar_member("src/bot/package.xml"), link("src/bot/log/x", "/etc/passwd"))
+    (tmp_path / "eve.tar").write_bytes(content)
+    with pytest.raises(SubmissionError, match="leads out"):
+        sha256(tmp_path / "eve.tar")
+
+
+def test_a_link_to_something_inside_is_kept_and_one_to_nothing_is_not(tmp_path: Path) -> None:
+    links = [
+        link("d/good", "../x"),
+        link("again", "d/good"),
+        link("dangling", "y"),
+        link("loop", "loop"),
+        link("whole", "."),
+    ]
+    (tmp_path / "ada.tar").write_bytes(tar_bytes(*links, tar_member("x", b"text")))
+    with opened(tmp_path / "ada.tar") as located:
+        assert [file.path for file in located.files] == ["again", "d/good", "x"]
+        assert (located.root / "again").read_text() == "text"
+
+
+PARTS = st.sampled_from(["a", "b", "c", "..", ".", "/"])
+LINKS = st.dictionaries(
+    st.sampled_from(["a", "b", "d/a", "d/b", "d/e/a"]),
+    st.lists(PARTS, min_size=1, max_size=4).map("/".join),
+    max_size=5,
+)
+
+
+@settings(deadline=None)
+@given(LINKS)
+def test_whatever_its_links_are_the_copy_holds_only_links_to_what_is_in_it(
+    tmp_path_factory: pytest.TempPathFactory, links: dict[str, str]
+) -> None:
+    folder = tmp_path_factory.mktemp("links")
+    (folder / "d/e").mkdir(parents=True)
+    (folder / "c").touch()
+    for path, target in links.items():
+        (folder / path).symlink_to(target)
+    with contextlib.suppress(SubmissionError), opened(folder) as located:
+        root = located.root.resolve()
+        for path in root.rglob("*"):
+            assert path.exists()
+            assert path.resolve().is_relative_to(root)
 
 
 def test_a_workspace_with_build_and_install_is_the_same_submission(tree: Tree) -> None:

@@ -9,12 +9,18 @@ import zipfile
 from collections.abc import Iterator
 from typing import IO, cast
 
-from grader.submission.intake.members import MIB, ArchiveLimits, Kind, Member, Refused
+from grader.submission.intake.members import (
+    LONGEST_TARGET,
+    MIB,
+    ArchiveLimits,
+    Kind,
+    Member,
+    Refused,
+)
 from grader.submission.intake.paths import shown
 
 _MADE_BY_DOS, _MADE_BY_UNIX = 0, 3
 _FLAG_ENCRYPTED, _FLAG_UTF8 = 0x1, 0x800
-_LONGEST_TARGET = 4096
 _DIRECTORY_ENTRY = b"PK\x01\x02"
 _BLOCK = 512
 _LONGEST_HEADER = 64 * 1024
@@ -56,7 +62,7 @@ def zip_members(archive: zipfile.ZipFile) -> Iterator[Member]:
         kind = _kind(name, mode)
         target = ""
         if kind is Kind.LINK:
-            if info.file_size > _LONGEST_TARGET:
+            if info.file_size > LONGEST_TARGET:
                 raise Refused(f"{shown(name)}: the link's target is too long")
             target = archive.read(info).decode("utf-8", "surrogateescape")
         size = info.file_size if kind is Kind.FILE else 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Set
+from collections.abc import Set
 from fnmatch import fnmatch
 
 from grader.submission.intake.paths import parents
@@ -77,14 +77,3 @@ def is_leftover(name: str, marks: Set[str], in_package: bool) -> bool:
         return False
     # A package may well have a module called "log"; a workspace has no use for another "log".
     return bool(marks & _COLCON_MARKS) or not (in_package or MANIFEST in marks)
-
-
-def is_within_leftover(path: str, present: Collection[str]) -> bool:
-    """Whether a path is in a folder that :func:`is_leftover`."""
-    in_package = MANIFEST in present
-    for folder in reversed(parents(path)):
-        marks = {one for one in MARKS if f"{folder}/{one}" in present}
-        if is_leftover(folder.rpartition("/")[2], marks, in_package):
-            return True
-        in_package = in_package or MANIFEST in marks
-    return False

@@ -21,12 +21,13 @@ from grader.submission.intake.leftovers import (
     is_left_out,
     is_leftover,
 )
-from grader.submission.intake.members import MIB, ArchiveLimits, LeadsOut, links_inside
+from grader.submission.intake.members import MIB, ArchiveLimits
 from grader.submission.intake.paths import is_within, join, parents, shown
 from grader.submission.read.manifest import MANIFEST
 
 _SOURCE_SPACE = "src"
 _IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
+_MOST_HOPS = 40
 _CHANGED = frozenset({errno.ENOENT, errno.ENOTDIR, errno.ELOOP, errno.ESTALE})
 
 
@@ -89,7 +90,7 @@ def list_files(
                 if leftovers is not None and found is not None:
                     leftovers.add(found)
             elif entry.is_symlink():
-                links[path] = _target(root, path)
+                links[path] = _end(root, path)
             elif entry.is_file(follow_symlinks=False):
                 status = entry.stat(follow_symlinks=False)
                 total += status.st_size
@@ -105,12 +106,14 @@ def list_files(
                 )
     except OSError as error:
         raise unreadable(str(error.filename), error) from error
-    paths = [path for file in files for path in (file.path, *parents(file.path))]
-    try:
-        kept = links_inside(links, set(paths), links)
-    except LeadsOut as error:
-        raise _leads_out(str(error)) from None
-    files += [SubmissionFile(path, 0, link=links[path]) for path in kept]
+    there = {path for file in files for path in (file.path, *parents(file.path))}
+    for path in links:
+        end = path
+        for _ in range(_MOST_HOPS):
+            end = links.get(end, end)
+        if end in there:
+            link = os.path.relpath(end, path.rpartition("/")[0] or ".")
+            files.append(SubmissionFile(path, 0, link=link))
     return sorted(files, key=lambda file: os.fsencode(file.path))
 
 
@@ -130,29 +133,27 @@ def _walk(
             left = is_left_out(entry.name) or entry.name.endswith(".pyc") or linked_leftover
             yield path, None if left else entry
             continue
-        marks = {mark for mark in MARKS if (root / path / mark).exists()}
+        marks = {mark for mark in MARKS if os.path.lexists(root / path / mark)}
         if is_leftover(entry.name, marks, in_package):
             yield path, None
         else:
             yield from _walk(root, path, in_package, depth - 1)
 
 
-def _target(root: Path, path: str) -> str:
+def _end(root: Path, path: str) -> str:
+    """Where a symbolic link leads, as a path in the folder; others on the way are not followed."""
     target = os.fspath((root / path).readlink())
-    if not target.startswith("/"):
-        return target
-    # An absolute link into the folder itself is as good as a relative one.
-    for base in (root.absolute(), root.resolve()):
-        inside = os.path.relpath(target, base)
-        if inside.split("/")[0] != "..":
-            return os.path.relpath(inside, path.rpartition("/")[0] or ".")
-    raise _leads_out(f"{shown(path)}: the link to {shown(target)!r}")
-
-
-def _leads_out(which: str) -> SubmissionError:
-    return SubmissionError(
-        f"{which} leads out of the submission; put a copy of its target there instead"
-    )
+    ends = [os.path.normpath(join(path, f"../{target}"))]
+    if target.startswith("/"):
+        # An absolute link into the folder itself is as good as a relative one.
+        ends = [os.path.relpath(target, base) for base in (root.absolute(), root.resolve())]
+    end = next((one for one in ends if one.split("/")[0] != ".."), None)
+    if end is None:
+        raise SubmissionError(
+            f"{shown(path)}: the link to {shown(target)!r} leads out of the submission; put a copy "
+            "of its target there instead"
+        )
+    return end
 
 
 def wrapper_of(files: Sequence[SubmissionFile]) -> str:

@@ -7,18 +7,17 @@ from __future__ import annotations
 
 import os
 import re
-from collections import deque
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
 
 from grader.errors import SubmissionError
-from grader.submission.intake.leftovers import built, is_left_out, is_within_leftover
+from grader.submission.intake.leftovers import built, is_left_out
 from grader.submission.intake.paths import parents, shown
 
 MIB = 2**20
 
-_MAX_HOPS = 40
+LONGEST_TARGET = 1000
 _DRIVE = re.compile(r"[A-Za-z]:[/\\]")
 
 
@@ -83,7 +82,8 @@ def admit(
         leftovers: Gets the paths of what builds and runs made, which is not unpacked.
 
     Returns:
-        What to unpack, with safe relative paths as names. Links to nothing are left out.
+        What to unpack, with safe relative paths as names. Where links lead is not looked at: see
+        :func:`~grader.submission.intake.listing.list_files`.
 
     Raises:
         SubmissionError: A member is unsafe or too much; names the archive and the member.
@@ -106,6 +106,8 @@ def admit(
                 raise Refused("a device, pipe or other special file is refused")
             if member.size < 0:
                 raise Refused("its size is negative")
+            if member.kind is Kind.LINK and not 0 < len(member.target) <= LONGEST_TARGET:
+                raise Refused("the link's target is empty or too long")
             total += member.size
             _check_size(total, archive_bytes, limits)
             _check_place(path, member.kind, kinds)
@@ -113,7 +115,7 @@ def admit(
             raise SubmissionError(f"{archive}: {shown(member.name)}: {reason}") from None
         kinds[path] = member.kind
         entries.append(replace(member, name=path))
-    return _with_safe_links(entries, archive)
+    return entries
 
 
 def safe_path(name: str, limits: ArchiveLimits) -> str:
@@ -154,75 +156,3 @@ def _check_place(path: str, kind: Kind, kinds: dict[str, Kind]) -> None:
     for folder in parents(path):
         if kinds.setdefault(folder, Kind.FOLDER) is not Kind.FOLDER:
             raise Refused(f"{shown(folder)} is not a folder in this archive")
-
-
-def _with_safe_links(entries: list[Member], archive: str) -> list[Member]:
-    links = {one.name: one.target for one in entries if one.kind is Kind.LINK}
-    if not links:
-        return entries
-    paths = [path for one in entries for path in (one.name, *parents(one.name))]
-    present = set(paths) - links.keys()
-    # `colcon build --symlink-install` and venv fill their folders with links out.
-    wanted = [path for path in links if not is_within_leftover(path, present)]
-    try:
-        kept = links_inside(links, present, wanted)
-    except LeadsOut as error:
-        raise SubmissionError(f"{archive}: {error} leads out of the archive") from None
-    return [one for one in entries if one.kind is not Kind.LINK or one.name in kept]
-
-
-class LeadsOut(Exception):
-    """A symbolic link leads out of the folder that it must stay in."""
-
-
-def links_inside(
-    links: Mapping[str, str], present: Collection[str], wanted: Iterable[str]
-) -> set[str]:
-    """Those of the wanted links that lead to a file or folder that is present.
-
-    Raises:
-        LeadsOut: One leads out; the text names it and its target.
-    """
-    kept = set()
-    for path in wanted:
-        try:
-            if resolve_link(path, links) in present:
-                kept.add(path)
-        except LeadsOut:
-            raise LeadsOut(f"{shown(path)}: the link to {shown(links[path])!r}") from None
-    return kept
-
-
-def resolve_link(path: str, links: Mapping[str, str]) -> str | None:
-    """The path at which a link ends, as the file system would follow it.
-
-    Returns:
-        None for a loop and for the root itself.
-
-    Raises:
-        LeadsOut: A target on the way is absolute or goes above the root.
-    """
-    reached: list[str] = []
-    ahead = deque(path.split("/"))
-    hops = 0
-    while ahead:
-        part = ahead.popleft()
-        if part in ("", "."):
-            continue
-        if part == "..":
-            if not reached:
-                raise LeadsOut(path)
-            reached.pop()
-            continue
-        reached.append(part)
-        target = links.get("/".join(reached))
-        if target is None:
-            continue
-        hops += 1
-        if hops > _MAX_HOPS:
-            return None
-        if target.startswith("/"):
-            raise LeadsOut(path)
-        reached.pop()
-        ahead.extendleft(reversed(target.split("/")))
-    return "/".join(reached) or None
