@@ -2,10 +2,16 @@
 (() => {
   const main = document.querySelector("main"), problem = document.querySelector("#problem"), text = document.querySelector("#text");
   const check = new URLSearchParams(location.search).get("check") ?? document.querySelector("select").value;
-  const draft = `regrade ${check}`;
-  const typed = sessionStorage.getItem(draft);
-  if (text && typed !== null) text.value = typed;
-  text?.addEventListener("input", () => sessionStorage.setItem(draft, text.value));
+  const draft = "regrade", typed = sessionStorage.getItem(draft);
+  if (typed !== null) text.value = typed;
+  text.addEventListener("input", () => sessionStorage.setItem(draft, text.value));
+  const at = check ? text.value.search(new RegExp(`\\bid: *["']?${check}\\b`)) : -1;
+  if (at >= 0) {
+    text.focus({ preventScroll: true });
+    text.setSelectionRange(at, at);
+    const lines = (part) => part.split("\n").length;
+    text.scrollTop = text.scrollHeight * (lines(text.value.slice(0, at)) - 3) / lines(text.value);
+  }
   document.querySelector("#choose").addEventListener("change", (event) => { location.search = `?check=${encodeURIComponent(event.target.value)}`; });
   main.addEventListener("submit", async (event) => {
     event.preventDefault();
@@ -13,7 +19,7 @@
     try {
       const answer = await fetch("regrade", {
         method: "POST", headers: { "Content-Type": "application/json" },
-        body: JSON.stringify({ do: doing, check, text: text?.value ?? "" }),
+        body: JSON.stringify({ do: doing, check, text: text.value }),
       });
       if (answer.ok) {
         if (doing !== "preview") sessionStorage.removeItem(draft);

@@ -1,4 +1,4 @@
-"""An assignment with one check changed, to try it on a class, to use it, and to go back.
+"""An assignment that was edited, to try it on a class, to use it, and to go back.
 
 ``OUT/assignment/<number>/`` holds each version that was used: the whole folder of the assignment,
 and in ``before.json`` the assignment that the class was graded with before.
@@ -21,27 +21,17 @@ _BEFORE = "before.json"
 _LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "rosgrade-report")
 
 
-def check_lines(loaded: LoadedAssignment, check: str) -> tuple[int, str]:
-    """The number of the first line of a check in ``assignment.yaml``, and its lines."""
-    lines = loaded.file.read_text(encoding="utf-8").splitlines(keepends=True)
-    first, end = _span(loaded, check, lines)
-    return first + 1, "".join(lines[first:end])
-
-
-def with_check(loaded: LoadedAssignment, check: str, text: str, place: Path) -> LoadedAssignment:
-    """Copy an assignment, with other lines for one of its checks.
+def with_text(loaded: LoadedAssignment, text: str, place: Path) -> LoadedAssignment:
+    """Copy an assignment, with another text of its YAML file.
 
     Args:
-        place: A folder for the copy; it is removed if the new lines are wrong.
+        place: A folder for the copy; it is removed if the text is wrong.
 
     Raises:
-        AssignmentError: They are wrong; with the lines of the whole file.
+        AssignmentError: It is wrong.
     """
     if loaded.file.name != ASSIGNMENT_FILE:
         raise UsageError(f"{loaded.file}: only an assignment in a folder of its own can be edited")
-    lines = loaded.file.read_text(encoding="utf-8").splitlines(keepends=True)
-    first, end = _span(loaded, check, lines)
-    new = text.replace("\r\n", "\n").rstrip("\n") + "\n"
     folder = place / loaded.assignment.id
     try:
         shutil.copytree(loaded.folder, folder, ignore=_LEFT_OUT)
@@ -49,7 +39,7 @@ def with_check(loaded: LoadedAssignment, check: str, text: str, place: Path) -> 
         refusal = UsageError(f"{folder}: {error.strerror or error}")
         raise machine_fault(error, folder) or refusal from error
     try:
-        write_whole(folder / ASSIGNMENT_FILE, "".join([*lines[:first], new, *lines[end:]]))
+        write_whole(folder / ASSIGNMENT_FILE, text.replace("\r\n", "\n"))
         return load_assignment(folder)
     except RosgradeError as error:
         shutil.rmtree(place, ignore_errors=True)
@@ -77,19 +67,3 @@ def load_before(ledger: Ledger) -> LoadedAssignment | None:
     words = ("regrade", str(out))
     before = json.loads(file.read_text())["location"]
     return load_assignment(stored_assignment(out, used.assignment, before, *words))
-
-
-def _span(loaded: LoadedAssignment, check: str, lines: list[str]) -> tuple[int, int]:
-    """Index of the first line of a check, and of the line after its last."""
-    source = loaded.source
-    assert source is not None
-    names = [one.get("id") for one in source.data["checks"]]
-    if check not in names:
-        raise UsageError(f"{loaded.file}: there is no check {check!r}")
-    own = ("checks", names.index(check))
-    first = source.lines[own] - 1
-    later = [line for place, line in source.lines.items() if place[:2] != own and line > first + 1]
-    end = min(later, default=len(lines) + 1) - 1
-    while lines[end - 1].strip() == "" or lines[end - 1].lstrip().startswith("#"):
-        end -= 1
-    return first, end

@@ -16,7 +16,7 @@ from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, R
 from starlette.routing import Route
 
 from grader.batch.class_files import INSTRUCTOR_FOLDER
-from grader.batch.edited_assignment import check_lines, load_before, new_place, with_check
+from grader.batch.edited_assignment import load_before, new_place, with_text
 from grader.errors import RosgradeError, UsageError
 from grader.findings.finding import Status
 from grader.report.html.overview import render_overview
@@ -194,13 +194,11 @@ class ReviewServer(LocalServer):
         # A copy, so that all of the page shows one moment of it.
         judging, loaded = replace(self._background.judging), self._class.loaded
         check = request.query_params.get("check") or judging.check
-        first, text = check_lines(loaded, check) if check else (0, "")
         back = load_before(self._class.ledger)
         return _page(
             "review_regrade",
             check=check,
-            first=first,
-            text=text,
+            text=loaded.file.read_text(encoding="utf-8"),
             judging=judging,
             changed=judging.changed,
             back=back,
@@ -217,7 +215,7 @@ class ReviewServer(LocalServer):
         else:
             scratch = do == "preview"
             place = Path(tempfile.mkdtemp(dir=self._scratch.name)) if scratch else new_place(ledger)
-            new = with_check(self._class.loaded, check, str(sent["text"]), place)
+            new = with_text(self._class.loaded, str(sent["text"]), place)
         if new is None:
             raise UsageError("There is no assignment to go back to.")
         self._background.judge(do.capitalize(), check, new, write=do != "preview")

@@ -179,6 +179,7 @@ def test_a_cause_is_forgiven_with_a_click(visit: Opened, out: Path) -> None:
 def test_a_changed_check_is_previewed_applied_and_taken_back(visit: Opened) -> None:
     page = visit("regrade?check=docs")
     text = page.locator("#text")
+    assert text.evaluate("it => it.value.slice(it.selectionStart).startsWith('id: docs')")
     text.fill(text.input_value().replace("80 %", "oops"))
     page.get_by_role("button", name="Preview").click()
     expect(page.get_by_role("alert")).to_contain_text("assignment.yaml:10")
