@@ -104,10 +104,7 @@ class Grade:
 
     def result(self, check: str) -> CheckResult:
         """The result of the check of that id."""
-        for result in self.results:
-            if result.id == check:
-                return result
-        raise KeyError(check)
+        return {result.id: result for result in self.results}[check]
 
     @property
     def remaps(self) -> dict[str, frozenset[str]]:

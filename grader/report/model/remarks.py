@@ -19,25 +19,17 @@ def remarks(recording: Recording) -> tuple[str, ...]:
 
     A limit of the sandbox that was reached is reported elsewhere (``Recording.breaches``).
     """
-    return (*_renaming(recording), *_posing(recording), *_excess(recording), *_tricks(recording))
-
-
-def _renaming(recording: Recording) -> Iterator[str]:
-    if recording.remaps:
-        yield (
-            f"this run corrected wrong names, so that everything else could be judged: "
-            f"{codes(recording.remaps)}"
-        )
+    names = f"so that everything else could be judged: {codes(recording.remaps)}"
+    renamed = (f"this run corrected wrong names, {names}",) if recording.remaps else ()
+    return (*renamed, *_posing(recording), *_excess(recording), *_tricks(recording))
 
 
 def _posing(recording: Recording) -> Iterator[str]:
     """Names of the probe and topics of the robot, unless the assignment asks for them."""
     for node in recording.student_nodes:
         if node.name.rpartition("/")[2] == PROBE:
-            yield (
-                f"a node of the submission is called {code(node.name)}, like the node that watches "
-                "the run"
-            )
+            name = code(node.name)
+            yield f"a node of the submission is called {name}, like the node that watches the run"
     heard = [e for e in recording.endpoints if e.owner is Owner.PROBE]
     # A robot is not the only one to publish transforms.
     wanted = {e.topic for e in heard if recording.scene is None or e.type == TRANSFORMS}

@@ -79,10 +79,8 @@ def spot(place: SourceError) -> str:
 
 def plain(check: CheckPart, result: Result) -> str:
     """:func:`explain` as text, a line for each; several lines stand below their name."""
-    rows = explain(check, result)
-    return "\n".join(
-        f"{row.name}:{chr(10) if chr(10) in row.text else ' '}{row.text}" for row in rows
-    )
+    rows = [(name, "\n" if "\n" in text else " ", text) for name, text in explain(check, result)]
+    return "\n".join(f"{name}:{before}{text}" for name, before, text in rows)
 
 
 class Notes(NamedTuple):
