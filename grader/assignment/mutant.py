@@ -184,56 +184,14 @@ def required_by(check: str, requires: Mapping[str, tuple[str, ...]]) -> set[str]
     return found - {check}
 
 
-@dataclass(frozen=True)
-class Difference:
-    """A check that ended otherwise than it must.
-
-    Attributes:
-        expected: How it must end.
-        actual: How it ended; None where it has no result.
-    """
-
-    check: str
-    expected: Status
-    actual: Status | None
-
-    def __str__(self) -> str:
-        """Write ``period: passed instead of failed``."""
-        actual = self.actual.value if self.actual else "no result"
-        return f"{self.check}: {actual} instead of {self.expected.value}"
-
-
-@dataclass(frozen=True)
-class MutantVerdict:
-    """What the checks made of one submission whose grade is known.
-
-    Attributes:
-        differences: Checks that ended otherwise than they must; none if all is well.
-        problem: What else is wrong with the grade; empty if nothing is.
-    """
-
-    differences: tuple[Difference, ...]
-    problem: str = ""
-
-    @property
-    def right(self) -> bool:
-        """Whether it was graded as it must be."""
-        return not self.differences and not self.problem
-
-    def __str__(self) -> str:
-        """Write what is wrong in one line; nothing if all is well."""
-        return "; ".join([*map(str, self.differences), *([self.problem] if self.problem else [])])
-
-
-def verdict(expected: Mapping[str, Status], actual: Mapping[str, Status]) -> MutantVerdict:
-    """Compare how checks ended with how they must end, by id of the check."""
-    return MutantVerdict(
-        tuple(
-            Difference(check, status, actual.get(check))
-            for check, status in expected.items()
-            if actual.get(check) is not status
-        )
-    )
+def deviations(expected: Mapping[str, Status], actual: Mapping[str, Status]) -> dict[str, str]:
+    """Checks that ended otherwise than they must, each with ``passed instead of failed``."""
+    ended = {check: actual[check].value if check in actual else "no result" for check in expected}
+    return {
+        check: f"{ended[check]} instead of {status.value}"
+        for check, status in expected.items()
+        if ended[check] != status.value
+    }
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ almost nothing.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from enum import Enum
@@ -19,14 +19,12 @@ from grader.assignment.mutant import (
     CPP,
     PYTHON,
     Change,
-    Difference,
     Language,
     Mutant,
-    MutantVerdict,
     apply,
+    deviations,
     expected_statuses,
     load_mutants,
-    verdict,
 )
 from grader.batch.grading import Graded, Grading
 from grader.findings.finding import Status
@@ -64,15 +62,24 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """How a trial went, without its recordings: an assignment has a hundred trials and more."""
+    """How a trial went, without its recordings: an assignment has a hundred trials and more.
+
+    Attributes:
+        wrong: What ended otherwise than it must, by its check; nothing if all is well.
+    """
 
     trial: Trial
-    verdict: MutantVerdict
+    wrong: Mapping[str, str]
     lost: tuple[str, ...]
     graded: bool
     repeated: bool
     grade: str
     findings: tuple[str, ...] = ()
+
+    @property
+    def mistake(self) -> str:
+        """What is wrong with the grade, in one line; nothing if it is as it must be."""
+        return "; ".join(f"{check}: {words}" for check, words in self.wrong.items())
 
 
 def trials(loaded: LoadedAssignment, language: Language = PYTHON) -> tuple[Trial, ...]:
@@ -122,41 +129,37 @@ def run_trial(
     on_graded(graded)
     actual = {result.id: result.status for result in graded.grade.results}
     if trial.role is Role.STARTER:
-        outcome = _starter_verdict(graded.grade)
+        wrong = _wrong_with_starter(graded.grade)
     elif trial.change is None:
-        outcome = verdict(dict.fromkeys(actual, Status.PASSED), actual)
+        wrong = deviations(dict.fromkeys(actual, Status.PASSED), actual)
     else:
         put_right = [result.id for result in graded.grade.results if result.put_right]
-        outcome = verdict(expected_statuses(loaded.assignment, trial.change, put_right), actual)
+        wrong = deviations(expected_statuses(loaded.assignment, trial.change, put_right), actual)
     return TrialResult(
         trial=trial,
-        verdict=outcome,
+        wrong=wrong,
         lost=tuple(name for name, status in actual.items() if status is Status.FAILED),
         graded=graded.grade.graded,
         repeated=any(count > 1 for count in graded.runs.values()),
         grade=grade_json(make_result(graded.grade, graded.recordings, RunFacts("", 0.0))),
         findings=tuple(
-            line
-            for one in outcome.differences
-            if one.actual is not None
-            for line in _findings(graded, one.check)
+            line for check in wrong if check in actual for line in _findings(graded, check)
         ),
     )
 
 
-def _starter_verdict(grade: Grade) -> MutantVerdict:
-    not_judged = tuple(
-        Difference(result.id, Status.FAILED, result.status)
+def _wrong_with_starter(grade: Grade) -> dict[str, str]:
+    wrong = {
+        result.id: "error instead of failed"
         for result in grade.results
         if result.status is Status.ERROR
-    )
-    problem = ""
+    }
     if grade.score > MOST_FOR_STARTER * grade.max_score:
-        problem = (
+        wrong["points"] = (
             f"{counted_points(grade.score)} of {number(grade.max_score)}, and a starter package "
             f"may have {MOST_FOR_STARTER:.0%} at most: give the points for what the lesson teaches"
         )
-    return MutantVerdict(not_judged, problem)
+    return wrong
 
 
 def _findings(graded: Graded, check: str) -> Iterator[str]:
@@ -186,7 +189,7 @@ def selftest(
 
         def work(trial: Trial) -> TrialResult:
             result = run_trial(trial, loaded, grading, base, folder, on_graded, language)
-            if keep is not None and not result.verdict.right:
+            if keep is not None and result.wrong:
                 shutil.rmtree(keep / trial.id, ignore_errors=True)
                 for part in ("submissions", "recordings"):
                     made = folder / part / trial.id
@@ -223,9 +226,9 @@ def mutation_score(results: list[TrialResult]) -> MutationScore:
     mutants = [r for r in results if r.trial.role is Role.MUTANT]
     right = [r for r in results if r.trial.role in {Role.REFERENCE, Role.VARIANT}]
     return MutationScore(
-        killed=sum(r.verdict.right for r in mutants),
+        killed=sum(not r.wrong for r in mutants),
         mutants=len(mutants),
-        accepted=sum(r.verdict.right for r in right),
+        accepted=sum(not r.wrong for r in right),
         right=len(right),
-        perfect=all(r.verdict.right for r in results),
+        perfect=not any(r.wrong for r in results),
     )

@@ -106,7 +106,7 @@ def selftest(
                 results.append(result)
                 progress.say(
                     f"{loaded.assignment.id}: {len(results)} of {wanted} graded: "
-                    f"{result.trial.id}: {'ok' if result.verdict.right else 'WRONG'}"
+                    f"{result.trial.id}: {'WRONG' if result.wrong else 'ok'}"
                 )
         if record:
             say(kept[-1])
@@ -131,10 +131,10 @@ def _print(console: Console, assignment: str, results: list[TrialResult]) -> Non
     order = ("reference", "variant", "mutant", "starter")
     for result in sorted(results, key=lambda r: (order.index(r.trial.role.value), r.trial.id)):
         table.add_row(
-            "ok" if result.verdict.right else "WRONG",
+            "WRONG" if result.wrong else "ok",
             result.trial.id,
             escape(result.trial.title),
-            escape(str(result.verdict) or ", ".join(result.lost) or "nothing"),
+            escape(result.mistake or ", ".join(result.lost) or "nothing"),
         )
     console.print(table)
     for result in results:

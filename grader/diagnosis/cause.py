@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from grader.findings.finding import Evidence, Finding
+from grader.spec.unit import format_duration
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,12 @@ class Cause:
     def to_repeat(cls, observed: str) -> Cause:
         """A cause in the machine or in rosgrade: the run should be repeated."""
         return cls(observed, ours=True, disturbed=True)
+
+    @classmethod
+    def held_up(cls, observed: str, stolen_s: float) -> Cause:
+        """What may be so only because the machine took time from the process meanwhile."""
+        took = f"the machine took up to {format_duration(stolen_s)} meanwhile"
+        return cls.to_repeat(f"{observed}; {took}, which may explain it")
 
     def finding(self, expected: str) -> Finding:
         """The finding of a check that expected something else."""

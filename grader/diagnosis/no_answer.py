@@ -209,9 +209,7 @@ def why_taken(
         return Cause.to_repeat(f"{what}: the run ended {ended} later, before the answer was due")
     if stolen_s <= 0.0 or stolen_s < excess_s:
         return None
-    return Cause.to_repeat(
-        f"{what}, but the machine took {format_duration(stolen_s)} from the process meanwhile"
-    )
+    return Cause.held_up(what, stolen_s)
 
 
 def why_raised(

@@ -67,10 +67,7 @@ def no_cpu_time(symptom: NoMessages) -> Cause | None:
         guilty = no_answer(symptom)
     if guilty:
         return replace(guilty, disturbed=True)
-    return Cause.to_repeat(
-        f"{symptom.seen}, but the machine took {format_duration(symptom.stolen_s)} of "
-        f"{format_duration(symptom.watched_s)} from the process"
-    )
+    return Cause.held_up(symptom.seen, symptom.stolen_s)
 
 
 @explanation(NoMessages, FewMessages, concept="executors")

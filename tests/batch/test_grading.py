@@ -400,7 +400,7 @@ def test_of_a_trial_only_what_is_printed_is_kept(
     gc.collect()
     assert [graded() for graded in told] == [None]
     assert (result.lost, result.graded, result.repeated) == (("ends",), True, False)
-    assert not result.verdict.right
+    assert result.wrong
     assert '"id": "ends"' in result.grade
 
 
@@ -410,8 +410,8 @@ def test_an_untouched_starter_that_gets_many_points_is_judged_wrongly(
     once = Once(grade(recording(stop_s=2.5))[0])
     trial = Trial(Role.STARTER, "starter", "the starter package, untouched", None)
     result = run_trial(trial, lesson, once, tmp_path, tmp_path)  # type: ignore[arg-type]
-    assert str(result.verdict).startswith(
-        "1 point of 2, and a starter package may have 15% at most"
+    assert result.mistake.startswith(
+        "points: 1 point of 2, and a starter package may have 15% at most"
     )
     assert not mutation_score([result]).perfect
 

@@ -56,9 +56,7 @@ def test_the_mutation_score_is_perfect(name: str) -> None:
             selftest(loaded, grading, jobs=2 * cpu_count(), chosen=lambda trial: trial.id in kept)
         )
     wrong = {
-        result.trial.id: (str(result.verdict), *result.findings)
-        for result in results
-        if not result.verdict.right
+        result.trial.id: (result.mistake, *result.findings) for result in results if result.wrong
     }
     assert not wrong
     assert mutation_score(results).perfect

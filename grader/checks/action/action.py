@@ -222,9 +222,7 @@ def _why_other_rate(recording: Recording, goal: Goal, parameters: FeedbackOf) ->
     late_s = (end_ns - begin_ns) / NS - due_s * (1.0 + parameters.tolerance)
     stolen_s = recording.stolen_s(begin_ns, end_ns)
     if 0.0 < late_s <= stolen_s:
-        return Cause.to_repeat(
-            f"{seen}, but the machine took {format_duration(stolen_s)} from the process meanwhile"
-        )
+        return Cause.held_up(seen, stolen_s)
     hint = f"Each round of the loop should take {format_duration(1.0 / parameters.rate)}."
     return Cause(seen, hint, evidence(recording, goal))
 

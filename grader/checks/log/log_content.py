@@ -340,8 +340,7 @@ def rate(recording: Recording, parameters: Rate) -> Finding | Cause:
     if not found:
         return _why_lacking(recording, parameters, found)
     if rate_hz < low_hz and left_s(recording, begin_ns, end_ns) <= len(found) / low_hz:
-        stolen_s = recording.stolen_s(begin_ns, end_ns)
-        return Cause.to_repeat(f"{seen}, but the machine took {format_duration(stolen_s)}")
+        return Cause.held_up(seen, recording.stolen_s(begin_ns, end_ns))
     return Cause(
         seen,
         "Log in a timer of that period, or with throttle_duration_sec=1.0 in a faster callback: "

@@ -212,7 +212,7 @@ def _too_slow(recording: Recording, gone_m: float) -> Cause:
         f"{speed(average)} on average; it had set off after {format_duration(waited_s)}"
     )
     if lost_s > 0.25 * (driven_s + waited_s):
-        return Cause.to_repeat(f"{words}; the machine took {format_duration(lost_s)} from the run")
+        return Cause.held_up(words, lost_s)
     evidence = Evidence(moments=(until_the_end(recording),), plots=(speed_plot(recording),))
     return Cause(words, _FIELDS_HINT, evidence)
 

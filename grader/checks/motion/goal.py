@@ -113,8 +113,7 @@ def settles(recording: Recording, parameters: Settles) -> Finding | Cause:
     lost_s = stolen_s(recording, truth[0].time_ns, end.time_ns)
     if lost_s > 0.0 and took_s - lost_s <= parameters.within:
         seen = f"at rest after {format_duration(took_s)}" if rest is not None else "never at rest"
-        took = f"{seen}; the machine took up to {format_duration(lost_s)} from the run"
-        return Cause.to_repeat(took)
+        return Cause.held_up(seen, lost_s)
     stop_if(why_unsteered(recording))
     if rest is None:
         return _restless(recording, end, f"after {format_duration(took_s)} it is")
@@ -159,10 +158,7 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding | Cause
     lost_s = stolen_s(recording, run.truth[0].time_ns, run.truth[-1].time_ns)
     # What it drives on without a command, it has to come back.
     if lost_s > 0.0 and 2.0 * lost_s * max(abs(step.linear_m_s) for step in run.truth) >= more_m:
-        return Cause.to_repeat(
-            f"{seen}; the machine took up to {format_duration(lost_s)} from the run, which may "
-            "explain it"
-        )
+        return Cause.held_up(seen, lost_s)
     return Cause(
         seen,
         "Does the robot turn to the goal at once, and the short way? Wrap the error "

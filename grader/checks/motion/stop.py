@@ -120,10 +120,7 @@ def _late(recording: Recording, scene: Scene, rest: int, sight: Sight, parameter
     lost_s = stolen_s(recording, begin_ns, end_ns)
     missing_m = wanted_m - parameters.late - sight.distance_m
     if lost_s > 0.0 and lost_s * fastest >= missing_m:
-        return Cause.to_repeat(
-            f"{seen}; the machine took up to {format_duration(lost_s)} from the run meanwhile, "
-            "which may explain it"
-        )
+        return Cause.held_up(seen, lost_s)
     shown = [one.stamp_ns for one in scans(recording) if begin_ns <= one.stamp_ns <= end_ns]
     within = f"; {counted(len(shown), 'scan')} came meanwhile" if shown else ""
     return Cause(

@@ -255,9 +255,7 @@ def _why_slow(recording: Recording, process: Process, parameters: Ends) -> Cause
         seen = f"{code(process.name)} needed {format_duration(took_s)} to end after SIGINT"
     stolen_s = recording.stolen_s(recording.stop_ns, process.exited_ns or recording.end_ns)
     if stolen_s > 0.0 and took_s - stolen_s <= parameters.within:
-        return Cause.to_repeat(
-            f"{seen}, but the machine took {format_duration(stolen_s)} from it meanwhile"
-        )
+        return Cause.held_up(seen, stolen_s)
     lines = [
         line.text
         for line in recording.log

@@ -129,9 +129,7 @@ def _why_too_few(
         return ended
     stolen_s = recording.stolen_s(begin_ns, end_ns)
     if watched_s - stolen_s <= _LEAST_PERIODS * (parameters.period or 0.0):
-        return Cause.to_repeat(
-            f"{seen}, too few to judge; the machine took {format_duration(stolen_s)}"
-        )
+        return Cause.held_up(f"{seen}, too few to judge", stolen_s)
     hint = "Publish in every call of the callback, whatever the value of the parameter is."
     return why_raised(recording, seen, begin_ns - round(parameters.within * NS)) or Cause(
         seen, hint if parameters.period is None else _NEW_TIMER, shown
@@ -174,7 +172,8 @@ def _why_other_period(
     if abs(off_s) <= parameters.period_tolerance * parameters.period:
         return None
     seen = f"after that, messages come every {format_duration(median_s)} (median)"
-    if 0.0 < off_s * (len(times) - 1) <= recording.stolen_s(times[0], times[-1]):
-        return Cause.to_repeat(f"{seen}, but the machine took the time")
+    stolen_s = recording.stolen_s(times[0], times[-1])
+    if 0.0 < off_s * (len(times) - 1) <= stolen_s:
+        return Cause.held_up(seen, stolen_s)
     most = percent(parameters.period_tolerance)
     return Cause(seen, f"{_NEW_TIMER} The period may be {most} off.", shown)

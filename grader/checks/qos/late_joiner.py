@@ -217,7 +217,7 @@ def _why_unpublished_before(case: _Case) -> Cause:
     stolen_s = recording.stolen_s(begin_ns, join.joined_ns)
     # With the time that was taken from it, the node may have come to as many as are needed.
     if case.number * span_s > case.parameters.last * (span_s - stolen_s):
-        return Cause.to_repeat(f"{seen}; the machine took {format_duration(stolen_s)}")
+        return Cause.held_up(seen, stolen_s)
     return Cause(
         f"{seen} ({format_duration(span_s)})",
         "Publish from the start, whether or not there is a subscription: leave out conditions such "

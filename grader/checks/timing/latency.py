@@ -120,10 +120,7 @@ def latency(recording: Recording, parameters: Latency) -> Finding | Cause:
     unexcused = sum(recording.stolen_s(at, at + within_ns) <= 0.0 for at in missing)
     if unexcused <= parameters.unanswered and not parameters.is_too_slow(own_s):
         stolen_s = recording.stolen_s(sent[0].stamp_ns, recording.stop_ns)
-        return Cause.to_repeat(
-            f"{figures}; the machine took up to {format_duration(stolen_s)} from the process "
-            "meanwhile, which may explain it"
-        )
+        return Cause.held_up(figures, stolen_s)
     if not is_missing:
         hint = (
             "Publish the answer in the subscription's callback itself, not from a timer. Let the "

@@ -135,10 +135,7 @@ def period(recording: Recording, parameters: Period) -> Finding | Cause:
     forgivable = verdict.period_good or not _is_declared(recording, verdict, limits)
     if forgivable and judge(forgiven(recording, measured, limits), limits).good:
         stolen_s = recording.stolen_s(measured[0].begin_ns, measured[-1].end_ns)
-        return Cause.to_repeat(
-            f"{observed}; the machine took up to {format_duration(stolen_s)} from the process "
-            "meanwhile, which may explain it"
-        )
+        return Cause.held_up(observed, stolen_s)
     if verdict.period_good:
         number = len(verdict.irregular)
         observed += (

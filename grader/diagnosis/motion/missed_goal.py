@@ -82,10 +82,7 @@ def no_cpu_time(symptom: GoalMissed) -> Cause | None:
     is_starved = lost_s > 0.25 * symptom.watched_s and recording.ending is Ending.TIMEOUT
     if symptom.is_at_rest or not is_starved:
         return None
-    return Cause.to_repeat(
-        f"{symptom.seen}; the machine took up to {format_duration(lost_s)} of "
-        f"{format_duration(symptom.watched_s)} from the run"
-    )
+    return Cause.held_up(symptom.seen, lost_s)
 
 
 @explanation(GoalMissed)

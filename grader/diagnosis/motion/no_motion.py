@@ -194,9 +194,7 @@ def moves_too_late(symptom: NotMoved) -> Cause:
     begin_ns = recording.truth[0].time_ns
     lost_s = stolen_s(recording, begin_ns, recording.truth[-1].time_ns)
     if left_s < 0.2 and lost_s > 0.0:
-        return Cause.to_repeat(
-            f"{_STILL} until the end, but the machine took {format_duration(lost_s)} from the run"
-        )
+        return Cause.held_up(f"{_STILL} until the end", lost_s)
     return Cause(
         f"{_STILL}: the first command to move, {speed(first.twist.linear_m_s)} ahead, came "
         f"{format_duration(max(left_s, 0.0))} before the end",
