@@ -154,19 +154,18 @@ class Batch:
         return {entry.key: entry for entry in written.entries}
 
     def _refuse_changed(self, keys: Iterable[str]) -> None:
-        changed = sorted(key for key in keys if not self._is_of_this_version(key))
-        if not changed:
-            return
-        named = ", ".join(changed[:_MOST_NAMED]) + (", …" if len(changed) > _MOST_NAMED else "")
-        raise UsageError(
-            f"{self.ledger.out}: {len(changed)} ({named}) graded with another version of "
-            f"{self.loaded.assignment.id}. {regrade_command(self.ledger.out, self.loaded)} judges "
-            "their recordings again; `--retry all` runs all of them again, `--retry NAME` one"
-        )
-
-    def _is_of_this_version(self, key: str) -> bool:
-        result = self.ledger.result(key)
-        return result is not None and result.assignment.sha256 == self.loaded.sha256
+        """Let no grade of another version of the assignment stay beside the new ones."""
+        results = {key: self.ledger.result(key) for key in sorted(keys)}
+        versions = {key: one.assignment.sha256 for key, one in results.items() if one is not None}
+        changed = [key for key, version in versions.items() if version != self.loaded.sha256]
+        if changed:
+            more = ", …" if len(changed) > _MOST_NAMED else ""
+            raise UsageError(
+                f"{self.ledger.out}: {len(changed)} ({', '.join(changed[:_MOST_NAMED])}{more}) "
+                f"graded with another version of {self.loaded.assignment.id}. "
+                f"{regrade_command(self.ledger.out, self.loaded)} judges their recordings again; "
+                "`--retry all` runs all of them again, `--retry NAME` one"
+            )
 
     def _take(self, key: str, partial: Path, future: Future[None]) -> None:
         try:

@@ -38,13 +38,6 @@ class Regraded:
         )
         return total((after, -before)) if before is not None and after is not None else 0.0
 
-    @property
-    def in_doubt(self) -> bool:
-        """Whether there was a grade before, but not any more."""
-        after = self.done.result
-        graded = self.before is not None and self.before.graded
-        return graded and (after is None or not after.graded)
-
 
 def regrade_class(
     loaded: LoadedAssignment, ledger: Ledger, *, write: bool = True

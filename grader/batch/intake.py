@@ -49,7 +49,6 @@ def take_in(
     roster: Roster | None = None,
     on_left_out: Callable[[str], None] = lambda _: None,
     out: Path | None = None,
-    on_prefix: Callable[[str], None] = lambda _: None,
     course: Course | None = None,
 ) -> list[HandedIn]:
     """Find out who handed in what, and when."""
@@ -58,7 +57,7 @@ def take_in(
     entries = list(_entries(folder, staging, on_left_out, out))
     if not entries:
         raise UsageError(f"{source}: holds no submission; expected one folder or archive for each")
-    rows = matched(entries, roster, on_prefix) if roster else entries
+    rows = matched(entries, roster) if roster else entries
     return _complete(rows, staging, course)
 
 
@@ -181,7 +180,8 @@ def _entries(
             # Moodle names the folder, but the student the archive.
             yield row if moodle else row.at(of_name(item.name))
         else:
-            on_left_out(shown(item.name))
+            why = "is neither a folder nor an archive, so it is left out"
+            on_left_out(f"{shown(item.name)} {why}")
     for files in canvas.values():
         yield _of_canvas(files, staging)
 

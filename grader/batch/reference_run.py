@@ -44,18 +44,9 @@ def keep_reference(
     loaded: LoadedAssignment, grade: Grade, recordings: Mapping[str, Recording]
 ) -> str:
     """Keep the runs of the reference, and say where."""
-    name = loaded.assignment.id
+    name, file = loaded.assignment.id, loaded.folder / REFERENCE_FILE
     if not grade.full_points:
         raise UsageError(f"{name}: the reference does not get full points, so no run is kept")
-    file = write_references(loaded, recordings)
-    if file is None:
-        return f"{name}: no scenario with a robot, nothing to keep"
-    kept = counted(len(read_references(loaded)), "run")
-    return f"{name}: {kept} of the reference kept in {file}"
-
-
-def write_references(loaded: LoadedAssignment, recordings: Mapping[str, Recording]) -> Path | None:
-    """Write the file of an assignment."""
     runs = {
         scenario.id: {"of": fingerprint(loaded, scenario), "replay": replay}
         for scenario in loaded.assignment.scenarios
@@ -63,10 +54,9 @@ def write_references(loaded: LoadedAssignment, recordings: Mapping[str, Recordin
         and (replay := make_replay(recordings[scenario.id], scenario)) is not None
     }
     if not runs:
-        return None
-    file = loaded.folder / REFERENCE_FILE
+        return f"{name}: no scenario with a robot, nothing to keep"
     write_whole(file, _packed(runs))
-    return file
+    return f"{name}: {counted(len(runs), 'run')} of the reference kept in {file}"
 
 
 def only_scenarios(file: Path, scenarios: Collection[str]) -> bytes:

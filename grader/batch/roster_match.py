@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
 
@@ -27,7 +27,7 @@ class _Names:
         for student in students:
             for form in student.resembling:
                 self._alike.setdefault(form, []).append(student)
-        self.prefix = self._find_prefix([stem_of(entry.item) for entry in entries])
+        self._prefix = self._find_prefix([stem_of(entry.item) for entry in entries])
 
     def _find_prefix(self, stems: Sequence[str]) -> str:
         """GitHub Classroom's ``<assignment>-``, where both that and logins may hold hyphens.
@@ -67,8 +67,8 @@ class _Names:
         if keys:
             return keys
         stem = stem_of(entry.item)
-        if self.prefix and stem.startswith(self.prefix):
-            return self._by_login(stem.removeprefix(self.prefix))
+        if self._prefix and stem.startswith(self._prefix):
+            return self._by_login(stem.removeprefix(self._prefix))
         return set()
 
     def alike(self, entry: HandedIn) -> set[str]:
@@ -83,16 +83,12 @@ class _Names:
         return {student.key for student in alike if written(login) in student.logins}
 
 
-def matched(
-    entries: list[HandedIn], roster: Roster, on_prefix: Callable[[str], None]
-) -> list[HandedIn]:
+def matched(entries: list[HandedIn], roster: Roster) -> list[HandedIn]:
     """Give each entry to the student of the roster that it names.
 
     A name that is only similar is not matched; the rows of submission and student say so.
     """
     names = _Names(roster.students, entries)
-    if names.prefix:
-        on_prefix(names.prefix)
     named: dict[str, set[str]] = {}
     students = {student.key: student for student in roster.students}
     for student in roster.students:

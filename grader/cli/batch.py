@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 
     from grader.batch.batch import Done
     from grader.batch.executor import BatchExecutor
-    from grader.batch.handed_in import HandedIn
-    from grader.batch.roster import Roster
-    from grader.course.load import Course
 
 NOT_GRADED = 3
 _AUTO = "auto"
@@ -72,8 +69,10 @@ def batch(
     from grader.batch.class_files import GRADES_FILE, all_standing, write_class
     from grader.batch.executor import DaskExecutor, ExecutorLost, LocalExecutor
     from grader.batch.groups import strangers
+    from grader.batch.intake import take_in, take_in_roster
     from grader.batch.ledger import Ledger
     from grader.batch.rendering import bring_up_to_date
+    from grader.batch.roster import read_roster
     from grader.batch.worker import Order, make_grading
     from grader.report.files import check_folder, refuse_inputs, refuse_part
     from grader.run.admission import Admission
@@ -96,9 +95,16 @@ def batch(
     with Scratch("batch") as staging, Progress(quiet).shown() as progress:
         if grading is not None and not quiet:
             progress.note(f"sandbox: {grading.process_sandbox}")
-        names, rows = _rows(submissions, roster, rules, out, staging, progress)
-        for problem in names.problems if names else ():
-            progress.note(f"{roster or submissions}: {problem}")
+        is_roster = submissions.suffix.lower() == ".csv" and submissions.is_file()
+        named = submissions if is_roster else roster
+        names = read_roster(named) if named is not None else None
+        if names is not None and is_roster:
+            progress.begin("fetching", len(names.students))
+            rows = take_in_roster(names, submissions.parent, staging, progress.advance, rules)
+        else:
+            rows = take_in(submissions, staging, names, progress.note, out, rules)
+        for problem in names.problems if names is not None else ():
+            progress.note(f"{named}: {problem}")
         for stranger in strangers(rows, rules) if rules is not None else ():
             progress.note(stranger)
         for row in rows:
@@ -150,35 +156,6 @@ def batch(
         item.result.graded if item.result is not None else not item.entry.fault for item in done
     )
     raise typer.Exit(0 if graded else NOT_GRADED)
-
-
-def _rows(
-    submissions: Path,
-    roster: Path | None,
-    course: Course | None,
-    out: Path,
-    staging: Path,
-    progress: Progress,
-) -> tuple[Roster | None, list[HandedIn]]:
-    from grader.batch.intake import take_in, take_in_roster
-    from grader.batch.roster import read_roster
-
-    if submissions.suffix.lower() == ".csv" and submissions.is_file():
-        known = read_roster(submissions)
-        progress.begin("fetching", len(known.students))
-        return known, take_in_roster(known, submissions.parent, staging, progress.advance, course)
-    read = read_roster(roster) if roster else None
-
-    not_taken = "is neither a folder nor an archive, so it is left out"
-    return read, take_in(
-        submissions,
-        staging,
-        read,
-        on_left_out=lambda name: progress.note(f"{name} {not_taken}"),
-        out=out,
-        on_prefix=lambda prefix: progress.say(f"names of submissions are read as {prefix}LOGIN"),
-        course=course,
-    )
 
 
 def _at_once(jobs: str) -> int | None:

@@ -116,13 +116,11 @@ def _class(batch: Ledger, assignment: str | None, quiet: bool, *, write: bool) -
         f"{-sum(row.gained for row in lose):g} points, "
         f"{sum(bool(row.changes) for row in rows)} with a change"
     )
-    left = sum(bool(row.problem) or row.in_doubt for row in rows)
+    results = ((row.problem, row.done.result) for row in rows)
+    left = sum(bool(why) or not (one is None or one.graded) for why, one in results)
     if left:
         say(
             f"{left} cannot be judged again from their recordings; run them again with "
             "`rosgrade batch ... --retry NAME`"
         )
-    graded = all(
-        not row.problem and (row.done.result is None or row.done.result.graded) for row in rows
-    )
-    raise typer.Exit(0 if graded else NOT_GRADED)
+    raise typer.Exit(NOT_GRADED if left else 0)

@@ -9,12 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader.assignment.load import list_assignments, load_assignment
-from grader.batch.reference_run import (
-    REFERENCE_FILE,
-    keep_reference,
-    read_references,
-    write_references,
-)
+from grader.batch.reference_run import REFERENCE_FILE, keep_reference, read_references
 from grader.errors import AssignmentError, UsageError
 from grader.grade import grade
 from tests.grade.sample import FAIL, Told, make_loaded, make_submission
@@ -33,14 +28,10 @@ def make(folder: Path, says=None):
     return loaded, {"drive": replace(ahead_until(0.2), submission=make_submission())}
 
 
-def stale(loaded):
-    """Scenarios with a robot whose reference must be recorded again."""
-    fresh = read_references(loaded)
-    return tuple(
-        one.id
-        for one in loaded.assignment.scenarios
-        if one.world is not None and one.id not in fresh
-    )
+def kept(loaded, recordings):
+    """Where the runs of a reference with full points are kept."""
+    keep_reference(loaded, grade(loaded, make_submission(), recordings), recordings)
+    return loaded.folder / REFERENCE_FILE
 
 
 @pytest.mark.parametrize("name", list_assignments())
@@ -54,21 +45,20 @@ def test_shipped_runs_are_of_the_scenarios_as_they_are(name):
 
 def test_what_is_written_is_read_again(tmp_path):
     loaded, recordings = make(tmp_path)
-    file = write_references(loaded, recordings)
-    assert file == tmp_path / REFERENCE_FILE
+    assert kept(loaded, recordings).parent == tmp_path
     found = read_references(loaded)
     assert list(found) == ["drive"] and len(found["drive"]["x"]) > 20
 
 
 def test_the_same_runs_are_the_same_bytes(tmp_path):
     loaded, recordings = make(tmp_path)
-    first = write_references(loaded, recordings).read_bytes()
-    assert write_references(loaded, recordings).read_bytes() == first
+    first = kept(loaded, recordings).read_bytes()
+    assert kept(loaded, recordings).read_bytes() == first
 
 
 def test_a_run_in_another_world_is_not_shown(tmp_path):
     loaded, recordings = make(tmp_path)
-    write_references(loaded, recordings)
+    kept(loaded, recordings)
     (tmp_path / "wall.yaml").write_text(WORLD.replace("0.6", "0.9"))
     assert read_references(loaded) == {}
 
