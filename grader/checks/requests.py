@@ -55,7 +55,7 @@ def judged_requests(
         stop_if(why_ended(recording) or Cause.to_repeat(never))
     for one in found:
         if one.error:
-            stop_if(why_not_met(recording, kind, name, "could not be asked", _sent_ns(one)))
+            stop_if(why_not_met(recording, kind, name, _sent_ns(one)))
     return found
 
 

@@ -22,11 +22,6 @@ class BuildError(Symptom[str]):
     error: SourceError
     package: PackageRecord
 
-    @property
-    def message(self) -> str:
-        """What the error says."""
-        return self.error.message
-
 
 class Row(Model):
     """A row of the table: a mistake, how to recognise its error, and what to do."""
@@ -39,7 +34,7 @@ class Row(Model):
 
     def __call__(self, symptom: BuildError) -> str | None:
         """The hint, if the error is that of the mistake."""
-        found = re.search(self.message, symptom.message)
+        found = re.search(self.message, symptom.error.message)
         if found is None or not re.search(self.file, symptom.error.file):
             return None
         return Template(self.hint).safe_substitute(

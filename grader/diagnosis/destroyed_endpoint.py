@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.process.process_exit import ended_early, exited
 from grader.findings.finding import Evidence, Moment
 from grader.findings.wording import code
 from grader.measure import declarations
-from grader.recording.interaction import Service
 from grader.recording.model import Endpoint, Kind, Recording
 
 _HINT = (
@@ -30,23 +27,22 @@ def why_unsubscribed(
     subscriptions = recording.student_endpoints(Kind.SUBSCRIPTION, topic)
     if sent_ns is not None and any((item.vanished_ns or 0) > sent_ns for item in subscriptions):
         return None
-    return why_destroyed(recording, seen, f"the subscription to {code(topic)}", subscriptions)
+    return _why_destroyed(recording, seen, f"the subscription to {code(topic)}", subscriptions)
 
 
 def why_unpublished(recording: Recording, topic: str, seen: str) -> Cause | None:
     """The same of its publishers on a topic."""
     publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
-    return why_destroyed(recording, seen, f"the publisher on {code(topic)}", publishers)
+    return _why_destroyed(recording, seen, f"the publisher on {code(topic)}", publishers)
 
 
-def why_destroyed(
-    recording: Recording, seen: str, what: str, items: Iterable[Endpoint | Service]
+def _why_destroyed(
+    recording: Recording, seen: str, what: str, found: tuple[Endpoint, ...]
 ) -> Cause | None:
-    """The cause if the student's code destroyed all of some endpoints, services or actions.
+    """The cause if the student's code destroyed all of some endpoints.
 
     What vanished with its process, or because the scenario ended that, was not destroyed.
     """
-    found = tuple(items)
     ends = [item.vanished_ns for item in found if item.vanished_ns is not None]
     if not found or len(ends) < len(found):
         return None

@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.destroyed_endpoint import why_destroyed
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_endpoint import Word, offered
 from grader.diagnosis.process.blocked_executor import HINT, why_never_spun
@@ -18,7 +17,6 @@ from grader.diagnosis.process.raised import (
     student_place,
 )
 from grader.findings.finding import Evidence, Moment
-from grader.findings.wording import code
 from grader.measure import declarations
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
@@ -130,14 +128,6 @@ def process_gone(symptom: NoAnswer) -> Cause | None:
 
 
 @explanation(NoAnswer)
-def server_destroyed(symptom: NoAnswer) -> Cause | None:
-    """The program destroyed its server."""
-    own = offered(symptom.recording, symptom.server, symptom.name)
-    server = f"the {symptom.server.noun} {code(symptom.name)}"
-    return why_destroyed(symptom.recording, symptom.what, server, own)
-
-
-@explanation(NoAnswer)
 def no_cpu_time(symptom: NoAnswer) -> Cause | None:
     """The machine gave the process too little CPU time; this is an error and costs no points."""
     recording = symptom.recording
@@ -181,7 +171,8 @@ def callback_does_not_answer(symptom: NoAnswer) -> Cause:
     return Cause(
         f"{symptom.what}{in_brackets(symptom.place)}{spins}",
         "Does the callback reach its end and return the response? A callback that waits for "
-        "another callback of the same callback group waits for ever.",
+        "another callback of the same callback group waits for ever. Keep the server as long as "
+        "the program runs.",
         symptom.evidence,
     )
 

@@ -6,7 +6,6 @@ import re
 from dataclasses import dataclass
 
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.destroyed_endpoint import why_destroyed
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import crashed, why_crashed
@@ -158,12 +157,11 @@ def is_offered(recording: Recording, word: Word, name: str, interface: str | Non
     )
 
 
-def why_not_met(recording: Recording, word: Word, name: str, what: str, asked_ns: int) -> Cause:
+def why_not_met(recording: Recording, word: Word, name: str, asked_ns: int) -> Cause:
     """Why something that was offered could not be asked."""
-    items = offered(recording, word, name)
-    return why_destroyed(recording, f"it {what}", f"the {word.noun} {code(name)}", items) or Cause(
-        f"the {word.noun} {code(name)} {what}: it was there, but did not match a client with the "
-        "default QoS",
+    return Cause(
+        f"the {word.noun} {code(name)} could not be asked: it was there, but went away, or did not "
+        "match a client with the default QoS",
         f"Keep the {word.noun} and its node as long as the program runs, and do not change its "
         "QoS.",
         Evidence(moments=(Moment("rosgrade gave up", recording.since_launch_s(asked_ns)),)),

@@ -30,7 +30,6 @@ _LOG_LINES = 5
 _STARVED = 0.5
 # Without what the host took: in so long a node answers what it was asked.
 _OWN_S = 2.0
-_ENDED_PERIODS = 3.0
 
 
 @explanation(NoMessages, concept="timers")
@@ -160,10 +159,7 @@ def publishing_stopped(symptom: FewMessages) -> Cause:
             "Publish from the callback of a timer, which goes on as long as the node spins.",
             evidence,
         )
-    # After so many periods of silence a timer has stopped.
-    silent_s = (recording.stop_ns - recording.on(symptom.topic)[-1].stamp_ns) / NS
-    stopped = silent_s > _ENDED_PERIODS * max(period_s)
-    is_slow = symptom.needed * min(period_s) > symptom.watched_s and not stopped
+    is_slow = symptom.needed * min(period_s) > symptom.watched_s
     return Cause(
         f"{symptom.seen}; the process declared a timer of "
         f"{listing(map(format_duration, period_s))}",

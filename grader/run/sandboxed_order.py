@@ -85,11 +85,7 @@ def sandboxed(
             limits=limits,
             folders={inside: in_cell[outside] for outside, inside in seen.items()},
         ),
-        facts={
-            **order.facts,
-            "sandbox": sandbox.description,
-            "libraries": " ".join(sorted({"numpy", *sandbox.libraries})),
-        },
+        facts={**order.facts, "sandbox": sandbox.description},
     )
 
 

@@ -67,7 +67,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         ("shares itself", "with std::bad_weak_ptr", "shared_from_this() fails"),
         ("reads beyond", "with std::out_of_range: vector", "The vector is empty"),
         ("reads no file", "with std::filesystem::filesystem_error", "${PROJECT_NAME}"),
-        ("asserts", "with Assertion: 'ranges.size() == 1' failed", NO_SYMBOLS),
+        ("asserts", "with SIGABRT: abort", NO_SYMBOLS),
         ("frees twice", "free(): double free detected", "std::make_shared<Bot>()"),
         ("calls a pure function", "with SIGABRT: pure virtual method called", "the constructor"),
         ("aborts", "with SIGABRT: abort", NO_SYMBOLS),

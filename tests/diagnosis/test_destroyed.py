@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 
-import pytest
-
 from grader.findings.finding import Status
 from grader.recording.event import Intervention
 from grader.recording.model import Kind
@@ -25,7 +23,6 @@ from tests.checks.builder import (
     stimulus,
     taken,
 )
-from tests.checks.requests import acting, action, asked, goal, service, serving
 
 LATCHED = replace(RELIABLE, durability="transient_local")
 LISTENER = endpoint("/chatter", kind=Kind.SUBSCRIPTION, type="std_msgs/msg/String")
@@ -67,26 +64,6 @@ def test_a_publisher_that_was_destroyed_before_a_late_joiner():
     )
     found = failing("qos.late_joiner", run, topic="/cmd_vel", joiner="late", last=5)
     assert "the publisher on `/cmd_vel` was destroyed 4.00 s after launch" in found
-
-
-@pytest.mark.parametrize("error", ["", "no server"])
-def test_a_service_that_was_destroyed(error):
-    run = serving(asked(1.0, None, error=error), services=(gone(service()),))
-    found = failing("service.responds", run, service="/enable")
-    assert f"the service `/enable` {WORDS}" in found
-
-
-@pytest.mark.parametrize("error", ["", "no server"])
-def test_an_action_server_that_was_destroyed(error):
-    run = acting(goal(accepted=None, error=error), services=(gone(action()),))
-    found = failing("action.result", run, action="/fibonacci", within="2 s")
-    assert f"the action `/fibonacci` {WORDS}" in found
-
-
-def test_an_action_server_that_was_destroyed_while_it_worked():
-    run = acting(goal(end_s=None), services=(gone(action(), 1.2),))
-    found = failing("action.result", run, action="/fibonacci", within="2 s")
-    assert "the action `/fibonacci` was destroyed 1.20 s after launch" in found
 
 
 def test_what_vanished_with_its_process_was_not_destroyed():

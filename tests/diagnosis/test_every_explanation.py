@@ -166,9 +166,6 @@ CASES: list[Group] = [
             "ProcessExit.machine_lacks_it": crashing(
                 "ModuleNotFoundError: No module named 'tf_transformations'"
             ),
-            "Raised.unknown_library": crashing(
-                "ModuleNotFoundError: No module named 'pandas'", environment={"libraries": "numpy"}
-            ),
             "Raised.not_imported": crashing("NameError: name 'Twist' is not defined"),
             "NoNode.not_built": nodeless(**NOT_STARTED, submission=submission(build=FAILED_BUILD)),
             "NoNode.no_executable": nodeless(**NOT_STARTED),
@@ -270,7 +267,6 @@ CASES: list[Group] = [
         ENABLE,
         {
             "NoAnswer.process_gone": serving(asked(1.0, None), processes=(died(1),)),
-            "NoAnswer.server_destroyed": serving(asked(1.0, None), services=(gone(service()),)),
             "NoAnswer.no_cpu_time": serving(asked(1.0, None), disturbance=BUSY),
             "NoAnswer.callback_raised": serving(
                 asked(1.0, None), log=output(traceback("ValueError: no"), time_s=1.5)

@@ -34,10 +34,10 @@ def declaring(timer_s: float | None) -> dict:
         (
             [0.003] * 500,
             declaring(0.003),
-            ["median 3 ms", "1/100 of the expected period", "declared a timer of 3 ms"],
+            ["median 3 ms", "0.01 times the expected period", "declared a timer of 3 ms"],
         ),
         ([0.003] * 500, {}, ["create_timer takes its period in seconds: 0.3 is 300 ms."]),
-        ([0.03] * 50, {}, ["1/10 of the expected period"]),
+        ([0.03] * 50, {}, ["0.1 times the expected period"]),
         ([3.0, 3.0], declaring(3.0), ["median 3 s", "10 times the expected period"]),
         ([0.5] * 8, declaring(0.5), ["the process declared a timer of 500 ms", "in seconds"]),
         ([0.0001] * 50, {"declarations": TIMER_OF_ZERO}, ["a timer of 0 s", "in seconds"]),

@@ -30,7 +30,7 @@ _OF_PYTHON = re.compile(
 )
 # They look themselves at which language it is: what they say of Python is said of Python only.
 _READS_PYTHON = {
-    *("library_hint", "newer_name", "why_too_new", "why_nothing_to_run"),
+    *("newer_name", "why_too_new", "why_nothing_to_run"),
     *("_why_unknown_imports", "tests"),
 }
 SOURCE = SourceFile("src/look/bin/look", "look")

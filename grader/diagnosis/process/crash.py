@@ -21,10 +21,6 @@ _BEGINNINGS = (
         r"|double free or corruption.*|corrupted (?:size|double).+|\*\*\* .+ detected \*\*\*.*)"
     ),
     re.compile(
-        r"(?:[^\s:]+: )?(?P<file>[^:]+):(?P<line>\d{1,7}): (?P<where>.+): "
-        r"(?P<type>Assertion) [`'](?P<failed>.+)' failed\."
-    ),
-    re.compile(
         r"\S+: (?P<type>error while loading shared libraries|symbol lookup error): (?P<message>.+)"
     ),
     re.compile(r"rosgrade: (?P<type>SIG[A-Z]+) \((?P<message>.+)\) in .+"),
@@ -54,9 +50,6 @@ def parse_crashes(lines: Iterable[str]) -> tuple[Failure, ...]:
 
 def _failure(said: dict[str, str]) -> Failure:
     type_ = _NOISE.sub(r"\1", said.get("type", "SIGABRT"))
-    if "failed" in said:
-        frame = Frame(said["file"], int(said["line"]), said["where"])
-        return Failure(type_, f"'{said['failed']}' failed", (frame,), compiled=True)
     return Failure(type_, said.get("message", ""), (), compiled=True)
 
 

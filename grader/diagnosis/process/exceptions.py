@@ -11,7 +11,6 @@ from pydantic import Field
 
 from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
 from grader.diagnosis.process.failure import Failure, Frame
-from grader.diagnosis.process.missing_library import library_hint
 from grader.diagnosis.process.raised import student_place
 from grader.findings.wording import code
 from grader.recording.model import Recording
@@ -86,14 +85,6 @@ _GDB = (
     "then `bt` for the functions that were being called. It names lines only if the program is "
     "built with -g."
 )
-
-
-@explanation(Raised, only=PYTHON)
-def unknown_library(symptom: Raised) -> str | None:
-    """A Python library is imported that the assignment does not allow."""
-    if symptom.failure.type != "ModuleNotFoundError":
-        return None
-    return library_hint(symptom.failure.message, symptom.recording)
 
 
 @explanation(Raised, only=PYTHON)

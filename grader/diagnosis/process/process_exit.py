@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.process.exceptions import Raised
 from grader.diagnosis.process.failure import Failure
 from grader.diagnosis.process.missing_library import lacking_package
@@ -220,9 +220,7 @@ def ended_by_signal(symptom: ProcessExit) -> Cause | None:
     if symptom.failure is not None:
         return None
     killed, evidence = symptom.killed, symptom.evidence
-    failed = [line for line in evidence.log if killed is signal.SIGABRT and "Assertion" in line]
-    hints = [explain(Raised(Failure("Assertion", line, ()), symptom.recording)) for line in failed]
-    hint = next(filter(None, hints), None) or TABLE.hints.get(
+    hint = TABLE.hints.get(
         killed.name if killed else "",
         "Run it by hand with `ros2 run` and look at its last lines of output.",
     )
