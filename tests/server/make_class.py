@@ -23,10 +23,10 @@ title: A lesson
 packages: [{name: bot}]
 checks:
   - {id: package, uses: package.found, with: {package: bot}, points: 1}
-  # Half of them must have one.
+  # Every function must have one.
   - id: docs
     uses: source.docstrings
-    with: {package: bot, share: 80 %}
+    with: {package: bot, of: [function]}
     points: 4
     requires: [package]
 
@@ -55,7 +55,9 @@ STUDENTS = {"ana": 2, "ben": 1, "cai": 1, 'd "<b>eli</b>': 1}
 def record(key: str, documented: int) -> SubmissionRecord:
     """A submission as it would be read."""
     functions = (SourceFunction("spin", 1, True), SourceFunction("stop", 6, documented == 2))
-    source = SourceFile(NODE, "bot.node", functions=functions, prints=(3,) * (documented == 1))
+    source = SourceFile(
+        NODE, "bot.node", True, functions=functions, prints=(3,) * (documented == 1)
+    )
     package = PackageRecord("bot", "bot", sources=(source,))
     return SubmissionRecord(key, key, packages=(package,))
 

@@ -192,7 +192,7 @@ def test_a_preview_shows_who_gains_what_and_writes_nothing(out: Path, client: Cl
     # Elsewhere the server may be writing reports again meanwhile.
     written = sorted((out / "submissions").glob("*/result.json"))
     before = [file.read_bytes() for file in written]
-    sent = {"do": "preview", "check": "docs", "text": YAML.replace("80 %", "50 %")}
+    sent = {"do": "preview", "check": "docs", "text": YAML.replace("[function]", "[module]")}
     assert client.post("/regrade", sent).status == 200
     shown = ended(client)
     assert "3 students gain 12 points, 0 lose 0" in shown and "Nothing was written" in shown
@@ -203,7 +203,7 @@ def test_a_preview_shows_who_gains_what_and_writes_nothing(out: Path, client: Cl
 def test_a_changed_check_is_applied_and_taken_back(out: Path, client: Client) -> None:
     shown = client.get("/regrade?check=docs").text.partition("<textarea")[2].partition(">\n")[2]
     assert html.unescape(shown).startswith(f"{YAML}</textarea>")
-    changed = YAML.replace("80 %", "50 %")
+    changed = YAML.replace("[function]", "[module]")
     sent = {"do": "apply", "check": "docs", "text": changed.replace("\n", "\r\n")}
     assert client.post("/regrade", sent).status == 200
     assert "3 students gain 12 points" in ended(client)
