@@ -16,15 +16,11 @@ from typing import Any
 from grader.assignment.binding import BoundCheck
 from grader.assignment.model import SHOWN_FROM, Assignment, CheckSpec, Launch, Package, Scenario
 from grader.assignment.repeat import runs_of
-from grader.assignment.stimuli.kinds.join import Join
-from grader.assignment.stimuli.kinds.publish import Publish
 from grader.assignment.stimuli.kinds.request import (
     CallService,
-    ReadParameters,
     SendGoal,
     SetParameters,
 )
-from grader.assignment.stimuli.kinds.serve import Serve
 from grader.checks import need as needs
 from grader.checks.check import Subject
 from grader.errors import GraderFault, Problem
@@ -235,7 +231,8 @@ def _(need: needs.Recorded, user: _User) -> Iterator[_Lack]:
     for scenario in user.scenarios:
         recorded = scenario.recorded_types
         if need.or_sent:
-            recorded.update(one.exchanged for one in scenario.stimuli if isinstance(one, Publish))
+            sent = (one.exchanged for one in scenario.stimuli if one.key == "publish")
+            recorded.update(filter(None, sent))
         if topic not in recorded:
             text = f"the scenario {scenario.id!r} does not record {topic!r}."
             yield ("with", need.topic), text + nearest_or_all(topic, recorded, "It records")
@@ -257,17 +254,10 @@ def _(need: needs.OwnTransform, user: _User) -> Iterator[_Lack]:
 
 
 @_lacks.register
-def _(need: needs.Published, user: _User) -> Iterator[_Lack]:
+def _(need: needs.Stimulated, user: _User) -> Iterator[_Lack]:
     for scenario in user.scenarios:
-        topics = [one.publish for one in scenario.stimuli if isinstance(one, Publish)]
-        yield from _unnamed(user, need.topic, scenario, topics, "publishes on")
-
-
-@_lacks.register
-def _(need: needs.Joined, user: _User) -> Iterator[_Lack]:
-    for scenario in user.scenarios:
-        names = [one.name for one in scenario.stimuli if isinstance(one, Join)]
-        yield from _unnamed(user, need.name, scenario, names, "is a join with the name")
+        names = _subjects(scenario, *need.keys)
+        yield from _unnamed(user, need.parameter, scenario, names, need.does)
 
 
 @_lacks.register
@@ -305,24 +295,10 @@ def _(need: needs.GoalSent, user: _User) -> Iterator[_Lack]:
 
 
 @_lacks.register
-def _(need: needs.Served, user: _User) -> Iterator[_Lack]:
-    for scenario in user.scenarios:
-        names = [one.serve for one in scenario.stimuli if isinstance(one, Serve)]
-        yield from _unnamed(user, need.server, scenario, names, "serves")
-
-
-@_lacks.register
-def _(need: needs.ParametersRead, user: _User) -> Iterator[_Lack]:
-    for scenario in user.scenarios:
-        read = [one.read_parameters for one in scenario.stimuli if isinstance(one, ReadParameters)]
-        yield from _unnamed(user, need.node, scenario, [*_nodes_set(scenario), *read], "asks")
-
-
-@_lacks.register
 def _(need: needs.ParameterSet, user: _User) -> Iterator[_Lack]:
     node, name, wanted = map(user.value, (need.node, need.name, need.value))
     for scenario in user.scenarios:
-        nodes = _nodes_set(scenario)
+        nodes = _subjects(scenario, "set_parameters")
         yield from _unnamed(user, need.node, scenario, nodes, "asks")
         tried = [
             one.set_parameters[name]
@@ -336,8 +312,8 @@ def _(need: needs.ParameterSet, user: _User) -> Iterator[_Lack]:
             yield ("with", need.value), text
 
 
-def _nodes_set(scenario: Scenario) -> list[str]:
-    return [one.node for one in scenario.stimuli if isinstance(one, SetParameters)]
+def _subjects(scenario: Scenario, *keys: str) -> list[str]:
+    return [one.subject for one in scenario.stimuli if one.key in keys]
 
 
 @_lacks.register

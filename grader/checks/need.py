@@ -63,19 +63,19 @@ class OwnTransform(Need):
 
 
 @dataclass(frozen=True)
-class Published(Need):
-    """A topic that a stimulus publishes on."""
+class Stimulated(Need):
+    """A stimulus that is about what a parameter names."""
 
-    words = "a stimulus that publishes on `{topic}`"
-    topic: str = "stimulus"
+    words = "a stimulus that {does} `{parameter}`"
+    parameter: str
+    does: str
+    """What such a stimulus does, before the name."""
+    keys: tuple[str, ...]
+    """Of the stimuli that do."""
 
 
-@dataclass(frozen=True)
-class Joined(Need):
-    """A late joiner among the stimuli."""
-
-    words = "a `join` among the stimuli with the name `{name}`"
-    name: str = "joiner"
+PUBLISHED = Stimulated("stimulus", "publishes on", ("publish",))
+"""A topic that a stimulus publishes on."""
 
 
 @dataclass(frozen=True)
@@ -106,22 +106,6 @@ class GoalSent(Need):
     """Parameter with how long the result may take: the stimulus must wait as long."""
     having: str | None = None
     """Key that one of the goals must have."""
-
-
-@dataclass(frozen=True)
-class Served(Need):
-    """A service or an action that the scenario offers."""
-
-    words = "a stimulus that serves `{server}`"
-    server: str = "server"
-
-
-@dataclass(frozen=True)
-class ParametersRead(Need):
-    """A node whose parameters a stimulus reads or sets."""
-
-    words = "a stimulus that reads or sets the parameters of `{node}`"
-    node: str = "node"
 
 
 @dataclass(frozen=True)

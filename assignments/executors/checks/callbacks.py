@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from grader.measure import declarations
 from grader.checks.check import Subject, check
 from grader.findings.finding import Evidence, Finding
-from grader.checks.need import Published, Recorded
+from grader.checks.need import PUBLISHED, Recorded
 from grader.measure.period import Interval, PeriodLimits, forgiven, judge
 from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.findings.wording import code, codes, counted, listing
@@ -45,7 +45,7 @@ _PERIOD_HINT = (
 class Runs(Reported):
     """Parameters of callbacks.run."""
 
-    needs = (Recorded(), Published())
+    needs = (Recorded(), PUBLISHED)
 
     period: Duration | None = Field(
         None, description="Expected time between two starts of each callback."

@@ -14,7 +14,7 @@ from grader.checks.check import Parameters, Subject, check
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import first_seen
 from grader.measure.numbering import published
-from grader.checks.need import Published, Recorded
+from grader.checks.need import PUBLISHED, Recorded
 from grader.findings.wording import code, counted, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.wrong_value import MISREAD, was_integer
@@ -64,7 +64,7 @@ Tolerance = Annotated[float, QuantityOf(Dimension.ANGLE, minimum=0.0, exclusive=
 class Answers(Parameters):
     """Parameters of rotation.answers."""
 
-    needs = (Recorded(), Published())
+    needs = (Recorded(), PUBLISHED)
 
     stimulus: TopicName = Field(description="Topic on which the probe sends what to convert.")
     topic: TopicName = Field(description="Topic on which the node answers.")

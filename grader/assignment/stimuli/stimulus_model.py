@@ -84,9 +84,15 @@ class StimulusModel(Model):
         return True
 
     @property
+    def subject(self) -> str:
+        """Its topic, service, action or node, or another name that checks call it by."""
+        return str(getattr(self, self.key))
+
+    @property
     def exchanged(self) -> tuple[str, str] | None:
         """The topic, service or action that it uses, and its type; or None."""
-        return None
+        interface = getattr(self, "type", None)
+        return None if interface is None else (getattr(self, self.key), interface)
 
     def order(self, making: Making) -> dict[str, Any]:
         """The order for the cell as plain JSON; ``kind`` names the ``order_type`` that plays it.

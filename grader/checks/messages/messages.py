@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if, toleranced
-from grader.checks.need import Published, Recorded
+from grader.checks.need import PUBLISHED, Recorded
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import explain
 from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
@@ -48,7 +48,7 @@ class Count(Parameters):
     """Parameters of messages.count."""
 
     about = ("published", "subscription")
-    needs = (Recorded(), Published())
+    needs = (Recorded(), PUBLISHED)
 
     topic: TopicName = Field(description="Fully qualified topic name.")
     exactly: int | None = Field(None, ge=0, description="Exact number of messages.")

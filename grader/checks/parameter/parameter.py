@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.need import Doubt, ParameterSet, ParametersRead
+from grader.checks.need import Doubt, ParameterSet, Stimulated
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_parameter import (
     answered_at,
@@ -50,7 +50,11 @@ class OfParameter(Parameters):
 class Declared(OfParameter):
     """Parameters of parameter.declared."""
 
-    needs = (ParametersRead(),)
+    needs = (
+        Stimulated(
+            "node", "reads or sets the parameters of", ("read_parameters", "set_parameters")
+        ),
+    )
 
     type: Type | None = Field(None, description="Its type; by default any.")
     default: Any = Field(

@@ -9,7 +9,7 @@ from statistics import median
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.need import Published, Recorded
+from grader.checks.need import PUBLISHED, Recorded
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_messages import why_not_sent, why_silent
@@ -46,7 +46,7 @@ def answers_to(
 class Latency(Parameters):
     """Parameters of timing.latency."""
 
-    needs = (Recorded(), Published())
+    needs = (Recorded(), PUBLISHED)
 
     stimulus: TopicName = Field(description="Topic that a stimulus publishes on.")
     topic: TopicName = Field(description="Topic that the node answers on.")

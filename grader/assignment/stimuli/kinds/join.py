@@ -37,9 +37,9 @@ class Join(StimulusModel):
     depth: int = Field(100, ge=1, le=10_000, description="Queue depth of the subscription.")
 
     @property
-    def exchanged(self) -> tuple[str, str]:
-        """The topic and its type."""
-        return self.join, self.type
+    def subject(self) -> str:
+        """Its own name: several may be on one topic."""
+        return self.name
 
     def order(self, making: Making) -> dict[str, Any]:
         """The subscription."""

@@ -120,11 +120,6 @@ class Publish(StimulusModel):
         """Whether it publishes a last message."""
         return self.message is None or self.every is None or self.count is not None
 
-    @property
-    def exchanged(self) -> tuple[str, str]:
-        """The topic and its type."""
-        return self.publish, self.type
-
     def order(self, making: Making) -> dict[str, Any]:
         """The messages with their times."""
         due = list(self.due(making))

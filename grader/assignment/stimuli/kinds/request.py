@@ -105,11 +105,6 @@ class CallService(StimulusModel):
         """Every request, in order."""
         return self.requests or ((self.request or {},) * (self.count or 1))
 
-    @property
-    def exchanged(self) -> tuple[str, str]:
-        """The service and its type."""
-        return self.call, self.type
-
     def order(self, making: Making) -> dict[str, Any]:
         """The requests."""
         requests = [
@@ -163,6 +158,11 @@ class SetParameters(StimulusModel):
     after: _After = 0.0
     within: _Within = 2.0
 
+    @property
+    def subject(self) -> str:
+        """The node."""
+        return self.node
+
     def order(self, making: Making) -> dict[str, Any]:
         """The node, and what is set."""
         drawn = dict(making.drawn)
@@ -206,11 +206,6 @@ class SendGoal(StimulusModel):
     )
     preempt: bool = Field(False, description="Send the goal while the previous goal is executed.")
     within: Duration = Field(10.0, description="How long to wait for its result.")
-
-    @property
-    def exchanged(self) -> tuple[str, str]:
-        """The action and its type."""
-        return self.send_goal, self.type
 
     def order(self, making: Making) -> dict[str, Any]:
         """The goal."""

@@ -127,11 +127,6 @@ class Serve(StimulusModel):
         """Whether its type is a service; the first kind, and else an action."""
         return cls.folder == "action" or "/srv/" in str(value.get("type"))
 
-    @property
-    def exchanged(self) -> tuple[str, str]:
-        """The service or action, and its type."""
-        return self.serve, self.type
-
     def order(self, making: Making) -> dict[str, Any]:
         """The server and what it answers."""
         if f"/{self.folder}/" not in self.type:
