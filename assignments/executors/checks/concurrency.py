@@ -53,12 +53,6 @@ def not_judged(
     recording: Recording, expected: str, observed: str, *, prevented: bool, at_once: int = 2
 ) -> Finding | None:
     """The finding where it is not the student's fault that callbacks did not run together."""
-    if _has_one_thread_for_one_cpu(recording):
-        return Finding.error(
-            expected,
-            f"{observed}: this machine has one CPU, so MultiThreadedExecutor() has one thread; "
-            "grade on a machine with two CPUs or more",
-        )
     if prevented and not _lacks_threads(recording, at_once):
         return Finding.to_repeat(
             expected, f"{observed}, but the machine took the time from the process"
@@ -83,12 +77,6 @@ def kept_apart(recording: Recording, runs: Iterable[Run]) -> bool:
 def _lacks_threads(recording: Recording, at_once: int) -> bool:
     """Whether all that was spun is one executor of fewer threads: that kept them apart."""
     return len(recording.declared("spin")) == 1 and 0 < threads(recording) < at_once
-
-
-def _has_one_thread_for_one_cpu(recording: Recording) -> bool:
-    return recording.environment.get("cpus") == "1" and any(
-        name == "MultiThreadedExecutor" and number == 1 for name, number in executors(recording)
-    )
 
 
 def allows(recording: Recording) -> bool:

@@ -130,8 +130,7 @@ def overlap(recording: Recording, parameters: Overlapping) -> Finding:
     apart, a busy machine is no excuse.
 
     A MultiThreadedExecutor takes as many threads as there are CPUs; the grader gives it four at
-    least, and os.cpu_count() says so. If that is not possible and the machine has one CPU, this
-    cannot be judged. It then costs no points.
+    least, and os.cpu_count() says so.
     """
     expected = (
         f"{codes(parameters.callbacks)} running at the same time as "

@@ -40,9 +40,6 @@ def together(recording: Recording, parameters: Together) -> Finding:
 
     All of the callbacks overlap at least `at_least` times, for `by` or longer. Judged by their
     reports on the wire; the executor that the process declared only helps to explain.
-
-    If a MultiThreadedExecutor has one thread because the machine has one CPU, this cannot be
-    judged. It then costs no points.
     """
     names = parameters.callbacks
     times = counted(parameters.at_least, "time")

@@ -528,17 +528,10 @@ class TestOverlap:
         words = failed("overlap", subject, ["chatter"], others=list(TIMERS))
         assert "3 callbacks can run at once only if the executor has 3 threads or more" in words
 
-    def test_a_machine_with_one_cpu_is_our_fault(self):
+    @pytest.mark.parametrize("cpus", ["1", "2"])
+    def test_one_thread_is_the_students_choice(self, cpus):
         spin = declared("spin", executor="MultiThreadedExecutor", threads=1)
-        subject = run(*serial(), declarations=(spin,), environment={"cpus": "1"})
-        finding = self.overlap(subject)
-        assert finding.status is Status.ERROR
-        assert "this machine has one CPU" in finding.observed
-        assert not finding.disturbed
-
-    def test_one_thread_of_several_cpus_is_the_students_choice(self):
-        spin = declared("spin", executor="MultiThreadedExecutor", threads=1)
-        subject = run(*serial(), declarations=(spin,), environment={"cpus": "2"})
+        subject = run(*serial(), declarations=(spin,), environment={"cpus": cpus})
         assert self.overlap(subject).status is Status.FAILED
 
     def test_what_the_machine_took_is_our_fault(self):
@@ -635,11 +628,6 @@ class TestTogether:
         disturbed = taken(1.55, 1.8, waited_s=0.3)
         subject = run(*self.two_threads(), disturbance=disturbed)
         assert judged("together", subject, self.ALL).status is Status.FAILED
-
-    def test_a_machine_with_one_cpu_is_our_fault(self):
-        spin = declared("spin", executor="MultiThreadedExecutor", threads=1)
-        subject = run(*serial(), declarations=(spin,), environment={"cpus": "1"})
-        assert judged("together", subject, self.ALL).status is Status.ERROR
 
     def test_without_reports_it_says_why(self):
         assert "chatter" in failed("together", run(*only(parallel(), *TIMERS)), self.ALL)
