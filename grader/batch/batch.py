@@ -15,6 +15,7 @@ from grader.batch.executor import BatchExecutor, ExecutorLost
 from grader.batch.files import write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.batch.handed_in import HandedIn
+from grader.batch.last_attempt import EARLIER
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import find, regrade, regrade_command
 from grader.errors import GraderFault, RosgradeError, UsageError, machine_fault
@@ -26,7 +27,6 @@ from grader.report.model.result_model import Result
 from grader.spec.nearest_name import did_you_mean
 from grader.submission.intake.locate import NO_FILES
 from grader.submission.intake.paths import shown
-from grader.submission.kept_source import SOURCE_FOLDER
 from grader.submission.prepare import fingerprint
 
 FAULTS_FILE = "faults.log"
@@ -209,20 +209,13 @@ class Batch:
         known, original = map(self.ledger.whole_result, (twin.key, key))
         if known and original and grade_json(known) == grade_json(original):
             return
-        found = find(self.ledger.folder(key))
-        record = replace(found.submission, id=twin.key)
         partial = self.ledger.partial(twin.key)
-        recordings = partial / RECORDINGS_FOLDER
-        recordings.mkdir()
-        for file in found.files.values():
-            shutil.copyfile(file, recordings / file.name)
-        write_whole(recordings / SUBMISSION_FILE, to_json(record))
-        source = self.ledger.folder(key) / SOURCE_FOLDER
-        if source.is_dir():
-            shutil.copytree(source, partial / SOURCE_FOLDER)
-        graded = regrade(self.loaded, replace(found, submission=record))
-        files = {scenario: recordings / file.name for scenario, file in found.files.items()}
-        write_graded(replace(graded, files=files), partial, Clock())
+        history = shutil.ignore_patterns(EARLIER)
+        shutil.copytree(self.ledger.folder(key), partial, dirs_exist_ok=True, ignore=history)
+        found = find(partial)
+        record = replace(found.submission, id=twin.key)
+        write_whole(partial / RECORDINGS_FOLDER / SUBMISSION_FILE, to_json(record))
+        write_graded(regrade(self.loaded, replace(found, submission=record)), partial, Clock())
         self.ledger.put(twin.key, partial)
 
     def _keep_attempts(self, earlier: Mapping[str, Entry]) -> None:
