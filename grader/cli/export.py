@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,7 +14,6 @@ from grader.findings.wording import counted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from grader.report.model.class_row import RowStatus
 
 Folder = Annotated[Path, typer.Option("--out", help="Folder to write to.")]
 Results = Annotated[Path, typer.Argument(help="Folder with the reports of a class.")]
@@ -29,22 +27,6 @@ Tag = Annotated[
     ),
 ]
 
-
-class Zero(str, Enum):
-    """What was never run."""
-
-    UNREADABLE = "unreadable"
-    MISSING = "missing"
-
-
-ZeroFor = Annotated[
-    list[Zero] | None,
-    typer.Option(
-        "--zero",
-        help="Give 0 points for unreadable or missing submissions; otherwise they have no score. "
-        "May be repeated.",
-    ),
-]
 
 app = typer.Typer(
     help="Write files for other systems: autograders and gradebooks.",
@@ -111,7 +93,7 @@ def course(
 
 
 @app.command()
-def csv(out: Results, output: File = Path("grades.csv"), zero: ZeroFor = None) -> None:
+def csv(out: Results, output: File = Path("grades.csv")) -> None:
     """Write a CSV with a row for each submission and a column for each check.
 
     For the folder of a batch, it has the columns and the rows of its grades.csv.
@@ -122,7 +104,7 @@ def csv(out: Results, output: File = Path("grades.csv"), zero: ZeroFor = None) -
 
     refuse_inputs([output], _read_of(out))
     rows = read_class(out)
-    write_whole(output, grades_csv(rows, _statuses(zero)))
+    write_whole(output, grades_csv(rows))
     graded = sum(row.graded for row in rows)
     say(f"{output}: {len(rows)} submissions, {graded} of them graded")
 
@@ -138,7 +120,6 @@ def canvas(
         str | None,
         typer.Option(help="Title of the assignment in Canvas; by default the assignment's id."),
     ] = None,
-    zero: ZeroFor = None,
     comments: Annotated[
         Path | None,
         typer.Option(help='Also write comments: a zip for "Upload Submissions" in Canvas.'),
@@ -161,7 +142,7 @@ def canvas(
     except UnicodeDecodeError as error:
         raise UsageError(f"{canvas}: is not UTF-8: give the file as Canvas exported it") from error
     export = read_canvas(text, str(canvas))
-    filled = canvas_csv(read_class(out), export, column, _statuses(zero))
+    filled = canvas_csv(read_class(out), export, column)
     write_whole(output, filled.text)
     say(f"{output}: {len(filled.scored)} scores")
     for doubt in filled.doubts:
@@ -251,9 +232,3 @@ def _read_of(out: Path) -> list[Path]:
     from grader.batch.ledger import BATCH_FILE
 
     return [out / BATCH_FILE, *(folder / RESULT_FILE for folder in find_reports(out))]
-
-
-def _statuses(zero: list[Zero] | None) -> set[RowStatus]:
-    from grader.report.model.class_row import RowStatus
-
-    return {RowStatus(one.value) for one in zero or ()}

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from grader.errors import UsageError
 from grader.report.formats.gradebook import canvas_csv, cell, grades_csv, read_canvas
-from grader.report.model.class_row import ClassRow, RowStatus
+from grader.report.model.class_row import ClassRow
 from tests.grade.sample import Told, make_submission
 from tests.report.sample import full_points, judged, lost_points, not_graded
 
@@ -67,8 +67,8 @@ def canvas_reads(text):
     }
 
 
-def fill(class_rows, export=EXPORT, column="ROS 2 Publisher", zero=()):
-    return canvas_csv(class_rows, read_canvas(export), column, zero)
+def fill(class_rows, export=EXPORT, column="ROS 2 Publisher"):
+    return canvas_csv(class_rows, read_canvas(export), column)
 
 
 @pytest.mark.parametrize(
@@ -220,26 +220,19 @@ def test_what_is_not_graded_has_no_score_in_it():
     assert (found["node (2)"], found["depth (1)"], found["max_score"]) == ("2", "", "4")
 
 
-@pytest.mark.parametrize(
-    "zero", [(), (RowStatus.MISSING,), (RowStatus.UNREADABLE, RowStatus.MISSING)]
-)
-def test_no_zero_is_written_for_what_was_never_run_unless_the_instructor_says_so(zero):
+def test_no_score_is_written_for_what_was_never_run():
     never_run = [unreadable("90211"), missing("wng"), row("90213")]
-    scores = ["0" if RowStatus.UNREADABLE in zero else "", "0" if zero else "", "3"]
-    found = records(grades_csv(never_run, zero))
-    assert [(one["status"], one["graded"]) for one in found] == [
-        *(("unreadable", "no"), ("missing", "no"), ("graded", "yes"))
+    found = records(grades_csv(never_run))
+    assert [(one["status"], one["graded"], one["score"]) for one in found] == [
+        *(("unreadable", "no", ""), ("missing", "no", ""), ("graded", "yes", "3"))
     ]
-    assert [one["score"] for one in found] == scores
-    filled = fill(never_run, EXPORT.replace("EX", ""), zero=zero)
+    filled = fill(never_run, EXPORT.replace("EX", ""))
     said = canvas_reads(filled.text)
-    assert [said.get(key, {}).get(TITLE, "") for key in ("90211", "90212", "90213")] == scores
-    problems = (
+    scores = [said.get(key, {}).get(TITLE, "") for key in ("90211", "90212", "90213")]
+    assert scores == ["", "", "3"]
+    assert filled.problems == (
         "90211: unreadable (a.zip: is broken), so the cell is left as it is",
         "wng: handed in nothing, so the cell is left as it is",
-    )
-    assert filled.problems == tuple(
-        p for p, score in zip(problems, scores, strict=False) if not score
     )
 
 
@@ -252,9 +245,7 @@ def test_students_of_the_gradebook_without_any_row_handed_in_nothing():
 
 def test_a_grade_goes_before_what_could_not_be_read():
     both = [unreadable("90211"), row("alopez")]
-    assert canvas_reads(fill(both, zero=[RowStatus.UNREADABLE]).text)["90211"] == {
-        "ROS 2 Publisher (48211)": "3"
-    }
+    assert canvas_reads(fill(both).text)["90211"] == {"ROS 2 Publisher (48211)": "3"}
 
 
 @settings(deadline=None)

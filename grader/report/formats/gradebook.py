@@ -11,7 +11,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
@@ -73,14 +73,11 @@ class CanvasFile:
     doubts: tuple[str, ...]
 
 
-def grades_csv(rows: Sequence[ClassRow], zero: Collection[RowStatus] = ()) -> str:
+def grades_csv(rows: Sequence[ClassRow]) -> str:
     """The gradebook of a class as CSV: a row for each submission, a column for each check.
 
     Then come a column for each manual item and one for each other kind of adjustment that there is.
     What could not be judged is an empty cell, and so is the score of a row without a grade.
-
-    Args:
-        zero: What gets 0 points of the rows without a grade.
     """
     results = [row.result for row in rows if row.result is not None]
     if results:
@@ -108,14 +105,13 @@ def grades_csv(rows: Sequence[ClassRow], zero: Collection[RowStatus] = ()) -> st
             if one.points is not None:
                 name = _column_of(one)[0]
                 sums[name] = total((sums.get(name, 0.0), one.points))
-        score = _score(row, zero)
         table.append(
             [
                 cell(row.id),
                 cell(row.name),
                 "yes" if row.late else "",
                 row.status.value,
-                "" if score is None else number(score),
+                "" if row.score is None else number(row.score),
                 number(row.result.final_max_score) if row.result is not None else "",
                 "yes" if row.graded else "no",
                 *(earned.get(name, "") for name in checks),
@@ -132,11 +128,6 @@ def _column_of(one: AdjustmentPart) -> tuple[str, str]:
         # The column `late` says yes or no.
         return one.kind, f"{one.kind} points"
     return f"manual {one.item}", f"{one.item} ({number(one.max_points)})"
-
-
-def _score(row: ClassRow, zero: Collection[RowStatus]) -> float | None:
-    """Points of a row: those that it was given, else 0 only where the instructor wants that."""
-    return 0.0 if row.score is None and row.status in zero else row.score
 
 
 def read_canvas(text: str, name: str = "the Canvas export") -> CanvasExport:
@@ -183,18 +174,15 @@ def read_canvas(text: str, name: str = "the Canvas export") -> CanvasExport:
 
 
 def canvas_csv(
-    rows: Sequence[ClassRow],
-    export: CanvasExport,
-    column: str | None = None,
-    zero: Collection[RowStatus] = (),
+    rows: Sequence[ClassRow], export: CanvasExport, column: str | None = None
 ) -> CanvasFile:
     """Fill a Canvas gradebook.
+
+    Students of the gradebook that no row fits handed in nothing.
 
     Args:
         column: Title of the assignment in Canvas, with or without its number; by default the
             title of the column that the export has for the assignment's id.
-        zero: What gets 0 points of the rows without a grade. Students of the gradebook that no
-            row fits handed in nothing too.
     """
     results = [row.result for row in rows if row.result is not None]
     assignment = _one_assignment(results)
@@ -215,7 +203,7 @@ def canvas_csv(
             problems.append(f"{who}: not matched, {why} in the gradebook")
             continue
         (student,) = found
-        score, is_excused = _score(row, zero), title in export.excused[student]
+        score, is_excused = row.score, title in export.excused[student]
         # An excused student owes nothing.
         if row.status is RowStatus.MISSING and (student in taken or is_excused):
             continue
