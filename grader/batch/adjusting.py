@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import replace
 from datetime import datetime, timezone
 from functools import cached_property
@@ -10,11 +12,11 @@ from pathlib import Path
 from grader.batch.attempts import attempts_of
 from grader.batch.batch import Done
 from grader.batch.ledger import Entry, Ledger
-from grader.course.attempts import Attempt, Ruled, ruled
+from grader.course.attempts import Ruled, ruled
 from grader.course.late import HandInTime
 from grader.course.load import Course, load_course
 from grader.errors import UsageError
-from grader.report.model.result_model import AttemptPart, Result
+from grader.report.model.result_model import Result
 from grader.report.model.student import VISIBLE_ONLY
 from grader.review.adjust import adjusted
 from grader.review.model import ClassReview
@@ -36,6 +38,9 @@ class ClassAdjustments:
         """
         self._ledger, self._written = ledger, ledger.read()
         self._entries = {entry.key: entry for entry in self._written.entries}
+        self._earlier: dict[str, list[Entry]] = defaultdict(list)
+        for entry in self._written.entries:
+            self._earlier[entry.attempt_of].append(entry)
         self._store = ReviewStore(ledger.out)
         self._now = now or datetime.now(timezone.utc)
         file, assignment = self._written.course, self._written.assignment
@@ -76,18 +81,27 @@ class ClassAdjustments:
         entry = self._entries.get(result.submission.id)
         if entry is None:
             return self._reviewed(result, result.submission.id), ()
-        attempts = [
-            replace(each, result=self._reviewed(each.result, entry.review_key))
-            for each in self._attempts(entry, result)
+        tried = [*self._graded_before(entry), (entry, result)]
+        results = [self._reviewed(each, entry.review_key) for _, each in tried]
+        times = [
+            HandInTime(one.handed_in, one.handed_in_from, one.late, each.started)
+            for one, each in tried
         ]
-        found = self._ruled(entry, attempts)
-        parts: tuple[AttemptPart, ...] = ()
-        if len(attempts) > 1:
-            times = [each.time.at for each in attempts]
-            parts = attempts_of([each.result for each in attempts], times, found.counts)
-        whole = attempts[-1].result
-        update = {"attempts": parts, "adjustments": (*whole.adjustments, *found.lines)}
-        return whole.model_copy(update=update), found.notes
+        found = Ruled(len(tried) - 1)
+        if self._course is not None and not entry.attempt_of:
+            rules = self._course.rules(self._written.assignment, entry.key)
+            found = ruled(results, times, rules)
+        several = len(tried) > 1
+        parts = attempts_of(results, [one.at for one in times], found.counts) if several else ()
+        update = {"attempts": parts, "adjustments": (*results[-1].adjustments, *found.lines)}
+        return results[-1].model_copy(update=update), found.notes
+
+    def _graded_before(self, entry: Entry) -> Iterator[tuple[Entry, Result]]:
+        """The earlier attempts of a row that are graded, first to last."""
+        for one in self._earlier.get(entry.key, ()):
+            result = self._ledger.result(one.key)
+            if result is not None and result.submission.sha256 == one.sha256:
+                yield one, result
 
     def _reviewed(self, result: Result, key: str) -> Result:
         return adjusted(result, self._store.student(key).content, self._of_class)
@@ -95,34 +109,6 @@ class ClassAdjustments:
     @cached_property
     def _of_class(self) -> ClassReview:
         return self._store.of_class().content
-
-    def _ruled(self, entry: Entry, attempts: list[Attempt]) -> Ruled:
-        if self._course is None or entry.attempt_of:
-            return Ruled(len(attempts) - 1)
-        return ruled(attempts, self._course.rules(self._written.assignment, entry.key))
-
-    @cached_property
-    def _earlier(self) -> dict[str, list[Entry]]:
-        """The earlier attempts of each row, first to last: 10 comes after 9."""
-        found: dict[str, list[Entry]] = {}
-        for entry in sorted(self._written.entries, key=lambda one: (len(one.key), one.key)):
-            if entry.attempt_of:
-                found.setdefault(entry.attempt_of, []).append(entry)
-        return found
-
-    def _attempts(self, entry: Entry, result: Result) -> list[Attempt]:
-        """All attempts that are graded, the current one last."""
-        graded = ((one, self._ledger.result(one.key)) for one in self._earlier.get(entry.key, ()))
-        same = [
-            (one, other) for one, other in graded if other and other.submission.sha256 == one.sha256
-        ]
-        return [
-            Attempt(
-                found,
-                HandInTime(one.handed_in, one.handed_in_from, one.late, found.started),
-            )
-            for one, found in (*same, (entry, result))
-        ]
 
 
 def course_of(out: Path, named: Path | None, assignment: str) -> Course | None:

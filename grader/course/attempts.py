@@ -14,14 +14,6 @@ _NOT_COMPARED = "attempts without a grade, or of another version of the assignme
 
 
 @dataclass(frozen=True)
-class Attempt:
-    """One of the times that a student handed in; its result is with what persons add to it."""
-
-    result: Result
-    time: HandInTime
-
-
-@dataclass(frozen=True)
 class Ruled:
     """What the rules of the course make of a student's attempts.
 
@@ -36,22 +28,24 @@ class Ruled:
     notes: tuple[str, ...] = ()
 
 
-def ruled(attempts: Sequence[Attempt], rules: Rules) -> Ruled:
-    """Apply the rules to the attempts of a student, the last of which is the current one."""
-    last, current = len(attempts) - 1, attempts[-1].result
+def ruled(results: Sequence[Result], times: Sequence[HandInTime], rules: Rules) -> Ruled:
+    """Apply the rules to the attempts of a student, the last of which is the current one.
+
+    Args:
+        results: With what persons add to them.
+        times: When each was handed in.
+    """
+    last, current = len(results) - 1, results[-1]
     if current.score is None:
         return Ruled(last)
     rule, most = rules.attempts or Attempts(), current.final_max_score
-    scores = [each.result.known_score or 0.0 for each in attempts]
-    late = [
-        lateness(each.time, rules, most, score)
-        for each, score in zip(attempts, scores, strict=True)
-    ]
+    scores = [each.known_score or 0.0 for each in results]
+    late = [lateness(*each, rules, most) for each in zip(times, scores, strict=True)]
+    version = current.assignment.sha256
     same = [
         at
-        for at, each in enumerate(attempts)
-        if each.result.score is not None
-        and each.result.assignment.sha256 == current.assignment.sha256
+        for at, each in enumerate(results)
+        if each.score is not None and each.assignment.sha256 == version
     ]
     allowed = [at for at in same if rule.at_most is None or at < rule.at_most] or [last]
     allowed = [at for at in allowed if not late[at].closed] or allowed
@@ -59,13 +53,13 @@ def ruled(attempts: Sequence[Attempt], rules: Rules) -> Ruled:
     if rule.counts == "best":
         counts = max(allowed, key=lambda at: (scores[at] - late[at].points, at))
     elif rule.counts == "last before the deadline":
-        in_time = [at for at in allowed if not attempts[at].time.is_late(rules)]
+        in_time = [at for at in allowed if not times[at].is_late(rules)]
         counts = (in_time or allowed)[-1]
     lines = [late[counts].line]
     if counts != last:
         line = AdjustmentPart(
             kind="attempts",
-            title=f"Attempt {counts + 1} of {len(attempts)} counts ({rule.words})",
+            title=f"Attempt {counts + 1} of {len(results)} counts ({rule.words})",
             points=scores[counts] - scores[last],
             reason=f"it has {scores[counts]:g} of {current.known_max_score:g} points, the last "
             f"attempt has {scores[last]:g}",

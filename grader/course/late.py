@@ -77,12 +77,12 @@ class Lateness:
     closed: bool = False
 
 
-def lateness(handed: HandInTime, rules: Rules, max_score: float, score: float) -> Lateness:
+def lateness(handed: HandInTime, score: float, rules: Rules, max_score: float) -> Lateness:
     """What lateness costs.
 
     Args:
-        max_score: All points of the assignment, of which a percentage is taken.
         score: Points before; no more is deducted.
+        max_score: All points of the assignment, of which a percentage is taken.
     """
     moment, note = handed.known(rules)
     if moment is None or utc(moment) <= utc(rules.due):

@@ -6,10 +6,11 @@ from datetime import datetime, timezone
 
 import pytest
 
-from grader.course.attempts import Attempt, Ruled, ruled
+from grader.course.attempts import Ruled, ruled
 from grader.course.late import HandInTime
 from grader.course.load import Rules
 from grader.course.model import Attempts, Late
+from grader.report.model.result_model import Result
 from tests.grade.sample import Told
 from tests.report.sample import judged
 
@@ -18,21 +19,25 @@ ANY = judged([Told("node")]).result
 LATE = Late(per="day", deduct=1.0)
 
 
-def attempt(score: float | None, day: int | None, version: str = "a") -> Attempt:
+def attempt(score: float | None, day: int | None, version: str = "a") -> tuple[Result, HandInTime]:
     """An attempt with some points of 10, handed in at noon of a day of March."""
     result = ANY
     assignment = result.assignment.model_copy(update={"sha256": version})
     changes = {"score": score, "max_score": 10.0, "assignment": assignment}
     time = HandInTime(f"2026-03-{day:02}T12:00:00+00:00" if day else "", "the roster")
-    return Attempt(result.model_copy(update=changes), time)
+    return result.model_copy(update=changes), time
 
 
 def rule(
-    attempts: Attempts | None, *tried: Attempt, late: Late | None = LATE, closes: int | None = None
+    attempts: Attempts | None,
+    *tried: tuple[Result, HandInTime],
+    late: Late | None = LATE,
+    closes: int | None = None,
 ) -> Ruled:
     """Which counts."""
     end = DUE.replace(day=closes) if closes else None
-    return ruled(tried, Rules(DUE, DUE, end, late, attempts))
+    results, times = zip(*tried, strict=True)
+    return ruled(results, times, Rules(DUE, DUE, end, late, attempts))
 
 
 BEST, LAST = Attempts(counts="best"), Attempts(counts="last")

@@ -43,7 +43,7 @@ def cost(by: timedelta, rules: Rules, score: float = 8.0, **about: bool) -> Late
     """What a delay costs, of 10 points."""
     moment = rules.due.astimezone(timezone.utc) + by
     handed = HandInTime(moment.isoformat(), "Gradescope's metadata", **about)
-    return lateness(handed, rules, 10.0, score)
+    return lateness(handed, score, rules, 10.0)
 
 
 def test_a_deduction_says_rule_times_and_source() -> None:
@@ -134,7 +134,7 @@ def test_nothing_is_deducted_on_a_time_that_is_not_known_for_sure() -> None:
             "marked late by the platform, but handed in 2026-03-01 13:00 Europe/Berlin by the",
         ),
     ):
-        found = lateness(handed, rules, 10.0, 8.0)
+        found = lateness(handed, 8.0, rules, 10.0)
         assert (found.points, found.line) == (0, None)
         assert note in found.note if note else found.note == ""
 
