@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -121,7 +120,7 @@ class DaskExecutor:
         """See :class:`BatchExecutor`."""
         done: Future[None] = Future()
         try:
-            parcel = replace(Parcel.of(key, path), given=given)
+            parcel = Parcel.of(key, path, given)
         except RosgradeError as error:
             done.set_exception(error)
             return done

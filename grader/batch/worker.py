@@ -8,7 +8,7 @@ import os
 import tarfile
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from grader import ros
@@ -55,12 +55,11 @@ def grade_into(grading: Grading, key: str, path: Path, folder: Path, given: Give
     write_graded(graded, folder, clock)
 
 
-def pack(folder: Path) -> bytes:
-    """A folder as an uncompressed tar: recordings are compressed already."""
+def pack(path: Path, name: str = ".") -> bytes:
+    """A file or a folder as an uncompressed tar: recordings are compressed already."""
     stream = io.BytesIO()
     with tarfile.open(fileobj=stream, mode="w") as tar:
-        for item in sorted(folder.rglob("*")):
-            tar.add(item, item.relative_to(folder).as_posix(), recursive=False)
+        tar.add(path, name)
     return stream.getvalue()
 
 
@@ -79,30 +78,20 @@ class Parcel:
 
     key: str
     name: str
-    content: bytes
-    is_folder: bool
+    given: Given
+    content: bytes = b""
     refused: Prepared | None = None
-    given: Given = field(default_factory=dict)
 
     @classmethod
-    def of(cls, key: str, path: Path) -> Parcel:
+    def of(cls, key: str, path: Path, given: Given) -> Parcel:
         """Pack what was handed in."""
         try:
             with opened(path) as located:
-                if not path.is_dir():
-                    return cls(key, path.name, path.read_bytes(), False)
-                return cls(key, path.name, pack(located.root), True)
+                packed = pack(located.root if path.is_dir() else path, path.name)
+                return cls(key, path.name, given, packed)
         except SubmissionError as error:
             # A refused archive is not sent: it may be large, and nothing of it will run.
-            return cls(key, path.name, b"", path.is_dir(), refused(path, error))
-
-    def open(self, path: Path) -> None:
-        """Write what was handed in."""
-        if self.is_folder:
-            path.mkdir()
-            unpack(self.content, path)
-        else:
-            path.write_bytes(self.content)
+            return cls(key, path.name, given, refused=refused(path, error))
 
 
 def grade_remotely(order: Order, parcel: Parcel) -> bytes:
@@ -110,10 +99,8 @@ def grade_remotely(order: Order, parcel: Parcel) -> bytes:
     with _held:
         grading = _make_grading(order)
     with Scratch("worker") as temporary:
-        path = temporary / "in" / parcel.name
         folder = temporary / "out"
         folder.mkdir()
-        path.parent.mkdir()
         if parcel.refused is not None:
             clock = Clock()
             prepared = parcel.refused.named(parcel.key)
@@ -121,7 +108,8 @@ def grade_remotely(order: Order, parcel: Parcel) -> bytes:
                 grading.grade_prepared(prepared, folder / RECORDINGS_FOLDER), folder, clock
             )
         else:
-            parcel.open(path)
+            unpack(parcel.content, temporary / "in")
+            path = temporary / "in" / parcel.name
             grade_into(grading, parcel.key, path, folder, parcel.given)
         return pack(folder)
 

@@ -31,10 +31,10 @@ def submission(tmp_path: Path) -> Path:
 
 def sent(path: Path, target: Path) -> Path:
     """What a worker finds."""
-    parcel: Parcel = pickle.loads(pickle.dumps(Parcel.of("ana", path)))
+    parcel: Parcel = pickle.loads(pickle.dumps(Parcel.of("ana", path, {})))
     assert parcel.refused is None
-    parcel.open(target)
-    return target
+    unpack(parcel.content, target)
+    return target / parcel.name
 
 
 def test_a_folder_arrives_with_the_hash_that_it_has_here(submission: Path, tmp_path: Path) -> None:
@@ -47,7 +47,7 @@ def test_an_archive_arrives_as_it_is(submission: Path, tmp_path: Path) -> None:
     file = tmp_path / "ana.zip"
     with zipfile.ZipFile(file, "w") as archive:
         archive.write(submission / "src" / "pkg" / "package.xml", "pkg/package.xml")
-    arrived = sent(file, tmp_path / "arrived.zip")
+    arrived = sent(file, tmp_path / "arrived")
     assert arrived.read_bytes() == file.read_bytes()
 
 
@@ -58,7 +58,7 @@ def test_a_refused_submission_is_not_sent_but_only_its_reason(
     path = submission if kind == "folder" else tmp_path / "ana.zip"
     with (submission / "big.bin" if kind == "folder" else path).open("wb") as big:
         big.truncate(2**30)
-    parcel = Parcel.of("ana", path)
+    parcel = Parcel.of("ana", path, {})
     assert parcel.content == b""
     assert parcel.refused is not None
     assert "256 MiB" in (parcel.refused.record.problem or "")
