@@ -111,14 +111,9 @@ def _report(done: Done, ledger: Ledger | None) -> str | None:
 
 
 def write_class(done: Sequence[Done], ledger: Ledger) -> Path:
-    """Write the gradebook and the overview."""
-    write_whole(ledger.out / GRADES_FILE, grades_csv(class_rows(done, ledger)))
-    return write_overview(done, ledger)
-
-
-def write_overview(done: Sequence[Done], ledger: Ledger) -> Path:
-    """Write the overview of a class, with links to the pages for its instructor."""
+    """Write the gradebook and the overview, with links to the pages for the instructor."""
     rows = class_rows(done, ledger)
+    write_whole(ledger.out / GRADES_FILE, grades_csv(rows))
     overview = ledger.out / OVERVIEW_FILE
     store = ReviewStore(ledger.out)
     found = clusters(rows, store.of_class().content.shares)

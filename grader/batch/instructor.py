@@ -9,7 +9,8 @@ from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.mutant import CPP, LANGUAGES, reference_of
-from grader.batch.class_files import INSTRUCTOR_FOLDER, all_standing, write_overview
+from grader.batch.adjusting import ClassAdjustments
+from grader.batch.class_files import INSTRUCTOR_FOLDER, all_standing, write_class
 from grader.batch.grading import RECORDINGS_FOLDER
 from grader.batch.ledger import Entry, Ledger
 from grader.errors import RosgradeError, UsageError
@@ -101,5 +102,6 @@ def _known(loaded: LoadedAssignment) -> set[int]:
 def _written(ledger: Ledger, name: str, page: str) -> Path:
     file = ledger.out / INSTRUCTOR_FOLDER / name
     write_whole(file, page)
-    write_overview(all_standing(ledger), ledger)
+    adjust = ClassAdjustments(ledger)
+    write_class([adjust.row(one) for one in all_standing(ledger)], ledger)
     return file

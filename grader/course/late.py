@@ -91,7 +91,7 @@ def lateness(handed: HandInTime, score: float, rules: Rules, max_score: float) -
     closed = rules.closes is not None and utc(moment) > utc(rules.closes)
     points, words = score, f"the assignment closed at {shown_time(rules.closes or moment)}"
     if not closed:
-        if late is None or by.total_seconds() <= late.grace or late.is_free:
+        if late is None or by.total_seconds() <= late.grace:
             return Lateness()
         count = _begun(rules.due, moment, late.per)
         most = max_score if late.at_most is None else points_of(late.at_most, max_score)

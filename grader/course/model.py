@@ -59,11 +59,6 @@ class Late(Model):
     grace: DurationOrZero = Field(0.0, description="Lateness that costs nothing.")
     at_most: Deduction | None = Field(None, description="The most that is deducted.")
 
-    @property
-    def is_free(self) -> bool:
-        """Whether lateness costs nothing."""
-        return points_of(self.deduct, 1.0) == 0.0
-
 
 class Tokens(Model):
     """Late tokens: each moves a due time of a student by a day or an hour."""
