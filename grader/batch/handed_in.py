@@ -34,8 +34,8 @@ class HandedIn(Entry):
 
     def of(self, student: Student) -> HandedIn:
         """The row with what a roster says of its student."""
-        row = replace(self, key=student.key, name=student.name, email=student.email)
-        return replace(row, columns=student.columns).with_problem(student.problem)
+        known = replace(self, key=student.key, name=student.name, email=student.email)
+        return replace(known, columns=student.columns)
 
     def at(self, time: tuple[str, str]) -> HandedIn:
         """The row with when it was handed in, and what tells that."""

@@ -6,7 +6,7 @@ import csv
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from grader.course.load import written
@@ -34,7 +34,6 @@ class Student:
     email: str = ""
     name: str = ""
     submission: str = ""
-    problem: str = ""
     columns: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @property
@@ -154,6 +153,4 @@ def _collect(
         known = students.setdefault(written(student.key), student)
         if known is not student:
             problems.append(f"row {number}: {student.key} is in row {known.row} already")
-            again = known.problem or f"in the roster again in row {number}"
-            students[written(student.key)] = replace(known, problem=again)
     return Roster(tuple(students.values()), tuple(problems))
