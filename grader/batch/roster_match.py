@@ -35,23 +35,19 @@ class _Names:
         It is what most of the names share; where they share several, logins of the roster must
         stand behind only one of them, more than once.
         """
-        known: dict[str, int] = {}
-        shared: Counter[str] = Counter()
-        for stem in stems:
-            parts = stem.split("-")[:_MOST_HYPHENS]
-            for end in range(1, len(parts)):
-                prefix = "-".join(parts[:end]) + "-"
-                shared[prefix] += 1
-                if self._by_login(stem[len(prefix) :]):
-                    known[prefix] = known.get(prefix, 0) + 1
+        hyphens = ((stem, at) for stem in stems for at, sign in enumerate(stem) if sign == "-")
+        shared = Counter(stem[: at + 1] for stem, at in hyphens)
         most = max(shared.values(), default=0)
-        found = [prefix for prefix, count in shared.items() if count == most > 1]
-        if most <= len(stems) / 2:
+        if most <= max(1, len(stems) / 2):
             return ""
-        fitting = [prefix for prefix in found if prefix in known]
-        if len(fitting) != 1 or (len(found) > 1 and known[fitting[0]] == 1):
-            return ""
-        return fitting[0]
+        known = {
+            prefix: sum(bool(self._login_behind(prefix, stem)) for stem in stems)
+            for prefix, count in shared.items()
+            if count == most
+        }
+        fitting = [prefix for prefix, count in known.items() if count]
+        is_sure = len(fitting) == 1 and (len(known) == 1 or known[fitting[0]] > 1)
+        return fitting[0] if is_sure else ""
 
     def exact(self, entry: HandedIn) -> set[str]:
         """Students with exactly its names; several where two of its names contradict each other."""
@@ -64,12 +60,7 @@ class _Names:
                 if written(form) in student.logins or written(form) in student.names
             }
             keys = keys & found or keys | found
-        if keys:
-            return keys
-        stem = stem_of(entry.item)
-        if self._prefix and stem.startswith(self._prefix):
-            return self._by_login(stem.removeprefix(self._prefix))
-        return set()
+        return keys or self._login_behind(self._prefix, stem_of(entry.item))
 
     def alike(self, entry: HandedIn) -> set[str]:
         """Students with a name that is written alike, or with which the entry's name ends."""
@@ -78,8 +69,10 @@ class _Names:
         forms = map(resemblance, (*entry.names, *ends))
         return {student.key for form in forms for student in self._alike.get(form, ())}
 
-    def _by_login(self, login: str) -> set[str]:
-        alike = self._alike.get(resemblance(login), ())
+    def _login_behind(self, prefix: str, stem: str) -> set[str]:
+        """The student whose login stands behind the prefix of a repository's name."""
+        login = stem.removeprefix(prefix)
+        alike = self._alike.get(resemblance(login), ()) if login != stem else ()
         return {student.key for student in alike if written(login) in student.logins}
 
 
