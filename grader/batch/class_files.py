@@ -134,7 +134,12 @@ def find_reports(out: Path) -> tuple[Path, ...]:
     if (out / RESULT_FILE).is_file():
         return (out,)
     if (out / BATCH_FILE).is_file():
-        return _of_batch(Ledger(out))
+        ledger = Ledger(out)
+        graded = (one.entry.key for one in all_standing(ledger) if one.result is not None)
+        found = tuple(sorted(map(ledger.folder, graded)))
+        if not found:
+            raise UsageError(f"{out}: nothing of this batch is graded yet")
+        return found
     inside = sorted(file.parent.relative_to(out) for file in out.rglob(RESULT_FILE))
     found = tuple(out / path for path in inside if "/." not in f"/{path}")
     if not found:
@@ -142,20 +147,10 @@ def find_reports(out: Path) -> tuple[Path, ...]:
     return found
 
 
-def _of_batch(ledger: Ledger) -> tuple[Path, ...]:
-    graded = (one.entry for one in all_standing(ledger) if one.result is not None)
-    found = [ledger.folder(entry.key) for entry in graded]
-    if not found:
-        raise UsageError(f"{ledger.out}: nothing of this batch is graded yet")
-    return tuple(sorted(found))
-
-
 def read_class(out: Path) -> list[ClassRow]:
     """The rows of the class at a path; of a folder of single reports, a row for each."""
     if (out / BATCH_FILE).is_file():
         ledger = Ledger(out)
-        # Refuses a batch without a grade.
-        _of_batch(ledger)
         adjust = ClassAdjustments(ledger)
         return class_rows([adjust.row(row) for row in all_standing(ledger)], ledger)
     results = (for_class(read_result(folder / RESULT_FILE)) for folder in find_reports(out))

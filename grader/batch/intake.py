@@ -58,10 +58,6 @@ def take_in(
     if not entries:
         raise UsageError(f"{source}: holds no submission; expected one folder or archive for each")
     rows = matched(entries, roster) if roster else entries
-    return _complete(rows, staging, course)
-
-
-def _complete(rows: list[HandedIn], staging: Path, course: Course | None) -> list[HandedIn]:
     return with_groups(timed(unique(rows), staging), course)
 
 
@@ -87,7 +83,7 @@ def take_in_roster(
         if _REPOSITORY.match(student.submission):
             cloned.setdefault(student.submission, row)
         on_taken(student.key)
-    return _complete(rows, staging, course)
+    return with_groups(timed(unique(rows), staging), course)
 
 
 def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn | None) -> HandedIn:

@@ -16,7 +16,6 @@ from grader.batch.files import RESULT_FILE, write_report
 from grader.batch.ledger import Ledger
 from grader.batch.regrading import find, regrade, regrade_command, stored_assignment
 from grader.errors import RosgradeError, UsageError
-from grader.grade import Grade
 from grader.report.files import write_whole
 from grader.report.model.result import read_result, result_json
 from grader.report.model.result_model import Result
@@ -77,7 +76,8 @@ def render_again(
         )
     shown = visible_part(loaded) if result.withheld.checks else loaded
     graded = regrade(select(shown, tuple(check.id for check in result.checks)), found)
-    changed = _changed(result, graded.grade)
+    before = {check.id: check.status for check in result.checks}
+    changed = [one.id for one in graded.grade.results if before.get(one.id) is not one.status]
     if changed:
         raise UsageError(
             f"{folder}: judging again does not give the stored result ({', '.join(changed)}). "
@@ -88,8 +88,3 @@ def render_again(
     if now != result:
         write_whole(folder / RESULT_FILE, result_json(now))
     return now
-
-
-def _changed(result: Result, grade: Grade) -> list[str]:
-    before = {check.id: check.status for check in result.checks}
-    return [one.id for one in grade.results if before.get(one.id) is not one.status]

@@ -23,10 +23,6 @@ _INTERFACES = "share/ament_index/resource_index/rosidl_interfaces"
 Say = Callable[[str], None]
 
 
-def _silent(_: str) -> None:
-    pass
-
-
 def underlays_of(loaded: LoadedAssignment) -> list[Underlay]:
     """The underlays that an assignment names."""
     return [find_underlay(given, loaded.folder) for given in loaded.assignment.underlays]
@@ -71,11 +67,11 @@ class TypeSupport:
         self._lock = threading.Lock()
         self._found: dict[bool, RosInstallation] = {}
 
-    def student(self, on_build: Say = _silent) -> RosInstallation:
+    def student(self, on_build: Say = lambda _: None) -> RosInstallation:
         """The ROS installation that submissions are built and run with."""
         return self._laid(for_probe=False, on_build=on_build)
 
-    def prefixes(self, on_build: Say = _silent) -> tuple[Path, ...]:
+    def prefixes(self, on_build: Say = lambda _: None) -> tuple[Path, ...]:
         """Install spaces that the probe imports interfaces from, to hear and send messages."""
         laid = self._laid(for_probe=True, on_build=on_build)
         return tuple(path for path in laid.underlays if (path / _INTERFACES).is_dir())
