@@ -10,7 +10,7 @@ from grader.assignment.load import ASSIGNMENT_FILE
 from grader.assignment.model import Package
 from grader.assignment.mutant import PYTHON
 from grader.errors import UsageError
-from grader.report.files import write_whole
+from grader.report.files import check_folder, write_whole
 from grader.report.html.handout import HANDOUT_FILE
 from grader.spec.name import check_id
 from grader.starter import package_files, programs, rendered
@@ -31,6 +31,7 @@ def write_assignment(name: str, folder: Path) -> Path:
     target = folder / name
     if target.exists():
         raise UsageError(f"{target} is there already, and is left as it is: take another id")
+    check_folder(target)
     for path, text in assignment_files(name).items():
         write_whole(target / path, text)
     return target

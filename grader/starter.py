@@ -17,7 +17,7 @@ from grader import resources
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Assignment, Package, Visibility
 from grader.errors import UsageError
-from grader.report.files import write_whole
+from grader.report.files import check_folder, write_whole
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -59,6 +59,7 @@ def write_starter(loaded: LoadedAssignment, folder: Path, *, cpp: bool = False) 
                 f"{place} is there already, and is left as it is: go on with it, or name another "
                 "folder"
             )
+    check_folder(folder)
     for path, text in starter_files(loaded, cpp=cpp).items():
         write_whole(folder / path, text)
     return places
