@@ -158,6 +158,7 @@ class PackageRecord:
         imports: What its Python code imports; tests, launch files and setup.py left aside.
         ros_imports: Those that belong to a ROS package, with its name in ``module``; of a package
             in C++ the packages whose headers it includes and that CMakeLists.txt links.
+        own_headers: A file of its C++ -> a header of its own that the file includes.
         newer_syntax: Other files, that only the Python of ROS 2 Jazzy can parse.
         entry_points: console_scripts: executable -> ``module:function``.
         executables: What the build installed for ``ros2 run``, in ``lib/<package>/``.
@@ -185,6 +186,7 @@ class PackageRecord:
     dependencies: tuple[Dependency, ...] = ()
     imports: tuple[Import, ...] = ()
     ros_imports: tuple[Import, ...] = ()
+    own_headers: tuple[tuple[str, str], ...] = ()
     syntax_errors: tuple[SourceError, ...] = ()
     newer_syntax: tuple[SourceError, ...] = ()
     entry_points: tuple[tuple[str, str], ...] = ()

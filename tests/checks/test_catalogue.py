@@ -118,7 +118,7 @@ PARAMETERS = {
     "log.follows": {"topic": "/cmd_vel", "fields": ["linear.x", "angular.z"]},
     "log.contains": {"text": "ready", "level": "INFO"},
     "log.level": {"at_most": "WARN"},
-    "log.rate": {"text": "ready", "at_least": "0.9 Hz", "at_most": "1.1 Hz"},
+    "log.rate": {"text": "ready", "rate": "1 Hz"},
     "service.exists": {"service": "/enable", "type": "std_srvs/srv/SetBool"},
     "service.responds": {"service": "/enable", "response": {"success": True}},
     "service.concurrent": {"service": "/enable", "takes": "400 ms"},

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from grader.findings.finding import Status
 from grader.grade.runtime_imports import with_runtime_imports
-from grader.submission.record import Dependency, Import, SourceError
+from grader.submission.record import Dependency, Import, SourceError, SourceFile
 from tests.checks.builder import (
     INSTALLED,
     SOURCE,
@@ -169,3 +169,32 @@ def test_a_module_whose_name_is_put_together_is_known_from_a_run():
 def test_what_is_not_the_student_s_own_import_needs_no_entry(run):
     handed_in = submission(package(dependencies=(RCLPY, GEOMETRY)))
     assert with_runtime_imports(handed_in, [run]) == handed_in
+
+
+@pytest.mark.parametrize(
+    ("names", "stars", "passes"),
+    [
+        ({"Twist": "geometry_msgs.msg.Twist"}, (), True),
+        ({"helper": "bot_publisher.helper"}, (), False),
+        ({"drive": "bot_publisher.helper.drive"}, (), False),
+        ({"bot_publisher": "bot_publisher"}, (), False),
+        ({}, ("bot_publisher.helper",), False),
+    ],
+)
+def test_only_the_modules_of_an_executable_count_if_the_author_says_so(names, stars, passes):
+    helper = "src/bot_publisher/bot_publisher/helper.py"
+    subject = package(
+        dependencies=(RCLPY, GEOMETRY),
+        ros_imports=(*package().ros_imports, Import("sensor_msgs", helper, 1)),
+        sources=(
+            SourceFile(SOURCE, "bot_publisher.node", names=tuple(names.items()), stars=stars),
+            SourceFile(helper, "bot_publisher.helper"),
+        ),
+    )
+    assert judged_package(subject).status is Status.FAILED
+    finding = judged_package(subject, executable="bot_pub")
+    assert finding.status is (Status.PASSED if passes else Status.FAILED)
+
+
+def judged_package(subject, **parameters):
+    return judge("package.dependencies", submission(subject), package=NAME, **parameters)

@@ -98,6 +98,10 @@ class TestDeclared:
     def test_a_scenario_that_never_asks_is_no_students_fault(self):
         assert judge("parameter.declared", recording(), **SPEED).status is Status.ERROR
 
+    def test_a_step_needs_a_range(self):
+        with pytest.raises(ValueError, match="'step' needs a 'range'"):
+            judge("parameter.declared", recording(), **SPEED, step=0.1)
+
 
 def setting(value, after=None, start=0.5, **changes):
     return recording(

@@ -154,9 +154,14 @@ class TestConcurrent:
     def test_calls_worked_on_side_by_side_pass(self):
         run = serving(asked(1.0, 0.4), asked(1.001, 0.41))
         assert judge("service.concurrent", run, **SLOW).status is Status.PASSED
+        one_after_another = {**SLOW, "calls": "one_after_another"}
+        found = failing("service.concurrent", run, **one_after_another)
+        assert "both were processed at the same time" in found
 
-    def test_calls_worked_on_one_after_another_fail(self):
+    def test_calls_worked_on_one_after_another_pass(self):
         run = serving(asked(1.0, 0.4), asked(1.001, 0.8))
+        finding = judge("service.concurrent", run, **SLOW, calls="one_after_another")
+        assert finding.status is Status.PASSED
         found = failing("service.concurrent", run, **SLOW)
         assert "the second call waited until the first was answered" in found
         assert "`SingleThreadedExecutor`" in found

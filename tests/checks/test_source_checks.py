@@ -135,9 +135,11 @@ class TestDocstrings:
             f"{FOLDER}/node.py:3: A.go()",
         ]
 
-    def test_each_must_have_one(self):
+    def test_a_share_is_enough_where_the_yaml_says_so(self):
         run = files(node='def a():\n    """A."""\n\ndef b(): pass\n')
         assert "1 of 2 have a docstring" in failing("source.docstrings", run, **PACKAGE)
+        finding = judge("source.docstrings", run, **PACKAGE, share="50 %")
+        assert finding.status is Status.PASSED
 
     def test_modules_if_asked_for(self):
         run = files(init="", node='def a():\n    """A."""\n')
@@ -169,6 +171,11 @@ class TestTypeHints:
     )
     def test_missing_type_hints_are_named(self, text, words):
         assert words in failing("source.type_hints", files(node=text), **PACKAGE)
+
+    def test_parameters_alone_may_be_asked_for(self):
+        run = files(node="def f(a: int): pass")
+        finding = judge("source.type_hints", run, **PACKAGE, returns=False)
+        assert finding.status is Status.PASSED
 
 
 class TestNoPrint:

@@ -76,10 +76,10 @@ def test_calls_parameters_and_logs_of_one_node(run_node: RunNode) -> None:
     assert (third.request, (third.response or {})["success"]) == ({"data": False}, False)
     (service,) = (item for item in recording.services if item.name == "/enable")
     assert (service.type, service.node) == (SET_BOOL, "/bot")
-    enabled = {"service": "/enable", "request": {"data": True}, "response": {"success": True}}
+    waits = {"service": "/enable", "takes": "200 ms", "calls": "one_after_another"}
     speed = {"node": "bot", "name": "speed"}
     for name, parameters in [
-        ("service.responds", enabled),
+        ("service.concurrent", waits),
         ("parameter.declared", {**speed, "type": "double", "default": 0.5, "range": [0, 1]}),
         ("parameter.declared", {"node": "bot", "name": "names", "default": ["a", "b"]}),
         ("parameter.set", {**speed, "value": 0.75}),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from grader.submission.read.includes import read_included
+from grader.submission.read.cmake import read_commands
+from grader.submission.read.includes import needed_files, read_included
 
 CMAKE = """\
 find_package(ament_cmake REQUIRED)
@@ -49,7 +50,8 @@ PACKAGES = "rclcpp std_msgs geometry_msgs sensor_msgs nav_msgs visualization_msg
 def included(cmake: str = CMAKE, files: dict[str, str] = FILES) -> set[str]:
     found = read_included(files, cmake, "p/CMakeLists.txt", set(PACKAGES.split()).__contains__)
     return {
-        f"{item.module}{'?' if item.optional else ''} {item.file}:{item.line}" for item in found
+        f"{item.module}{'?' if item.optional else ''} {item.file}:{item.line}"
+        for item in found.packages
     }
 
 
@@ -76,6 +78,15 @@ def test_a_header_of_a_package_of_that_name_may_be_its_own() -> None:
         )
         == set()
     )
+
+
+def test_an_executable_needs_its_sources_their_libraries_and_headers() -> None:
+    commands = read_commands(CMAKE)
+    own = read_included(FILES, CMAKE, "p/CMakeLists.txt", lambda _: False).own
+    files, lines = needed_files("one", commands, "p/", own) or (set(), set())
+    assert files >= {"p/src/one.cpp", "p/src/drive.cpp", "p/include/bot/drive.hpp"}
+    assert "p/src/two.cpp" not in files and lines == {6}
+    assert needed_files("script.py", commands, "p/", own) is None
 
 
 def test_an_endless_list_of_includes_is_cut() -> None:

@@ -89,6 +89,10 @@ def is_undisturbed(goal: Goal) -> bool:
     return goal.cancel_after_s is None and not goal.preempted
 
 
+def _is_to_cancel(goal: Goal) -> bool:
+    return goal.cancel_after_s is not None
+
+
 def why_rejected(recording: Recording, goal: Goal) -> Cause | None:
     """Why a goal that should have been accepted was not, or None if it was."""
     if goal.accepted is not False:
@@ -245,8 +249,9 @@ class Result(OfGoals):
     )
     status: str = Field(
         "succeeded",
-        pattern="^(succeeded|aborted)$",
-        description="How the goal ends: `succeeded` or `aborted`; see action.cancels.",
+        pattern="^(succeeded|aborted|canceled)$",
+        description="How the goal ends: `succeeded`, `aborted`, or `canceled` (then the goals with "
+        "`cancel_after` are judged).",
     )
     tolerance: FieldTolerance = EXACT
     within: Duration = Field(description="Longest time from the goal to its result.")
@@ -265,9 +270,12 @@ class Result(OfGoals):
 def result(recording: Recording, parameters: Result) -> Finding:
     """The action ends with the expected result.
 
-    Judged by the results of the accepted goals that were not canceled or preempted.
+    Judged by the results of the accepted goals that were not canceled or preempted; or with
+    `status: canceled` of those that the probe asked to cancel.
     """
-    goals = answered_goals(recording, parameters, is_undisturbed)
+    is_canceled = parameters.status == "canceled"
+    is_judged = _is_to_cancel if is_canceled else is_undisturbed
+    goals = answered_goals(recording, parameters, is_judged)
     for goal in goals:
         stop_if(why_rejected(recording, goal))
         stop_if(_why_no_result(recording, goal, parameters.within))
@@ -282,7 +290,7 @@ def _why_other_status(recording: Recording, goal: Goal, parameters: Result) -> C
         return None
     seen = f"{the_goal(goal)} {goal.status or 'has no status'}"
     is_aborted = goal.status == "aborted"
-    call = {"succeeded": "succeed", "aborted": "abort"}[parameters.status]
+    call = {"succeeded": "succeed", "aborted": "abort", "canceled": "canceled"}[parameters.status]
     raised = why_raised(recording, seen, goal.sent_ns) if is_aborted else None
     return raised or Cause(
         seen,

@@ -18,12 +18,12 @@ from grader.diagnosis.wrong_rhythm import why_paused
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import until_the_end
 from grader.findings.value import EXACT, same
-from grader.findings.wording import code, counted
+from grader.findings.wording import code, counted, percent
 from grader.measure.printed import logged_text, numbers, quote
 from grader.recording.model import NS, LogLine, Recording
 from grader.spec.name import QualifiedNodeName
 from grader.spec.nearest_name import nearest
-from grader.spec.quantity import Frequency
+from grader.spec.quantity import Frequency, Ratio
 from grader.spec.unit import format_duration
 
 Level = Literal["DEBUG", "INFO", "WARN", "ERROR", "FATAL"]
@@ -290,16 +290,30 @@ def level(recording: Recording, parameters: Worst) -> Finding | Cause:
 class Rate(Matching):
     """Parameters of log.rate."""
 
+    rate: Frequency | None = Field(None, description="Expected mean rate.")
+    tolerance: Ratio = Field(0.1, description="How far the mean rate may be from `rate`.")
     at_most: Frequency | None = Field(None, description="Highest mean rate.")
     at_least: Frequency | None = Field(None, description="Lowest mean rate.")
 
     @model_validator(mode="after")
     def _sensible(self) -> Rate:
-        if self.at_most is None and self.at_least is None:
-            raise ValueError("give a bound: at_least, at_most or both")
+        given = (self.at_most, self.at_least)
+        if self.rate is None and given == (None, None):
+            raise ValueError("say how often: rate, at_least or at_most")
+        if self.rate is not None and given != (None, None):
+            raise ValueError("'rate' cannot be used with 'at_least' or 'at_most'")
         return self
 
+    @property
+    def bounds_hz(self) -> tuple[float, float]:
+        """Lowest and highest rate."""
+        if self.rate is not None:
+            return self.rate * (1.0 - self.tolerance), self.rate * (1.0 + self.tolerance)
+        return self.at_least or 0.0, math.inf if self.at_most is None else self.at_most
+
     def _asked(self) -> str:
+        if self.rate is not None:
+            return f"{self.words} at {self.rate:g} Hz (within {percent(self.tolerance)})"
         bounds = {"at least": self.at_least, "at most": self.at_most}
         texts = [f"{name} {hz:g} Hz" for name, hz in bounds.items() if hz is not None]
         return f"{self.words} at {' and '.join(texts)}"
@@ -313,7 +327,7 @@ def rate(recording: Recording, parameters: Rate) -> Finding | Cause:
     than three records, judged by their number in the observed time. With a lowest rate the node
     must log until the end of the observation: the last two periods may be silent.
     """
-    low_hz, high_hz = parameters.at_least or 0.0, parameters.at_most or math.inf
+    low_hz, high_hz = parameters.bounds_hz
     found = parameters.found(recording)
     begin_ns, end_ns = recording.matched_ns or recording.launched_ns, recording.stop_ns
     periods = float(len(found))

@@ -26,6 +26,7 @@ from grader.spec.name import BuildTypes, PackageName
 from grader.spec.nearest_name import nearest
 from grader.submission.read.dependencies import meant
 from grader.submission.read.includes import CODE
+from grader.submission.read.reachable import only_for
 from grader.submission.record import Import, PackageRecord, SourceError, SubmissionRecord
 
 
@@ -150,7 +151,17 @@ _IDLE = {
 class Dependencies(OfPackage):
     """Parameters of package.dependencies."""
 
-    asks = "every ROS package that `{self.package}` imports is in package.xml"
+    needs = (Submitted(executable="executable"),)
+
+    executable: str | None = Field(
+        None,
+        description="Judge only the imports of the modules, or the includes of the sources, that "
+        "this executable needs; by default those of the whole package.",
+    )
+
+    def _asked(self) -> str:
+        whose = f"the executable {code(self.executable)}" if self.executable else code(self.package)
+        return f"every ROS package that {whose} imports is in package.xml"
 
 
 @check("package.dependencies", Subject.SUBMISSION, Dependencies, concept="packages")
@@ -167,6 +178,9 @@ def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Find
     package = existing_package(submission, parameters.package)
     stop_if(why_too_new(package))
     stop_if(_why_unknown_imports(package))
+    if parameters.executable is not None:
+        stop_if(why_no_executable(submission, parameters.package, parameters.executable))
+        package = only_for(package, parameters.executable)
     faults = [*_missing(package), *_unknown(submission, package)]
     if not faults:
         names = sorted({item.module for item in package.ros_imports} - {package.name})

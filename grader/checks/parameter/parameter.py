@@ -63,6 +63,7 @@ class Declared(OfParameter):
     range: tuple[float, float] | None = Field(
         None, description="Lowest and highest value in its descriptor, [low, high]."
     )
+    step: float | None = Field(None, ge=0, description="Step of the range.")
     read_only: bool | None = Field(None, description="Whether it is read-only.")
     described: bool = Field(False, description="Whether its descriptor must have a description.")
 
@@ -70,6 +71,8 @@ class Declared(OfParameter):
     def _consistent(self) -> Declared:
         if self.range is not None and self.range[0] > self.range[1]:
             raise ValueError(f"the lowest value {self.range[0]:g} is above {self.range[1]:g}")
+        if self.step is not None and self.range is None:
+            raise ValueError("'step' needs a 'range'")
         return self
 
     def _asked(self) -> str:
@@ -77,7 +80,7 @@ class Declared(OfParameter):
         if self.default is not None:
             parts.append(f"{wanted_text(self.default)} at first")
         if self.range is not None:
-            parts.append(f"from {_range_words((*self.range, 0.0))}")
+            parts.append(f"from {_range_words((*self.range, self.step or 0.0))}")
         if self.read_only is not None:
             parts.append("read-only" if self.read_only else "not read-only")
         if self.described:
@@ -131,8 +134,8 @@ def _why_other_descriptor(found: Descriptor, parameters: Declared, shown: Eviden
         if (parameters.type, found.type) == ("double", "integer"):
             hint += " 1 is an integer, 1.0 is a double."
         return Cause(f"it is {_article(found.type)}", hint, shown)
-    wanted = parameters.range
-    if wanted and not (found.range and same(wanted, found.range[:2], _TOLERANCE)):
+    wanted = [*(parameters.range or ()), *([] if parameters.step is None else [parameters.step])]
+    if wanted and not (found.range and same(wanted, found.range[: len(wanted)], _TOLERANCE)):
         kind = "IntegerRange" if found.type == "integer" else "FloatingPointRange"
         return Cause(
             f"its range is {_range_words(found.range)}" if found.range else "it has no range",

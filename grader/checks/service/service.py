@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -183,18 +183,23 @@ class Concurrent(Parameters):
         description="Service that a `call` of the scenario calls with `at_once: 2`."
     )
     takes: Duration = Field(description="Processing time of one call.")
+    calls: Literal["side_by_side", "one_after_another"] = Field(
+        "side_by_side", description="How it processes two calls that come at once."
+    )
 
     def _asked(self) -> str:
-        calls = f"calls side by side if they come at once, each in {format_duration(self.takes)}"
-        return f"{code(self.service)} processes {calls}"
+        return (
+            f"{code(self.service)} processes calls {self.calls.replace('_', ' ')} if they come at "
+            f"once, each in {format_duration(self.takes)}"
+        )
 
 
 @check("service.concurrent", Subject.RECORDING, Concurrent, concept="executors")
 def concurrent(recording: Recording, parameters: Concurrent) -> Finding | Cause:
-    """A second call during a slow call is processed at once.
+    """A second call during a slow call is processed as expected.
 
-    Judged by the answers to calls that the probe sent at once: they come together, and not one
-    processing time apart.
+    Judged by the answers to calls that the probe sent at once. Parallel calls are answered
+    together. Calls one after another are answered one processing time apart.
     """
     calls = judged_calls(recording, parameters.service)
     pairs = [
@@ -203,11 +208,12 @@ def concurrent(recording: Recording, parameters: Concurrent) -> Finding | Cause:
         if (second.requested_ns - first.requested_ns) / NS < _TOGETHER * parameters.takes
     ]
     if not pairs:
-        return Cause("the scenario never calls the service twice at once", ours=True)
+        text = "the scenario never calls the service twice at once"
+        return Cause(text, ours=True)
     # Time enough for the slower of both, one after the other.
     stop_if(why_slow(recording, calls, 2.0 * len(calls) * parameters.takes))
     for pair in pairs:
-        stop_if(_why_apart(recording, parameters.takes, pair))
+        stop_if(_why_other_order(recording, parameters, pair))
     observed = f"the answers came {format_duration(max(map(_gap_s, pairs)))} apart"
     return Finding.passed(parameters.asked_for, observed, _evidence(recording, calls))
 
@@ -216,15 +222,19 @@ def _gap_s(pair: tuple[Call, Call]) -> float:
     return abs((pair[1].answered_ns or 0) - (pair[0].answered_ns or 0)) / NS
 
 
-def _why_apart(recording: Recording, takes_s: float, pair: tuple[Call, Call]) -> Cause | None:
-    """Why the answers to two calls at once came one after the other, or None if they did not."""
-    gap_s = _gap_s(pair)
-    if gap_s <= _TOGETHER * takes_s:
+def _why_other_order(
+    recording: Recording, parameters: Concurrent, pair: tuple[Call, Call]
+) -> Cause | None:
+    gap_s, takes_s = _gap_s(pair), parameters.takes
+    side_by_side = parameters.calls == "side_by_side"
+    together, far_apart = gap_s <= _TOGETHER * takes_s, gap_s >= _APART * takes_s
+    if together if side_by_side else far_apart:
         return None
     seen = f"the answers to two calls at once came {format_duration(gap_s)} apart"
     ended_ns = max(call.answered_ns or 0 for call in pair)
     stolen_s = recording.stolen_s(pair[0].requested_ns, ended_ns)
-    if gap_s - stolen_s <= _TOGETHER * takes_s or gap_s < _APART * takes_s:
+    in_doubt = side_by_side and gap_s - stolen_s <= _TOGETHER * takes_s
+    if in_doubt or not (together or far_apart):
         return Cause(
             f"{seen}, so it cannot be judged how they were processed",
             f"Each call should take {format_duration(takes_s)}.",
@@ -233,6 +243,12 @@ def _why_apart(recording: Recording, takes_s: float, pair: tuple[Call, Call]) ->
         )
     executors = sorted({str(item.data.get("executor")) for item in recording.declared("spin")})
     declared = f"; the process declared a {codes(executors)}" if executors else ""
+    if not side_by_side:
+        return Cause(
+            f"{seen}, so both were processed at the same time{declared}",
+            "Give the service a MutuallyExclusiveCallbackGroup, or use rclpy.spin(node).",
+            _evidence(recording, pair),
+        )
     return Cause(
         f"{seen}, so the second call waited until the first was answered{declared}",
         "Spin with a MultiThreadedExecutor, and give the service a ReentrantCallbackGroup: "

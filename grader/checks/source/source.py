@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, field_validator
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.need import RuffRules, Submitted
@@ -18,8 +18,9 @@ from grader.checks.package.package import OfPackage
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_package, why_too_new
 from grader.findings.finding import Evidence, Finding
-from grader.findings.wording import code, codes, counted, listing
+from grader.findings.wording import code, codes, counted, listing, percent
 from grader.spec.nearest_name import nearest
+from grader.spec.quantity import Ratio
 from grader.submission.read.inheritance import NODE, Family, FoundClass
 from grader.submission.read.lint import EXCLUDED
 from grader.submission.record import (
@@ -32,6 +33,7 @@ from grader.submission.record import (
 )
 
 _MOST_PLACES = 20
+_DOTTED = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+")
 _RULE = re.compile(r"[A-Z]+[0-9]*")
 
 
@@ -57,13 +59,23 @@ def _judged_package(submission: SubmissionRecord, name: str) -> PackageRecord:
     return package
 
 
+def _dotted_name(text: str) -> str:
+    if not _DOTTED.fullmatch(text):
+        raise ValueError(f"{text!r} is not a class with its module, such as {NODE!r}")
+    return text
+
+
 class Class(OfPython):
     """Parameters of source.class."""
 
     name: str | None = Field(None, description="Name of the class; by default any.")
+    inherits: Annotated[str, AfterValidator(_dotted_name)] = Field(
+        NODE, description="Class that it inherits, with its module."
+    )
 
     def _asked(self) -> str:
-        return f"{f'the class {code(self.name)}' if self.name else 'a class'} that inherits `Node`"
+        what = f"the class {code(self.name)}" if self.name else "a class"
+        return f"{what} that inherits {code(self.inherits.rpartition('.')[2])}"
 
 
 @check("source.class", Subject.SUBMISSION, Class)
@@ -78,7 +90,7 @@ def class_(submission: SubmissionRecord, parameters: Class) -> Finding:
     family = Family([file for other in submission.packages for file in other.sources])
     classes = [item for item in family.classes if item.file in package.sources]
     named = [item for item in classes if parameters.name in (None, _short(item))]
-    kin = [item for item in named if family.inherits(item, NODE)]
+    kin = [item for item in named if family.inherits(item, parameters.inherits)]
     if not kin:
         stop_if(_why_no_class(family, classes, named, parameters))
     place = _place(kin[0], f"class {kin[0].found.name}")
@@ -89,8 +101,9 @@ def class_(submission: SubmissionRecord, parameters: Class) -> Finding:
 def _why_no_class(
     family: Family, classes: Sequence[FoundClass], named: Sequence[FoundClass], parameters: Class
 ) -> Cause:
+    module, _, base = parameters.inherits.rpartition(".")
     name = parameters.name or "MyClass"
-    hint = f"Write `from rclpy.node import Node` and `class {name}(Node):`."
+    hint = f"Write `from {module} import {base}` and `class {name}({base}):`."
     if not classes:
         return Cause("no class is defined in the package", hint)
     evidence = Evidence(places=tuple(_place(item, _inherits(item)) for item in classes[:10]))
@@ -122,10 +135,28 @@ def _place(item: FoundClass, message: str) -> SourceError:
     return SourceError(item.file.path, item.found.line, message)
 
 
+class _Share(OfPython):
+    """Part of the parameters of source.docstrings and source.type_hints."""
+
+    share: Ratio = Field(1.0, description="Share of them that must have one.")
+
+    @field_validator("share")
+    @classmethod
+    def _possible(cls, share: float) -> float:
+        if not 0.0 < share <= 1.0:
+            raise ValueError("the share must be more than 0 % and at most 100 %")
+        return share
+
+    @property
+    def needed(self) -> str:
+        """The share in words."""
+        return "all" if self.share == 1.0 else f"at least {percent(self.share)} of the"
+
+
 _PLURALS = {"module": "modules", "class": "classes", "function": "functions"}
 
 
-class Docstrings(OfPython):
+class Docstrings(_Share):
     """Parameters of source.docstrings."""
 
     of: tuple[Literal["module", "class", "function"], ...] = Field(
@@ -135,7 +166,7 @@ class Docstrings(OfPython):
     )
 
     def _asked(self) -> str:
-        return f"docstrings of all {listing(_PLURALS[kind] for kind in self.of)}"
+        return f"docstrings of {self.needed} {listing(_PLURALS[kind] for kind in self.of)}"
 
 
 @check("source.docstrings", Subject.SUBMISSION, Docstrings)
@@ -157,7 +188,7 @@ def docstrings(submission: SubmissionRecord, parameters: Docstrings) -> Finding 
         'A docstring is the first statement in the body: """Publish the next command.""" A '
         "comment with # is not one."
     )
-    return _complete(parameters, judged, "a docstring", hint)
+    return _shared(parameters, judged, "a docstring", hint)
 
 
 def _documentable(file: SourceFile) -> Iterator[tuple[str, bool, int, str]]:
@@ -178,10 +209,14 @@ def _is_public(name: str) -> bool:
     return "<locals>" not in parts and not any(part.startswith("_") for part in parts)
 
 
-class TypeHints(OfPython):
+class TypeHints(_Share):
     """Parameters of source.type_hints."""
 
-    asks = "type hints for the parameters and return types of all functions"
+    returns: bool = Field(True, description="Whether return values need a hint too.")
+
+    def _asked(self) -> str:
+        what = "parameters and return types" if self.returns else "parameters"
+        return f"type hints for the {what} of {self.needed} functions"
 
 
 @check("source.type_hints", Subject.SUBMISSION, TypeHints)
@@ -196,27 +231,29 @@ def type_hints(submission: SubmissionRecord, parameters: TypeHints) -> Finding |
         (not lacking, SourceError(file.path, one.line, f"{one.name}(): {lacking}"))
         for file in package.sources
         for one in file.functions
-        for lacking in [_lacking(one)]
+        for lacking in [_lacking(one, parameters.returns)]
     ]
     hint = "Write the types behind the names: `def callback(self, msg: Twist) -> None:`."
-    return _complete(parameters, judged, "every hint", hint)
+    return _shared(parameters, judged, "every hint", hint)
 
 
-def _lacking(one: SourceFunction) -> str:
+def _lacking(one: SourceFunction, returns: bool) -> str:
     missing = codes(one.unannotated)
     init = one.name.rpartition(".")[2] in ("__init__", "__post_init__")
-    if not one.returns and not init:
+    if returns and not one.returns and not init:
         missing = f"{missing} and what it returns" if missing else "what it returns"
     return f"no hint for {missing}" if missing else ""
 
 
-def _complete(
-    parameters: OfPython, judged: Sequence[tuple[bool, SourceError]], what: str, hint: str
+def _shared(
+    parameters: _Share, judged: Sequence[tuple[bool, SourceError]], what: str, hint: str
 ) -> Finding | Cause:
-    """The finding by whether each item has what it needs."""
+    """The finding by the share of items that have what they need."""
     lacking = [place for good, place in judged if not good]
-    observed = f"{len(judged) - len(lacking)} of {len(judged)} have {what}"
-    if judged and not lacking:
+    having = len(judged) - len(lacking)
+    observed = f"{having} of {len(judged)} have {what}"
+    # The small amount is float noise of the product.
+    if judged and having >= parameters.share * len(judged) - 1e-9:
         return Finding.passed(parameters.asked_for, observed)
     first = f"the first without is {lacking[0]}" if lacking else "there is nothing to judge"
     shown = Evidence(places=tuple(lacking[:_MOST_PLACES]))

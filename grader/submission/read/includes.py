@@ -9,6 +9,7 @@ from __future__ import annotations
 import posixpath
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from itertools import islice
 
 from grader.submission.read.cmake import CMakeCommand, read_commands
@@ -27,10 +28,23 @@ _USES = ("ament_target_dependencies", "target_link_libraries")
 _NOT_CODE = ("test/", "tests/")
 
 
+@dataclass(frozen=True)
+class Included:
+    """What a package includes and links.
+
+    Attributes:
+        packages: Other packages that it needs, and where it says so.
+        own: A file of the package -> a header of the package that it includes.
+    """
+
+    packages: tuple[Import, ...] = ()
+    own: tuple[tuple[str, str], ...] = ()
+
+
 def read_included(
     files: Mapping[str, str], cmake: str | None, cmake_file: str, is_package: Callable[[str], bool]
-) -> tuple[Import, ...]:
-    """Other packages that the sources of a package and its CMakeLists.txt need, and where.
+) -> Included:
+    """What the sources of a package and its CMakeLists.txt need.
 
     Args:
         files: Path of each source and header, from the folder of the package -> its text.
@@ -39,9 +53,10 @@ def read_included(
     """
     commands = read_commands(cmake or "")
     if not any(one.name in _PROGRAMS for one in commands):
-        return ()
+        return Included()
     folder = cmake_file.removesuffix("CMakeLists.txt")
     packages: list[Import] = []
+    own: list[tuple[str, str]] = []
     every = (
         (path, *one)
         for path, text in sorted(files.items())
@@ -49,12 +64,51 @@ def read_included(
         for one in _includes(text)
     )
     for path, header, line, optional in islice(every, _MOST):
+        found = _own_header(header, path, files)
         package = header.partition("/")[0]
-        if "/" in header and is_package(package) and not _is_own(header, path, files):
+        if found is not None:
+            own.append((folder + path, folder + found))
+        elif "/" in header and is_package(package):
             packages.append(Import(package, folder + path, line, optional))
     linked = islice(_linked(commands, is_package), _MOST)
     packages += [Import(name, cmake_file, line) for name, line in linked]
-    return tuple(packages)
+    return Included(tuple(packages), tuple(own))
+
+
+def needed_files(
+    program: str, commands: Iterable[CMakeCommand], folder: str, own: Iterable[tuple[str, str]]
+) -> tuple[set[str], set[int]] | None:
+    """Files that a program of a CMakeLists.txt is made of, and lines of the commands about it.
+
+    Args:
+        folder: Of the package, with a slash at its end, or empty.
+
+    Returns:
+        None where CMakeLists.txt does not name the program.
+    """
+    targets = {one.arguments[0]: one for one in commands if one.name in _PROGRAMS and one.arguments}
+    if program not in targets:
+        return None
+    about, pending = {program}, [program]
+    while pending:
+        name = pending.pop()
+        linked = {
+            word
+            for one in commands
+            if one.name == "target_link_libraries" and one.arguments[:1] == (name,)
+            for word in one.arguments
+        }
+        pending += sorted((linked & targets.keys()) - about)
+        about |= linked & targets.keys()
+    files = {folder + word for name in about for word in targets[name].arguments[1:]}
+    pending = sorted(files)
+    while pending:
+        file = pending.pop()
+        more = {header for includer, header in own if includer == file} - files
+        files |= more
+        pending += more
+    lines = {one.line for one in commands if one.name in _USES and {*one.arguments[:1]} & about}
+    return files, lines
 
 
 def _includes(text: str) -> Iterator[tuple[str, int, bool]]:
@@ -79,10 +133,13 @@ def _includes(text: str) -> Iterator[tuple[str, int, bool]]:
                 yield named[1] or named[2], number, any(doubtful for _, doubtful in open_)
 
 
-def _is_own(header: str, includer: str, files: Mapping[str, str]) -> bool:
-    """Whether a header is a file of the package: beside the includer, or in any folder."""
+def _own_header(header: str, includer: str, files: Mapping[str, str]) -> str | None:
+    """The file of the package that a header is: beside the includer, or in any folder."""
     beside = posixpath.normpath(posixpath.join(posixpath.dirname(includer), header))
-    return any(path in (beside, header) or path.endswith(f"/{header}") for path in files)
+    ends = f"/{header}"
+    return next((path for path in (beside, header) if path in files), None) or next(
+        (path for path in files if path.endswith(ends)), None
+    )
 
 
 def _linked(

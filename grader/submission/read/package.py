@@ -154,8 +154,9 @@ class Package:
                         for module, names in providers.items()
                     },
                 ),
-                *included,
+                *included.packages,
             ),
+            own_headers=included.own,
             syntax_errors=tuple(error for error in errors if error.file not in newer),
             newer_syntax=self.newer_syntax,
             description=shown(self.manifest.description),
