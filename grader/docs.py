@@ -68,6 +68,7 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "robot: drives": description.Drive,
         "lidar": description.LidarOptions,
         "odometry": description.OdometryOptions,
+        "odometry: drift": description.DriftOptions,
         "topics": description.Topics,
         "topics: command": description.CommandTopic,
         "topics: odometry": description.OdometryTopic,

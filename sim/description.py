@@ -27,6 +27,7 @@ from grader.spec.quantity import (
     DurationOrZero,
     Frequency,
     QuantityOf,
+    Ratio,
     Speed,
 )
 from grader.spec.source import Model, read_source
@@ -118,8 +119,24 @@ class LidarOptions(Model):
         return self
 
 
+class DriftOptions(Model):
+    """Errors of the wheel odometry, drawn from the seed; by default none."""
+
+    radius: Ratio = Field(
+        0.0, description="Standard deviation of each wheel's radius, constant in a run."
+    )
+    separation: Ratio = Field(
+        0.0, description="Standard deviation of the wheel separation, constant in a run."
+    )
+    slip: LengthOrZero = Field(
+        0.0,
+        description="Standard deviation of a wheel's distance after 1 m; it grows with the square "
+        "root of the distance.",
+    )
+
+
 class OdometryOptions(Model):
-    """The odometry: where the robot is and how it moves, without errors."""
+    """The wheel odometry."""
 
     enabled: bool = Field(True, description="Whether there is one.")
     rate: Rate = Field(30.0, description="Messages per second, at most 100 Hz.")
@@ -130,6 +147,7 @@ class OdometryOptions(Model):
         description="The quaternion is continuous when the robot turns, so `w` can be negative. By "
         "default `w` is never negative. Both mean the same rotation.",
     )
+    drift: DriftOptions = Field(default_factory=DriftOptions, description="Errors.")
     starts: DurationOrZero = Field(0.0, description="No odometry before this time.")
     stops: DurationOrZero | None = Field(None, description="No odometry from this time on.")
 

@@ -22,7 +22,7 @@ from sensor_msgs.msg import LaserScan
 from sim.description import OdometryOptions, SimulatorOptions, TopicOptions
 from sim.lidar import Lidar, Scan
 from sim.motion import NS, Pose
-from sim.simulation import OdometrySample
+from sim.odometry import OdometrySample
 
 _VARIANCES = (1e-5, 1e-5, 1e12, 1e12, 1e12, 1e-3)
 """As of Gazebo Classic's diff drive (m² and rad²): wheels cannot measure z, roll and pitch."""

@@ -2,9 +2,9 @@
 
 Sources of the figures:
 
-- Speeds: ROBOTIS e-Manual, TurtleBot3, "Features", Hardware Specifications
+- Speeds, wheel separation: ROBOTIS e-Manual, TurtleBot3, "Features", Hardware Specifications
   (https://emanual.robotis.com/docs/en/platform/turtlebot3/features/).
-- Linear acceleration 1.0 m/s²: the DiffDrive system in
+- Wheel separation and radius again, linear acceleration 1.0 m/s²: the DiffDrive system in
   ``turtlebot3_gazebo/models/turtlebot3_{burger,waffle}/model.sdf`` of
   ROBOTIS-GIT/turtlebot3_simulations. That file leaves braking and turning unlimited; here the
   same limit holds for braking (our choice: a robot that stops within one step would teach
@@ -44,10 +44,11 @@ class RobotModel:
     name: str
     limits: RobotLimits
     radius_m: float
+    wheel_separation_m: float
 
 
-BURGER = RobotModel("burger", RobotLimits(0.22, 2.84, 1.0, 3.2), 0.10)
-WAFFLE = RobotModel("waffle", RobotLimits(0.26, 1.82, 1.0, 3.2), 0.22)
+BURGER = RobotModel("burger", RobotLimits(0.22, 2.84, 1.0, 3.2), 0.10, 0.160)
+WAFFLE = RobotModel("waffle", RobotLimits(0.26, 1.82, 1.0, 3.2), 0.22, 0.287)
 MODELS = {model.name: model for model in (BURGER, WAFFLE)}
 
 

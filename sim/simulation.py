@@ -17,6 +17,7 @@ from sim.contact import ContactFinder
 from sim.description import LidarOptions, OdometryOptions, SimulatorOptions
 from sim.lidar import Lidar, Scan
 from sim.motion import NS, REST, Pose, Twist, integrate
+from sim.odometry import OdometrySample, WheelOdometry
 from sim.robot import MODELS, next_velocity
 from sim.world import World
 
@@ -40,15 +41,6 @@ class Event:
 
     kind: EventKind
     text: str
-
-
-@dataclass(frozen=True, slots=True)
-class OdometrySample:
-    """What odometry says at a moment: base_footprint in the frame ``odom``."""
-
-    time_ns: int
-    pose: Pose
-    twist: Twist
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,13 +99,21 @@ class Simulation:
         """Begin at simulated time 0, at rest.
 
         Args:
-            seed: Of the noise of the LiDAR.
+            seed: Of the noise of the LiDAR and the drift of odometry, which are drawn
+                independently of each other.
         """
         self.world, self.options = world, options
         self.model = MODELS[options.robot.model]
         self.lidar = Lidar(world, options.lidar)
         self.pose = options.start(world.start)
-        self._noise = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+        lidar_seed, odometry_seed = np.random.SeedSequence(seed).spawn(2)
+        self._noise = np.random.default_rng(lidar_seed)
+        self._odometry = WheelOdometry(
+            options.odometry,
+            self.pose,
+            self.model.wheel_separation_m,
+            np.random.default_rng(odometry_seed),
+        )
         self._contacts = ContactFinder(world, self.model.radius_m)
         self._scans = Schedule(options.lidar) if options.lidar.enabled else None
         self._samples = Schedule(options.odometry) if options.odometry.enabled else None
@@ -166,7 +166,7 @@ class Simulation:
         if self._scans is not None and self._scans.is_due(time_ns):
             scan = self.lidar.scan(self.pose, time_ns, self._noise)
         if self._samples is not None and self._samples.is_due(time_ns):
-            sample = OdometrySample(time_ns, self.pose, self._motion)
+            sample = self._odometry.sample(time_ns, self.pose, self._motion)
         return Step(
             self._index,
             time_ns,
@@ -213,7 +213,9 @@ class Simulation:
             self._motion = Twist(0.0, angular)
             reached = integrate(pose, linear, angular, STEP_S * contact.share)
             self.pose = Pose(reached.x_m, reached.y_m, self.pose.yaw_rad)
-        self._way_m += abs(linear * STEP_S * contact.share)
+        way_m = linear * STEP_S * contact.share
+        self._way_m += abs(way_m)
+        self._odometry.move(way_m, angular * STEP_S)
         return contact.label
 
 

@@ -15,7 +15,7 @@ def sim(
     options: Annotated[
         Path | None, typer.Option(help="YAML file with robot, lidar, odometry and topics.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of noise.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of noise and drift.")] = 0,
     domain_id: Annotated[
         int | None, typer.Option(help="ROS domain; by default ROS_DOMAIN_ID.")
     ] = None,

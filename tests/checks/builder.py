@@ -42,7 +42,8 @@ from grader.submission.record import (
 from sim.description import SimulatorOptions
 from sim.lidar import Scan
 from sim.motion import Pose, Twist
-from sim.simulation import OdometrySample, Simulation, make_simulation
+from sim.odometry import OdometrySample
+from sim.simulation import Simulation, make_simulation
 from sim.world import parse_world
 
 CHECKS = all_checks()

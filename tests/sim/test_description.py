@@ -53,6 +53,7 @@ lidar:
   noise: 5 mm
   pose: [-3.2 cm, 0, 0]
   stops: 8 s
+odometry: {drift: {radius: 1 %, slip: 2 mm}}
 topics:
   command: {type: geometry_msgs/msg/TwistStamped}
   scan: {reliability: best_effort, depth: 5}
@@ -64,6 +65,7 @@ topics:
     assert options.lidar.no_return is NoReturn.ZERO
     assert options.lidar.pose == Pose(-0.032, 0.0, 0.0)
     assert options.lidar.noise == pytest.approx(0.005)
+    assert options.odometry.drift.slip == pytest.approx(0.002)
     assert options.topics.scan.reliability == "best_effort"
     assert options.topics.command.type.endswith("TwistStamped")
 

@@ -19,6 +19,7 @@ MODEL = st.sampled_from([BURGER, WAFFLE])
 def test_the_models_have_the_figures_of_the_manual() -> None:
     assert (BURGER.limits.speed_m_s, BURGER.limits.angular_speed_rad_s) == (0.22, 2.84)
     assert (WAFFLE.limits.speed_m_s, WAFFLE.limits.angular_speed_rad_s) == (0.26, 1.82)
+    assert (BURGER.wheel_separation_m, WAFFLE.wheel_separation_m) == (0.160, 0.287)
 
 
 @given(MODEL, st.lists(COMMAND, max_size=60))
