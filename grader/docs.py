@@ -69,6 +69,7 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "lidar": description.LidarOptions,
         "odometry": description.OdometryOptions,
         "odometry: drift": description.DriftOptions,
+        "odometry: covariance": description.CovarianceOptions,
         "topics": description.Topics,
         "topics: command": description.CommandTopic,
         "topics: odometry": description.OdometryTopic,
@@ -105,6 +106,8 @@ _EXAMPLES = {
     Dimension.ANGLE: "5 deg",
     Dimension.SPEED: "0.22 m/s",
     Dimension.ANGULAR_SPEED: "90 deg/s",
+    Dimension.ACCELERATION: "0.5 m/s^2",
+    Dimension.ANGULAR_ACCELERATION: "1 rad/s^2",
     Dimension.RATIO: "5 %",
     Dimension.SIZE: "64 MiB",
 }

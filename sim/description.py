@@ -39,6 +39,11 @@ TopicName = Annotated[str, AfterValidator(topic_name)]
 Rate = Annotated[Frequency, Field(le=100.0)]
 LengthOrZero = Annotated[float, QuantityOf(Dimension.LENGTH, minimum=0.0)]
 
+_SPEED = QuantityOf(Dimension.SPEED, minimum=0.0, exclusive=True)
+_ANGULAR_SPEED = QuantityOf(Dimension.ANGULAR_SPEED, minimum=0.0, exclusive=True)
+_ACCELERATION = QuantityOf(Dimension.ACCELERATION, minimum=0.0, exclusive=True)
+_ANGULAR_ACCELERATION = QuantityOf(Dimension.ANGULAR_ACCELERATION, minimum=0.0, exclusive=True)
+
 
 class Layout(str, Enum):
     """Where the beams of a scan begin; they go counter-clockwise in both."""
@@ -56,6 +61,15 @@ class NoReturn(str, Enum):
     """+inf beyond the range, -inf below it (REP-117, Gazebo)."""
     ZERO = "zero"
     """0.0 for both, as the real LDS-01."""
+
+
+class OdometryOrigin(str, Enum):
+    """Where the frame ``odom`` is."""
+
+    WORLD = "world"
+    """At the world's origin (Gazebo Classic)."""
+    START = "start"
+    """Where the robot started (the DiffDrive system of Gazebo Sim)."""
 
 
 class Drive(Model):
@@ -90,6 +104,24 @@ class RobotOptions(Model):
     pose: PoseInPlane | None = Field(
         None, description="Start as [x, y, yaw]; by default the world's `start`."
     )
+    radius: PositiveMetres | None = Field(
+        None, description="Radius of the footprint; by default the model's."
+    )
+    max_speed: Annotated[float, _SPEED] | None = Field(None, description="Instead of the model's.")
+    max_angular_speed: Annotated[float, _ANGULAR_SPEED] | None = Field(
+        None, description="Instead of the model's."
+    )
+    max_acceleration: Annotated[float, _ACCELERATION] | None = Field(
+        None, description="Instead of the model's; for braking too."
+    )
+    max_angular_acceleration: Annotated[float, _ANGULAR_ACCELERATION] | None = Field(
+        None, description="Instead of the model's; for braking too."
+    )
+    command_timeout: Duration | None = Field(
+        None,
+        description="The robot stops after this time without a command. By default the last "
+        "command stays active, as in Gazebo.",
+    )
     drives: tuple[Drive, ...] = Field(
         (), description="Commands in addition to those on its topic; the newest counts."
     )
@@ -107,6 +139,12 @@ class LidarOptions(Model):
     layout: Layout = Field(Layout.FROM_ZERO, description="Range of the beam angles.")
     no_return: NoReturn = Field(NoReturn.INF, description="What a beam without distance reports.")
     noise: LengthOrZero = Field(0.0, description="Standard deviation of a measured distance.")
+    intensities: bool = Field(
+        True,
+        description="Whether `intensities` holds a number for each beam, as from the real LDS-01 "
+        "and in Gazebo: smaller with distance, 0 without a return. Some drivers leave "
+        "it empty.",
+    )
     pose: PoseInPlane = Field(ORIGIN, description="Pose on the robot.")
     frame: str = Field("base_scan", min_length=1, description="`header.frame_id`.")
     starts: DurationOrZero = Field(0.0, description="No scan before this time.")
@@ -135,6 +173,14 @@ class DriftOptions(Model):
     )
 
 
+class CovarianceOptions(Model):
+    """Variances that odometry reports, as in Gazebo Classic's diff drive (m² and rad²)."""
+
+    x: float = Field(1e-5, ge=0.0)
+    y: float = Field(1e-5, ge=0.0)
+    yaw: float = Field(1e-3, ge=0.0)
+
+
 class OdometryOptions(Model):
     """The wheel odometry."""
 
@@ -142,12 +188,20 @@ class OdometryOptions(Model):
     rate: Rate = Field(30.0, description="Messages per second, at most 100 Hz.")
     frame: str = Field("odom", min_length=1, description="`header.frame_id`.")
     child_frame: str = Field("base_footprint", min_length=1, description="`child_frame_id`.")
+    origin: OdometryOrigin = Field(
+        OdometryOrigin.WORLD,
+        description="Origin of `odom`: with `world`, odometry uses the coordinates of the world "
+        "file.",
+    )
     continuous: bool = Field(
         False,
         description="The quaternion is continuous when the robot turns, so `w` can be negative. By "
         "default `w` is never negative. Both mean the same rotation.",
     )
     drift: DriftOptions = Field(default_factory=DriftOptions, description="Errors.")
+    covariance: CovarianceOptions = Field(
+        default_factory=CovarianceOptions, description="Variances that are reported."
+    )
     starts: DurationOrZero = Field(0.0, description="No odometry before this time.")
     stops: DurationOrZero | None = Field(None, description="No odometry from this time on.")
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.description import OdometryOptions
-from sim.motion import Pose, Twist, integrate
+from sim.description import OdometryOptions, OdometryOrigin
+from sim.motion import ORIGIN, Pose, Twist, integrate, relative
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +43,9 @@ class WheelOdometry:
             start: True pose of the robot at the beginning, in the world's frame.
         """
         drift = options.drift
+        self._origin = ORIGIN if options.origin is OdometryOrigin.WORLD else start
         self._is_exact = not (drift.radius or drift.separation or drift.slip)
-        self._belief = start
+        self._belief = relative(self._origin, start)
         self._separation_m = wheel_separation_m
         self._slip_m = drift.slip
         self._random = random
@@ -68,7 +69,11 @@ class WheelOdometry:
         Args:
             pose: The true pose in the world's frame, which exact odometry reports.
         """
-        return OdometrySample(time_ns, pose if self._is_exact else self._belief, twist)
+        if not self._is_exact:
+            pose = self._belief
+        elif self._origin is not ORIGIN:
+            pose = relative(self._origin, pose)
+        return OdometrySample(time_ns, pose, twist)
 
     def _measured(self, way_m: float, factor: float) -> float:
         slip_m = self._slip_m and self._slip_m * self._random.standard_normal()

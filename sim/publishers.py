@@ -24,8 +24,8 @@ from sim.lidar import Lidar, Scan
 from sim.motion import NS, Pose
 from sim.odometry import OdometrySample
 
-_VARIANCES = (1e-5, 1e-5, 1e12, 1e12, 1e12, 1e-3)
-"""As of Gazebo Classic's diff drive (m² and rad²): wheels cannot measure z, roll and pitch."""
+UNKNOWN_VARIANCE = 1e12
+"""Variance of what wheels cannot measure (z, roll, pitch), as Gazebo Classic's diff drive."""
 
 
 def qos_profile(options: TopicOptions) -> QoSProfile:
@@ -50,7 +50,9 @@ class OdometryPublisher:
         self._message.header.frame_id = options.frame
         self._message.child_frame_id = options.child_frame
         self._is_continuous = options.continuous
-        for index, variance in enumerate(_VARIANCES):
+        variances = options.covariance
+        diagonal = (variances.x, variances.y, *[UNKNOWN_VARIANCE] * 3, variances.yaw)
+        for index, variance in enumerate(diagonal):
             self._message.pose.covariance[7 * index] = variance
             self._message.twist.covariance[7 * index] = variance
         self.publisher = _publisher(node, Odometry, topic.topic, topic)
@@ -77,6 +79,7 @@ class ScanPublisher:
 
     def __init__(self, node: Node, topic: TopicOptions, lidar: Lidar) -> None:
         """Create the publisher."""
+        self._has_intensities = lidar.options.intensities
         self._message = LaserScan(
             angle_min=lidar.angle_min_rad,
             angle_max=lidar.angle_max_rad,
@@ -93,7 +96,8 @@ class ScanPublisher:
         _set_time(self._message.header.stamp, stamp_ns)
         # An array('f') is taken over as it is; a list would be checked number by number.
         self._message.ranges = array("f", scan.ranges_m.tobytes())
-        self._message.intensities = array("f", scan.intensities.tobytes())
+        if self._has_intensities:
+            self._message.intensities = array("f", scan.intensities.tobytes())
         self.publisher.publish(self._message)
 
 

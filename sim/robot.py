@@ -17,8 +17,9 @@ Sources of the figures:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from sim.description import RobotOptions
 from sim.motion import Twist
 
 
@@ -50,6 +51,18 @@ class RobotModel:
 BURGER = RobotModel("burger", RobotLimits(0.22, 2.84, 1.0, 3.2), 0.10, 0.160)
 WAFFLE = RobotModel("waffle", RobotLimits(0.26, 1.82, 1.0, 3.2), 0.22, 0.287)
 MODELS = {model.name: model for model in (BURGER, WAFFLE)}
+
+
+def robot_model(options: RobotOptions) -> RobotModel:
+    """The robot that the YAML describes."""
+    model = MODELS[options.model]
+    limits = RobotLimits(
+        options.max_speed or model.limits.speed_m_s,
+        options.max_angular_speed or model.limits.angular_speed_rad_s,
+        options.max_acceleration or model.limits.acceleration_m_s2,
+        options.max_angular_acceleration or model.limits.angular_acceleration_rad_s2,
+    )
+    return replace(model, limits=limits, radius_m=options.radius or model.radius_m)
 
 
 def next_velocity(twist: Twist, command: Twist, dt_s: float, limits: RobotLimits) -> Twist:

@@ -18,7 +18,7 @@ from sim.description import LidarOptions, OdometryOptions, SimulatorOptions
 from sim.lidar import Lidar, Scan
 from sim.motion import NS, REST, Pose, Twist, integrate
 from sim.odometry import OdometrySample, WheelOdometry
-from sim.robot import MODELS, next_velocity
+from sim.robot import next_velocity, robot_model
 from sim.world import World
 
 STEP_NS = 10_000_000
@@ -27,11 +27,12 @@ STEP_S = STEP_NS / NS
 
 
 class EventKind(str, Enum):
-    """Something worth a line in a recording; after a rejected command the robot stops."""
+    """Something worth a line in a recording; after either of a command the robot stops."""
 
     CONTACT_BEGAN = "contact_began"
     CONTACT_ENDED = "contact_ended"
     COMMAND_REJECTED = "command_rejected"
+    COMMAND_TIMEOUT = "command_timeout"
     PUSHED = "pushed"
 
 
@@ -103,7 +104,7 @@ class Simulation:
                 independently of each other.
         """
         self.world, self.options = world, options
-        self.model = MODELS[options.robot.model]
+        self.model = robot_model(options.robot)
         self.lidar = Lidar(world, options.lidar)
         self.pose = options.start(world.start)
         lidar_seed, odometry_seed = np.random.SeedSequence(seed).spawn(2)
@@ -125,6 +126,7 @@ class Simulation:
         self._wheels = REST
         self._motion = REST
         self._command = REST
+        self._commanded_ns: int | None = None
         self._contact: str | None = None
 
     @property
@@ -146,7 +148,8 @@ class Simulation:
         controller drive on blindly, which is harder to notice than a robot that stops.
 
         Args:
-            command: A command that arrived since the last step, or None. It holds until the next.
+            command: A command that arrived since the last step, or None. It holds until the
+                next, unless the robot has a command timeout.
         """
         events: list[Event] = []
         if self._drives and round(self._drives[0].at * NS) <= self.time_ns:
@@ -180,12 +183,20 @@ class Simulation:
         )
 
     def _obey(self, command: Twist | None, events: list[Event]) -> None:
+        timeout_s = self.options.robot.command_timeout
         if command is not None and command.is_finite:
-            self._command = command
+            self._command, self._commanded_ns = command, self.time_ns
         elif command is not None:
-            self._command = REST
+            self._command, self._commanded_ns = REST, None
             text = f"linear {command.linear_m_s}, angular {command.angular_rad_s}"
             events.append(Event(EventKind.COMMAND_REJECTED, text))
+        elif (
+            timeout_s is not None
+            and self._commanded_ns is not None
+            and self.time_ns - self._commanded_ns >= round(timeout_s * NS)
+        ):
+            self._command, self._commanded_ns = REST, None
+            events.append(Event(EventKind.COMMAND_TIMEOUT, f"none for {timeout_s:g} s"))
 
     def _push(self, time_ns: int, events: list[Event]) -> Twist:
         """The velocity that a push adds in the step that ends at a time."""

@@ -75,7 +75,7 @@ def _world(source: Source, place: Place, scenario: Scenario) -> Iterator[Problem
         try:
             world = read_scenario_world(file, world_values(scenario, values))
             start = scenario.robot.pose if scenario.robot.pose is not None else world.start
-            world.check_start(start, MODELS[scenario.robot.model].radius_m)
+            world.check_start(start, scenario.robot.radius or MODELS[scenario.robot.model].radius_m)
         except (AssignmentError, UsageError) as error:
             drawn = ", ".join(f"{name} = {value:g}" for name, value in values.items())
             yield source.problem((*place, "world"), f"{error}{f' (with {drawn})' if drawn else ''}")

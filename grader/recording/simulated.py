@@ -42,7 +42,7 @@ class Incident:
 
     Attributes:
         time_ns: When.
-        kind: ``contact_began``, ``contact_ended``, ``command_rejected``,
+        kind: ``contact_began``, ``contact_ended``, ``command_rejected``, ``command_timeout``,
             ``pushed`` or ``late`` (steps that ran late because of the machine, and were caught
             up).
         text: For people.

@@ -20,6 +20,8 @@ class Dimension(Enum):
     ANGLE = "angle"
     SPEED = "speed"
     ANGULAR_SPEED = "angular speed"
+    ACCELERATION = "acceleration"
+    ANGULAR_ACCELERATION = "angular acceleration"
     RATIO = "ratio"
     SIZE = "size"
 
@@ -37,6 +39,8 @@ UNITS: dict[Dimension, dict[str, float]] = {
     Dimension.ANGLE: {"rad": 1.0, "deg": _DEGREE},
     Dimension.SPEED: {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
     Dimension.ANGULAR_SPEED: {"rad/s": 1.0, "deg/s": _DEGREE},
+    Dimension.ACCELERATION: {"m/s^2": 1.0, "cm/s^2": 1e-2},
+    Dimension.ANGULAR_ACCELERATION: {"rad/s^2": 1.0, "deg/s^2": _DEGREE},
     Dimension.RATIO: {"%": 1e-2},
     Dimension.SIZE: {"B": 1.0, "KiB": 2.0**10, "MiB": 2.0**20, "GiB": 2.0**30},
 }

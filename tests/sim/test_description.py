@@ -46,14 +46,14 @@ def test_the_defaults_are_those_of_turtlebot3_in_gazebo() -> None:
 def test_everything_can_be_set_in_yaml() -> None:
     options = read(
         """
-robot: {model: waffle, pose: [1, 20 cm, 90 deg]}
+robot: {model: waffle, pose: [1, 20 cm, 90 deg], command_timeout: 500 ms}
 lidar:
   layout: -pi..pi
   no_return: zero
   noise: 5 mm
   pose: [-3.2 cm, 0, 0]
   stops: 8 s
-odometry: {drift: {radius: 1 %, slip: 2 mm}}
+odometry: {origin: start, drift: {radius: 1 %, slip: 2 mm}, covariance: {yaw: 0.5}}
 topics:
   command: {type: geometry_msgs/msg/TwistStamped}
   scan: {reliability: best_effort, depth: 5}
@@ -66,12 +66,13 @@ topics:
     assert options.lidar.pose == Pose(-0.032, 0.0, 0.0)
     assert options.lidar.noise == pytest.approx(0.005)
     assert options.odometry.drift.slip == pytest.approx(0.002)
+    assert options.odometry.covariance.yaw == 0.5
     assert options.topics.scan.reliability == "best_effort"
     assert options.topics.command.type.endswith("TwistStamped")
 
 
 def test_options_survive_being_written_and_read() -> None:
-    options = read("robot: {pose: [1, 2, 90 deg]}\nlidar: {noise: 1 cm}")
+    options = read("robot: {pose: [1, 2, 90 deg], max_speed: 1 m/s}\nlidar: {noise: 1 cm}")
     assert SimulatorOptions.model_validate_json(options.model_dump_json()) == options
 
 
@@ -91,6 +92,7 @@ def test_options_survive_being_written_and_read() -> None:
             "robot: {model: bugrer}",
             r"robot.model: expected 'burger' or 'waffle', not 'bugrer'. Did",
         ),
+        ("robot: {max_speed: 0 m/s}", r"robot.max_speed: '0 m/s' is too small: it must be more"),
         ("topics: {scan: {topic: scan}}", r"topics.scan.topic: 'scan' is relative"),
         ("topics: {command: {type: geometry_msgs/msg/Twst}}", r"topics.command.type: expected"),
     ],

@@ -6,9 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sim.description import OdometryOptions
-from sim.motion import REST, Pose, Twist
+from sim.motion import REST, Pose, Twist, relative
 from sim.odometry import WheelOdometry
 
 SEPARATION_M = 0.16
@@ -24,6 +26,16 @@ def test_without_drift_it_is_the_truth_to_the_last_bit() -> None:
     pose, twist = Pose(0.1, 0.2, 0.3), Twist(0.4, 0.5)
     sample = wheels.sample(7, pose, twist)
     assert (sample.time_ns, sample.pose, sample.twist) == (7, pose, twist)
+
+
+@given(
+    st.builds(Pose, st.floats(-5, 5), st.floats(-5, 5), st.floats(-3, 3)),
+    st.builds(Pose, st.floats(-5, 5), st.floats(-5, 5), st.floats(-3, 3)),
+)
+def test_from_the_start_it_is_the_truth_as_seen_from_the_start(start: Pose, pose: Pose) -> None:
+    sample = odometry(start, origin="start").sample(0, pose, REST)
+    assert sample.pose == relative(start, pose)
+    assert odometry(start, origin="start").sample(0, start, REST).pose == Pose(0.0, 0.0, 0.0)
 
 
 def believed(wheels: WheelOdometry, ways: list[tuple[float, float]]) -> Pose:

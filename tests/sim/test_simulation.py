@@ -149,6 +149,21 @@ def test_the_robot_obeys_its_own_drives_at_their_times() -> None:
     assert asked == [(0.0, 0.0)] * 10 + [(0.0, 1.0)] * 40 + [(0.1, 0.0)] * 50
 
 
+def test_with_a_timeout_the_robot_stops_and_it_is_reported_once() -> None:
+    subject = simulation(robot={"command_timeout": "500 ms"})
+    steps = run(subject, 300, lambda i: Twist(0.1, 0.0) if i in (0, 30) else None)
+    told = [
+        step.index
+        for step in steps
+        for event in step.events
+        if event.kind is EventKind.COMMAND_TIMEOUT
+    ]
+    assert told == [81]  # the command came before step 31, which ends at 310 ms
+    assert steps[79].command == Twist(0.1, 0.0)
+    assert steps[-1].command == steps[-1].twist == REST
+    assert subject.advance(Twist(0.1, 0.0)).command == Twist(0.1, 0.0)
+
+
 @pytest.mark.parametrize(
     "command",
     [Twist(math.nan, 0.0), Twist(0.0, math.nan), Twist(math.inf, 0.0), Twist(0.1, -math.inf)],
@@ -178,6 +193,22 @@ def test_beginning_and_end_of_a_contact_are_reported() -> None:
     touching = [step for step in steps if step.contact == "segments[0]"]
     assert len({step.pose for step in touching}) == 1
     assert touching[0].pose.x_m == pytest.approx(0.2, abs=1e-8)
+
+
+def test_the_options_change_the_robot() -> None:
+    options = {
+        "model": "waffle",
+        "radius": "30 cm",
+        "max_speed": "1 m/s",
+        "max_angular_speed": "90 deg/s",
+        "max_acceleration": "2 m/s^2",
+        "max_angular_acceleration": "4 rad/s^2",
+    }
+    model = simulation(robot=options).model
+    assert (model.name, model.radius_m, model.wheel_separation_m) == ("waffle", 0.3, 0.287)
+    limits = model.limits
+    assert (limits.speed_m_s, limits.angular_speed_rad_s) == (1.0, pytest.approx(math.pi / 2))
+    assert (limits.acceleration_m_s2, limits.angular_acceleration_rad_s2) == (2.0, 4.0)
 
 
 def test_the_start_is_that_of_the_scenario_or_else_of_the_world() -> None:
