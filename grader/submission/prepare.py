@@ -23,6 +23,7 @@ from grader.submission.intake.locate import Located, check_path, opened, submiss
 from grader.submission.intake.members import MIB
 from grader.submission.intake.paths import shown
 from grader.submission.kept_source import keep_source
+from grader.submission.read.bag import read_bags
 from grader.submission.read.document import read_headings
 from grader.submission.read.package import Package, read_package, record_packages
 from grader.submission.read.source import Allowance
@@ -178,6 +179,7 @@ def _prepare(
         leftovers=located.leftovers,
         files=tuple(shown(file.path) for file in located.files[:_MOST_PATHS]),
         headings=read_headings(located.root, located.files),
+        bags=read_bags(located.root, located.files),
     )
     if record.problem is not None:
         return Prepared(record, None)

@@ -251,6 +251,30 @@ class BuildRecord:
 
 
 @dataclass(frozen=True)
+class BagTopic:
+    """A topic in a bag."""
+
+    name: str
+    type: str
+    messages: int
+
+
+@dataclass(frozen=True)
+class BagRecord:
+    """A bag as ``ros2 bag record`` writes it.
+
+    Attributes:
+        path: Folder of its metadata.yaml.
+        problem: Why it cannot be read to its end, or None.
+    """
+
+    path: str
+    problem: str | None = None
+    duration_s: float = 0.0
+    topics: tuple[BagTopic, ...] = ()
+
+
+@dataclass(frozen=True)
 class SubmissionRecord:
     """Everything known of a submission before it runs.
 
@@ -259,6 +283,7 @@ class SubmissionRecord:
         leftovers: What builds and runs made and was handed in too, such as ``build``.
         files: Paths of what was handed in; at most 5000.
         headings: Path of each text (Markdown, reStructuredText) -> its headings.
+        bags: Recordings of ``ros2 bag record``.
         build: None where nothing was built.
         given: Variable of the assignment -> its value, from the roster or from `--set`.
     """
@@ -271,6 +296,7 @@ class SubmissionRecord:
     leftovers: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     headings: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    bags: tuple[BagRecord, ...] = ()
     given: tuple[tuple[str, str], ...] = ()
 
     @property

@@ -1,9 +1,14 @@
-"""archive.clean, archive.file and package.manifest."""
+"""archive.clean, archive.file, archive.bag and package.manifest."""
 
 import pytest
 
 from grader.findings.finding import Status
+from grader.submission.record import BagRecord, BagTopic
 from tests.checks.builder import failing, judge, package, submission
+
+TWIST = "geometry_msgs/msg/Twist"
+BAG = BagRecord("bags/run1", None, 12.5, (BagTopic("/cmd_vel", TWIST, 40),))
+WITH_BAG = submission(bags=(BAG,))
 
 
 def test_sources_alone_are_clean():
@@ -45,6 +50,41 @@ def test_one_text_must_have_all_headings():
     other = ("README.md", ("Tests",))
     subject = submission(files=("README.md", "src/bot/README.md"), headings=(other, README))
     failing("archive.file", subject, path="README.md", headings=["Tests", "Design"])
+
+
+def test_a_bag_with_the_topics_passes():
+    finding = judge(
+        "archive.bag", submission(bags=(BAG,)), topics={"/cmd_vel": TWIST}, lasts="10 s"
+    )
+    assert finding.status is Status.PASSED
+    assert "`bags/run1` has 40 messages in 12.5 s" in finding.observed
+
+
+def test_one_good_bag_among_broken_ones_is_enough():
+    broken = BagRecord("bags/run0", "it cannot be read: not a database")
+    assert judge("archive.bag", submission(bags=(broken, BAG))).status is Status.PASSED
+    assert "not a database" in failing("archive.bag", submission(bags=(broken,)))
+
+
+@pytest.mark.parametrize(
+    ("bag", "parameters", "words"),
+    [
+        (
+            BAG,
+            {"topics": {"/odom": "nav_msgs/msg/Odometry"}},
+            "no message on `/odom`; it has `/cmd",
+        ),
+        (BAG, {"topics": {"/cmd_vel": "std_msgs/msg/String"}}, f"has as `{TWIST}` on `/cmd_vel`"),
+        (BAG, {"lasts": "20 s"}, "lasts 12.5 s"),
+        (BagRecord("b", None, 0.0, (BagTopic("/cmd_vel", TWIST, 0),)), {}, "has no message"),
+    ],
+)
+def test_a_bag_that_lacks_something_fails(bag, parameters, words):
+    assert words in failing("archive.bag", submission(bags=(bag,)), **parameters)
+
+
+def test_no_bag_at_all_fails():
+    assert "there is no bag" in failing("archive.bag", submission())
 
 
 FILLED = {

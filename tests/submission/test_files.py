@@ -1,10 +1,14 @@
-"""What is read of the files beside packages: leftovers, headings."""
+"""What is read of the files beside packages: leftovers, headings, bags."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
+from grader.submission.intake.listing import SubmissionFile
 from grader.submission.intake.locate import opened
+from grader.submission.read.bag import read_bags
 from grader.submission.read.document import headings
 from tests.submission.samples import zip_bytes
 
@@ -53,3 +57,42 @@ def test_archives_that_differ_only_in_leftovers_are_two_submissions(tmp_path: Pa
 def test_headings_of_markdown_and_restructuredtext() -> None:
     text = "# Bot #\r\n\n```sh\n# no heading\n```\n## Usage\n\nDesign\n======\n\nTests\n-----\n"
     assert headings(text) == ("Bot", "Usage", "Design", "Tests")
+
+
+@pytest.mark.parametrize("plugin", ["MCAP", "SQLITE3"])
+def test_a_recorded_bag_is_read_to_its_end(tmp_path: Path, plugin: str) -> None:
+    record = read_bags(tmp_path, write_bag(tmp_path, plugin))[0]
+    assert record.problem is None
+    assert record.duration_s == pytest.approx(2.0)
+    assert [(one.name, one.type, one.messages) for one in record.topics] == [
+        ("/chatter", "std_msgs/msg/String", 3)
+    ]
+
+
+def test_a_damaged_bag_says_so(tmp_path: Path) -> None:
+    files = write_bag(tmp_path, "SQLITE3")
+    storage = next(tmp_path.glob("bag/*.db3"))
+    storage.write_bytes(storage.read_bytes()[:4000])
+    assert "cannot be read" in str(read_bags(tmp_path, files)[0].problem)
+
+
+def test_a_bag_whose_recording_did_not_end_says_so(tmp_path: Path) -> None:
+    files = [one for one in write_bag(tmp_path, "MCAP") if "metadata" not in one.path]
+    assert "no metadata.yaml" in str(read_bags(tmp_path, files)[0].problem)
+
+
+def write_bag(root: Path, plugin: str) -> list[SubmissionFile]:
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    kind = "std_msgs/msg/String"
+    with Writer(root / "bag", version=9, storage_plugin=StoragePlugin[plugin]) as writer:
+        connection = writer.add_connection("/chatter", kind, typestore=store)
+        for second in range(3):
+            data = store.serialize_cdr(store.types[kind](data="hello"), kind)
+            writer.write(connection, second * 10**9, bytes(data))
+    return [
+        SubmissionFile(path.relative_to(root).as_posix(), path.stat().st_size)
+        for path in sorted((root / "bag").iterdir())
+    ]

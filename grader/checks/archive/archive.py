@@ -1,4 +1,4 @@
-"""Checks of the files of a submission: leftovers of builds, texts."""
+"""Checks of the files of a submission: leftovers of builds, texts, bags."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ from pydantic import Field
 from grader.checks.check import Parameters, Subject, check
 from grader.diagnosis.cause import Cause
 from grader.findings.finding import Finding
-from grader.findings.wording import code, codes, listing
-from grader.submission.record import SubmissionRecord
+from grader.findings.wording import code, codes, counted, listing
+from grader.spec.name import InterfaceName, TopicName
+from grader.spec.quantity import Duration
+from grader.spec.unit import format_duration
+from grader.submission.record import BagRecord, SubmissionRecord
 
 
 class Clean(Parameters):
@@ -90,3 +93,63 @@ def _missing(parameters: File, headings: tuple[str, ...]) -> list[str]:
         for wanted in parameters.headings
         if not any(wanted.casefold() in heading.casefold() for heading in headings)
     ]
+
+
+class Bag(Parameters):
+    """Parameters of archive.bag."""
+
+    topics: dict[TopicName, InterfaceName] = Field(
+        default_factory=dict, description="Topics with messages in the bag -> their types."
+    )
+    lasts: Duration | None = Field(None, description="Least time from first to last message.")
+
+    def _asked(self) -> str:
+        topics = codes(self.topics)
+        lasts = f" of at least {format_duration(self.lasts)}" if self.lasts is not None else ""
+        return f"a bag{lasts}" + (f" with messages on {topics}" if topics else "")
+
+
+@check("archive.bag", Subject.SUBMISSION, Bag)
+def bag(submission: SubmissionRecord, parameters: Bag) -> Finding:
+    """The submission holds a recorded bag that can be read.
+
+    Judged by reading every message of the bags that `ros2 bag record` wrote, in MCAP or SQLite.
+    """
+    causes = [(one, _why_not(one, parameters)) for one in submission.bags]
+    for one, cause in causes:
+        if cause is None:
+            messages = counted(sum(topic.messages for topic in one.topics), "message")
+            observed = f"{code(one.path)} has {messages} in {format_duration(one.duration_s)}"
+            return Finding.passed(parameters.asked_for, observed)
+    if not causes:
+        nothing = "there is no bag, a folder with `metadata.yaml` and an `.mcap` or `.db3` file"
+        cause = Cause(nothing, "Hand in the whole folder that `ros2 bag record` made.")
+    else:
+        cause = next(cause for _, cause in causes if cause is not None)
+    return cause.finding(parameters.asked_for)
+
+
+def _why_not(bag: BagRecord, parameters: Bag) -> Cause | None:
+    """Why a bag is not what is asked for, or None."""
+    here = code(bag.path)
+    if bag.problem is not None:
+        return Cause(
+            f"{here}: {bag.problem}",
+            "End `ros2 bag record` with Ctrl-C and wait until it has ended. `ros2 bag info` must "
+            "be able to read the bag.",
+        )
+    types = {topic.name: topic.type for topic in bag.topics if topic.messages}
+    for topic, kind in parameters.topics.items():
+        if types.get(topic) != kind:
+            there = f"as {code(types[topic])}" if topic in types else "no message"
+            others = f"; it has {codes(types)}" if types else ""
+            return Cause(
+                f"{here} has {there} on {code(topic)}{others if topic not in types else ''}",
+                f"Record {code(topic)} ({kind}) while the node publishes on it.",
+            )
+    if parameters.lasts is not None and bag.duration_s < parameters.lasts:
+        seen = f"{here} lasts {format_duration(bag.duration_s)}"
+        return Cause(seen, "Record for a longer time.")
+    if not types:
+        return Cause(f"{here} has no message", "Record while the node publishes.")
+    return None
