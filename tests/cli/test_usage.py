@@ -38,28 +38,32 @@ def lesson(folder: Path, old: str = "", new: str = "") -> Path:
     return place
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "line", "said"),
-    [
-        ("    points: 1", "    poinst: 1", 15, "unknown key 'poinst'. Did you mean 'points'?"),
-        ("uses: node.alive", "uses: node.alife", 14, "Did you mean 'node.alive'?"),
-        ("timeout: 5 s", "timeout: 5 m", 11, "'m' is a unit of length, but a time is needed"),
-        ("timeout: 5 s", "timeout: 5", 11, "has no unit: write for example '5 s'"),
-        ("title: Test", "title: Test\ntitle: Again", 4, "the key 'title' stands twice"),
-        ("/cmd_vel", "cmd_vel", 10, "is relative: write the full name, '/cmd_vel'"),
-    ],
+MISTAKES = (
+    ("    points: 1", "    poinst: 1", 15, "unknown key 'poinst'. Did you mean 'points'?"),
+    ("uses: node.alive", "uses: node.alife", 14, "Did you mean 'node.alive'?"),
+    ("timeout: 5 s", "timeout: 5 m", 11, "'m' is a unit of length, but a time is needed"),
+    ("timeout: 5 s", "timeout: 5", 11, "has no unit: write for example '5 s'"),
+    ("title: Test", "title: Test\ntitle: Again", 4, "the key 'title' stands twice"),
+    ("/cmd_vel", "cmd_vel", 10, "is relative: write the full name, '/cmd_vel'"),
 )
-def test_a_mistake_in_the_yaml_is_named_with_its_line(
-    rosgrade: Rosgrade, tmp_path: Path, old: str, new: str, line: int, said: str
+
+
+def test_mistakes_in_the_yaml_are_named_with_their_lines(
+    rosgrade: Rosgrade, tmp_path: Path
 ) -> None:
-    place = lesson(tmp_path, old, new)
-    for arguments in (["validate", place], ["check", place, tmp_path]):
-        ended = rosgrade(*arguments)
-        assert ended.returncode == 2
-        assert f"assignment.yaml:{line}: " in ended.stderr
-        assert said in ended.stderr
-        assert "Traceback" not in ended.stderr
-        assert not (tmp_path / "rosgrade-report").exists()
+    places = []
+    for number, (old, new, _, _) in enumerate(MISTAKES):
+        (tmp_path / str(number)).mkdir()
+        places.append(lesson(tmp_path / str(number), old, new))
+    ended = rosgrade("validate", *places, columns=500)
+    for place, (_, _, line, said) in zip(places, MISTAKES, strict=True):
+        told = [one for one in ended.stderr.splitlines() if f"{place}/assignment.yaml:" in one]
+        assert [f"assignment.yaml:{line}: " in one and said in one for one in told] == [True]
+    for one in (ended, rosgrade("check", places[0], tmp_path)):
+        assert one.returncode == 2
+        assert "assignment.yaml:15: " in one.stderr and MISTAKES[0][3] in one.stderr
+        assert "Traceback" not in one.stderr
+    assert not (tmp_path / "rosgrade-report").exists()
 
 
 def test_an_assignment_that_does_not_exist_names_the_nearest(rosgrade: Rosgrade) -> None:
@@ -250,7 +254,7 @@ def test_the_schemas_are_json_schemas(rosgrade: Rosgrade, document: str) -> None
     assert schema["$defs"]
 
 
-@pytest.mark.parametrize("jobs", ["0", "-1", "1.5", "²", "many"])
+@pytest.mark.parametrize("jobs", ["0", "²"])
 def test_a_number_of_jobs_that_is_none_is_reported(
     rosgrade: Rosgrade, tmp_path: Path, jobs: str
 ) -> None:
