@@ -87,19 +87,6 @@ def test_a_new_assignment_is_named_by_its_folder_as_well(
     assert rosgrade("new", "course/My-Lesson").returncode == 2
 
 
-@pytest.mark.ros
-@pytest.mark.slow
-def test_a_new_assignment_tells_right_from_wrong(rosgrade: Rosgrade) -> None:
-    rosgrade("new", "lesson")
-    ended = rosgrade("selftest", "lesson")
-    assert ended.returncode == 0, ended.stdout + ended.stderr
-    # Where there is no terminal, each program has a line as soon as it is judged.
-    counts = [line.split()[2:5] for line in ended.stderr.splitlines() if " graded: " in line]
-    assert counts and [int(one) for one, _, _ in counts] == [*range(1, int(counts[0][2]) + 1)]
-    assert "2 of 2 right solutions with full points" in ended.stdout
-    assert "8 of 8 mutants judged as expected: mutation score 100 %" in ended.stdout
-
-
 def test_the_handout_is_written_as_a_page(rosgrade: Rosgrade, tmp_path: Path) -> None:
     ended = rosgrade("show", "timed_publisher", "--html")
     assert ended.stdout == "Handout: timed_publisher.html\n"

@@ -14,7 +14,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from grader import ros
+from grader import resources, ros
 from grader.run.cell.domain import lock_domain
 from grader.submission.underlay.store import UnderlayStore
 
@@ -72,10 +72,10 @@ print(json.dumps([heard['/tf'][at], heard['/odom'][at], heard['/tf_static']]))
 
 
 @pytest.fixture(scope="module")
-def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Variables of a shell with tf2_msgs in it."""
+def environment() -> dict[str, str]:
+    """Variables of a shell with tf2_msgs in it, built once for all tests that need it."""
     found = ros.find()
-    store = UnderlayStore(tmp_path_factory.mktemp("tf2"), found)
+    store = UnderlayStore(resources.cache_folder(), found)
     return {
         **store.completed(found, ["tf2_msgs"]).environment(os.environ),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
