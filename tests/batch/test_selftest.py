@@ -7,6 +7,8 @@ tests stay short. `rosgrade selftest` grades them all.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 
 from grader import resources, ros
@@ -32,11 +34,18 @@ NAMES = [
 ]
 
 
+@pytest.fixture(scope="module")
+def runner() -> Iterator[Runner]:
+    """Runs the trials of all assignments: what it prepares is made once."""
+    with Runner(ros.find()) as made:
+        yield made
+
+
 @pytest.mark.ros
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("name", NAMES)
-def test_the_mutation_score_is_perfect(name: str) -> None:
+def test_the_mutation_score_is_perfect(name: str, runner: Runner) -> None:
     loaded = load_assignment(EXAMPLES.get(name, name))
     for missing in missing_underlays(loaded):
         pytest.skip(missing)
@@ -47,14 +56,10 @@ def test_the_mutation_score_is_perfect(name: str) -> None:
     many = robot or len(every) * len(scenarios) > MOST_RUNS
     step = EVERY if many else EVERY_OF_EXAMPLE if name in EXAMPLES else 1
     kept = {trial.id for trial in (*every[::step], every[-1])}
-    missing = missing_underlays(loaded)
-    if missing:
-        pytest.skip(missing[0])
-    with Runner(ros.find()) as runner:
-        grading = Grading(loaded, runner, resources.cache_folder())
-        results = list(
-            selftest(loaded, grading, jobs=2 * cpu_count(), chosen=lambda trial: trial.id in kept)
-        )
+    grading = Grading(loaded, runner, resources.cache_folder())
+    results = list(
+        selftest(loaded, grading, jobs=2 * cpu_count(), chosen=lambda trial: trial.id in kept)
+    )
     wrong = {
         result.trial.id: (result.mistake, *result.findings) for result in results if result.wrong
     }

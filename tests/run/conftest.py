@@ -62,10 +62,16 @@ def running(marker: str) -> list[int]:
     return [pid for pid in found if pid != os.getpid() and marker in command_line(pid)]
 
 
+@pytest.fixture(scope="module")
+def runner() -> Iterator[Runner]:
+    """Runs nodes one after the other, as those of a class: what it prepares is made once."""
+    with Runner(ros.find()) as made:
+        yield made
+
+
 @pytest.fixture
-def run_node(tmp_path: Path) -> Iterator[RunNode]:
+def run_node(runner: Runner, tmp_path: Path) -> RunNode:
     """Run a node's source in a cell and read what was recorded."""
-    runner = Runner(ros.find())
     numbers = iter(range(1000))
 
     def run(
@@ -89,5 +95,4 @@ def run_node(tmp_path: Path) -> Iterator[RunNode]:
         )
         return read_recording(file)
 
-    yield run
-    runner.close()
+    return run
