@@ -82,7 +82,11 @@ class Batch:
             self._given[row.key] = {name: value for name, value in given.items() if value}
             entry: Entry = replace(row, team=teams.get(row.key, ""))
             if row.path is not None:
-                entry = self._identified(replace(entry, source=str(row.path.resolve())), row.path)
+                entry = replace(entry, source=str(row.path.resolve()))
+                try:
+                    entry = replace(entry, sha256=fingerprint(row.path))
+                except Exception as error:
+                    entry = self._with_fault(entry, error)
                 distinct = entry.sha256 in ("", NO_FILES)
                 same = (entry.sha256, str(self._given[row.key]))
                 original = row.key if distinct else first.setdefault(same, row.key)
@@ -121,12 +125,6 @@ class Batch:
                     yield from self._finished(key, fresh=True)
         finally:
             self._write()
-
-    def _identified(self, entry: Entry, path: Path) -> Entry:
-        try:
-            return replace(entry, sha256=fingerprint(path))
-        except Exception as error:
-            return self._with_fault(entry, error)
 
     def _is_done(self, key: str) -> bool:
         result = self.ledger.result(key)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from grader.batch.handed_in import HandedIn
+from grader.batch.handed_in import NOTHING, HandedIn
 from grader.course.load import Course, written
 from grader.findings.wording import listing
 from grader.spec.nearest_name import did_you_mean
@@ -22,17 +22,12 @@ def with_groups(rows: Sequence[HandedIn], course: Course | None) -> list[HandedI
         for at in members if len(paths) > 1 else ():
             names = listing([rows[one].key for one in handed])
             found[at] = rows[at].with_problem(f"{names} of one group handed in different files")
-        for at in members if len(paths) == 1 else ():
-            if at not in handed:
-                found[at] = _shared(rows[handed[0]], rows[at])
+        for at in set(members) - set(handed) if len(paths) == 1 else ():
+            row, other = rows[at], rows[handed[0]]
+            parts = (part for part in row.problem.split("; ") if not part.startswith(NOTHING))
+            row = replace(row, path=other.path, fault=other.fault, problem="; ".join(parts))
+            found[at] = replace(row, late=other.late).at((other.handed_in, other.handed_in_from))
     return found
-
-
-def _shared(handed: HandedIn, row: HandedIn) -> HandedIn:
-    """The row of a member who has what another one handed in."""
-    parts = [part for part in row.problem.split("; ") if not part.startswith("handed in nothing")]
-    shared = replace(row, path=handed.path, fault=handed.fault, problem="; ".join(parts))
-    return replace(shared, late=handed.late).at((handed.handed_in, handed.handed_in_from))
 
 
 def strangers(rows: Sequence[HandedIn], course: Course) -> Iterator[str]:

@@ -14,6 +14,7 @@ from grader.submission.read.manifest import MANIFEST
 
 # Archives that cannot be read; they are rows all the same, with this as their reason.
 FOREIGN = (".rar", ".7z")
+NOTHING = "handed in nothing"
 
 
 @dataclass(frozen=True)

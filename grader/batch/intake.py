@@ -16,6 +16,7 @@ from grader.batch.groups import with_groups
 from grader.batch.hand_in_time import of_metadata, of_name, timed
 from grader.batch.handed_in import (
     FOREIGN,
+    NOTHING,
     HandedIn,
     is_ignored,
     only_archive,
@@ -89,7 +90,7 @@ def take_in_roster(
 def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn | None) -> HandedIn:
     row = HandedIn("").of(student)
     if not student.submission:
-        return row.with_problem("handed in nothing")
+        return row.with_problem(NOTHING)
     if cloned is not None:
         return replace(row, path=cloned.path, fault=cloned.fault)
     if _REPOSITORY.match(student.submission):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
 
-from grader.batch.handed_in import HandedIn, stem_of
+from grader.batch.handed_in import NOTHING, HandedIn, stem_of
 from grader.batch.roster import Roster, Student, name_forms, resemblance
 from grader.course.load import written
 from grader.findings.wording import listing
@@ -114,7 +114,7 @@ def matched(entries: list[HandedIn], roster: Roster) -> list[HandedIn]:
             rows[at] = rows[at].with_problem(f"{listing(doubtful[key])} may be theirs too")
     for student in roster.students:
         if student.key not in handed:
-            why = "handed in nothing"
+            why = NOTHING
             if student.submission:
                 why += f": {shown(student.submission)} is not among the submissions"
             other = doubtful.get(student.key)

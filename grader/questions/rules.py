@@ -16,7 +16,7 @@ from typing import Any
 from grader.findings.wording import code
 from grader.measure.declarations import timers
 from grader.questions.work import Work
-from grader.recording.model import NS, Recording
+from grader.recording.model import NS, Kind, Recording
 
 QUESTIONS = 3
 _SPECIAL = 4.0
@@ -96,17 +96,22 @@ def timer(work: Work) -> Iterator[Question]:
         yield Question(text, (str(place), *facts), 1 + 2 * work.is_rare(place))
 
 
-def parameter(work: Work) -> Iterator[Question]:
-    """Another default of a parameter."""
-    pattern = r"\bdeclare_parameter(?:<[^>]*>)?\(\s*[\"']([^\"']+)[\"']\s*,\s*([^,)]+)"
-    for place in work.places(pattern):
-        name, default = place.match.groups()
+def queue(work: Work) -> Iterator[Question]:
+    """Another depth of a queue."""
+    for place in work.places(r"\bcreate_(publisher|subscription)\b"):
+        kind = place.match[1]
+        ends = [
+            f"{code(end.topic)} is {end.qos.reliability} and {end.qos.durability}, "
+            f"{len(recording.carried(end.topic))} messages in {code(recording.scenario)}"
+            for recording in work.recordings[:1]
+            for end in recording.student_endpoints(Kind(kind))
+            if end.topic.rpartition("/")[2] in place.text
+        ]
         text = (
-            f"{place.short} gives the parameter {code(name)} the default {code(default)}. Show "
-            "where this value goes. What would change with ten times as much?"
+            f"{place.short} creates a {kind}. With what QoS? Which messages would be lost if "
+            "its depth were 1, and when?"
         )
-        uses = work.evidence(rf"\b{re.escape(name)}\b")
-        yield Question(text, tuple(dict.fromkeys((str(place), *uses))), 1 + 2 * work.is_rare(place))
+        yield Question(text, (str(place), *ends), 2 * work.is_rare(place))
 
 
 def line(work: Work) -> Iterator[Question]:
@@ -122,7 +127,7 @@ def line(work: Work) -> Iterator[Question]:
             yield Question(text, (str(place),), weight + 2 * work.is_rare(place))
 
 
-_RULES = (pause, jump, timer, parameter, line)
+_RULES = (pause, jump, timer, queue, line)
 
 
 def _at(recording: Recording, time_ns: int) -> str:

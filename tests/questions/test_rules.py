@@ -58,7 +58,7 @@ def asked(
 def test_source_alone_gives_three_questions_about_lines_that_are_there() -> None:
     text = asked()
     assert "`node.py:10` creates a timer" in text and "three times as long?" in text
-    assert "`node.py:8` gives the parameter `speed` the default `0.2`" in text
+    assert "`node.py:9` creates a publisher. With what QoS?" in text
     assert "`node.py:16` reads `if self.count > 7 and not self.arrived:`" in text
     assert "setup.py" not in text
 
