@@ -555,8 +555,8 @@ HONEST = {
     "uses_what_is_not": unstarted(
         "import pydantic",
         "No module named 'pydantic'",
-        "Is `pydantic` spelt right?",
-        "`numpy` and `scipy`",
+        "Python does not find this module: check its spelling",
+        "numpy and the libraries that your course allows",
     ),
     "does_not_build": unbuilt("raise ValueError('a mistake')"),
 }

@@ -69,7 +69,7 @@ def test_an_ordinary_run_is_not_worth_a_word() -> None:
         ),
         (
             {"messages": {"/cmd_vel": messages(4000, 3000.0)}},
-            "3000 messages came on `/cmd_vel`",
+            "3000 messages were sent on `/cmd_vel`",
             "within 1 s",
         ),
     ],

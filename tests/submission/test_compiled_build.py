@@ -63,7 +63,7 @@ def built(
 
 
 def judged(found: Prepared, check: str = "package.builds") -> Finding:
-    parameters = {"executable": "bot_pub"} if check != "package.builds" else {}
+    parameters = {"executable": "bot_pub"} if check == "package.executable" else {}
     return judge(check, found.record, package="bot_publisher", **parameters)
 
 
@@ -93,7 +93,7 @@ def test_a_program_names_its_lines_by_the_files_as_handed_in(
         (
             {"src/bot.cpp": CODE.replace("void drive()\n{", "void drive();\nvoid other()\n{")},
             f"{FOLDER}/src/bot.cpp:13: undefined reference to `drive()'",
-            "`drive()` is declared and called, but has no body",
+            "`drive()` is declared and called, but its body is not found",
         ),
         (
             {"CMakeLists.txt": CMAKE.replace("find_package(rcutils REQUIRED)\n", "")},
@@ -103,7 +103,7 @@ def test_a_program_names_its_lines_by_the_files_as_handed_in(
         (
             {"CMakeLists.txt": CMAKE.replace("ament_target_dependencies(bot_pub rcutils)\n", "")},
             f"{FOLDER}/src/bot.cpp:1: rcutils/logging.h: No such file",
-            "ament_target_dependencies(bot_pub rcutils)",
+            "ament_target_dependencies(<program> rcutils)",
         ),
     ],
 )
@@ -119,9 +119,13 @@ def test_the_first_error_of_a_compiler_is_explained(
 @pytest.mark.parametrize(
     ("right", "wrong", "words"),
     [
-        ("install(TARGETS bot_pub DESTINATION lib/${PROJECT_NAME})", "", "does not install it"),
+        (
+            "install(TARGETS bot_pub DESTINATION lib/${PROJECT_NAME})",
+            "",
+            "the build installed no executable",
+        ),
         ("lib/${PROJECT_NAME}", "bin", "was installed in bin/"),
-        ("ament_package()\n", "", "ROS does not find it"),
+        ("ament_package()\n", "", "ROS does not find the package"),
     ],
 )
 def test_what_ros2_run_does_not_find_is_explained(
