@@ -96,9 +96,9 @@ def test_a_right_node_gets_full_points_and_a_wrong_one_loses_what_it_must(
     name: str, results: Results
 ) -> None:
     wrong = {
-        result.trial.id: (str(result.verdict), *result.findings)
+        result.trial.id: (result.mistake, *result.findings)
         for result in results.verdicts[name]
-        if not result.verdict.right
+        if result.wrong
     }
     assert not wrong
 
