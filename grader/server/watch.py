@@ -39,7 +39,7 @@ class PageState:
         changed: By the last save, in one line.
         scores: Since watching began; None where there was no grade.
         most: Points that can be had.
-        hints: How many further hints were opened; None where nobody counts.
+        hints: How many further hints were opened; None if they are not counted.
     """
 
     version: int = 0
@@ -127,7 +127,7 @@ class ReportPage(LocalServer):
             counts = result.hints_opened
             steps = {one.id: range(1, len(one.further_hints) + 1) for one in result.checks}
             if counts is None or number not in steps.get(check, ()):
-                return PlainTextResponse("There is no such hint, or nobody counts.", 404)
+                return PlainTextResponse("There is no such hint, or hints are not counted.", 404)
             counts = {**counts, check: max(number, counts.get(check, 0))}
             result = result.model_copy(update={"hints_opened": counts})
             write_whole(file, result_json(result))

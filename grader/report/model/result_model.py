@@ -209,7 +209,8 @@ class Result(_Part):
     ``score`` is that of the checks. It is null where ``graded`` is false, so that no gradebook can
     take the points of half a grade for a score. ``final_score`` is with the adjustments; it is
     null too while one of them waits for a person. ``hints_opened`` says how many of the further
-    hints of a check were opened in the page of ``rosgrade watch``, by id; null if none counts.
+    hints of a check were opened in the page of ``rosgrade watch``, by id; null if they are not
+    counted.
     """
 
     schema_: Literal[1] = Field(alias="schema")
