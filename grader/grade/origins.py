@@ -39,7 +39,11 @@ def _places(seen: str, parameters: Parameters, recording: Recording) -> Iterator
     if recording.scene and "published" in parameters.about and not hasattr(parameters, "topic"):
         # About the robot: it does what it is commanded.
         named.add(recording.scene.command_topic)
-    kinds = [kind for kind in parameters.about if kind in named] or parameters.about
+    kinds = tuple(kind for kind in parameters.about if kind in named) or parameters.about
+    published = {one.data.get("topic") for one in recording.declared("published")}
+    if "published" in kinds and named and not published & named:
+        # Nothing was published, and these are what should have done it.
+        kinds += ("timer", "publisher")
     declared = {kind: recording.declared(kind) for kind in kinds}
     timers = declared.pop("timer", ())
     found = [

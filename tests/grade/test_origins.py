@@ -67,6 +67,11 @@ def test_what_a_check_is_about_is_shown_where_it_is_created(parameters, expected
     assert lines(FAILED, parameters, run()) == expected
 
 
+def test_where_nothing_was_published_the_timer_and_the_publisher_are_shown():
+    silent = run(declarations=tuple(one for one in run().declarations if one.kind != "published"))
+    assert lines(FAILED, Count(topic="/cmd_vel", at_least=1), silent) == [14, 13, 11]
+
+
 def test_a_check_of_the_robot_shows_where_it_is_commanded():
     assert lines(FAILED, KeepsDriving(distance="1 m"), run(scene=ahead_until(0.2).scene)) == [21]
 
