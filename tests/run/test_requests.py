@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from grader import ros
 from grader.errors import GraderFault
@@ -13,6 +15,7 @@ from grader.findings.finding import Status
 from grader.recording.model import Ending
 from grader.ros import RosInstallation
 from grader.run.runner import launch_file_program
+from grader.run.stimuli.parameters import next_call_s
 from tests.checks.builder import judge
 from tests.run.conftest import RunNode
 
@@ -276,3 +279,14 @@ def test_a_launch_file_is_started_as_ros2_launch_does(tmp_path: Path) -> None:
 def test_without_ros2_launch_a_launch_file_is_our_fault(tmp_path: Path) -> None:
     with pytest.raises(GraderFault, match=r"bot/demo.launch.py is a launch file, and this ROS"):
         launch_file_program(ros_with("rclpy", folder=tmp_path), "bot", "demo.launch.py")
+
+
+@given(late_s=st.lists(st.floats(0, 0.5), min_size=1, max_size=20))
+def test_a_late_call_to_an_executor_does_not_move_the_calls_after_it(late_s: list[float]) -> None:
+    every_s = 0.23
+    due_s = 100.0
+    for late in late_s:
+        now_s = due_s + late
+        due_s = next_call_s(due_s, every_s, now_s)
+        assert now_s < due_s + 1e-9 <= now_s + every_s + 2e-9
+        assert (due_s - 100.0) / every_s == pytest.approx(round((due_s - 100.0) / every_s))

@@ -126,6 +126,15 @@ class ListParametersOrder:
     every_s: float
 
 
+def next_call_s(due_s: float, every_s: float, now_s: float) -> float:
+    """When to call again: at the next whole period after the time at which this call was due.
+
+    Counted from a call that came late, those after it would move to other times within the
+    student's period, and could miss a callback that is busy in the same part of each.
+    """
+    return due_s + every_s * (1 + (now_s - due_s) // every_s)
+
+
 @plays(ListParametersOrder)
 class ListingParameters(Playing):
     """Calls ``list_parameters`` of every node, or what stands in for it; it has no end."""
@@ -142,9 +151,9 @@ class ListingParameters(Playing):
 
     def tick(self, elapsed_s: float | None) -> None:
         """Call when it is due; also before the first match, since a node may be blocked."""
-        now = time.monotonic()
+        now, every_s = time.monotonic(), self._order.every_s
         if now >= self._next and self._context.is_set_up:
-            self._next = now + self._order.every_s
+            self._next = next_call_s(self._next or now, every_s, now)
             there = (node for node in self._context.graph.nodes if node.vanished_ns is None)
             for name in dict.fromkeys(node.name for node in there if node.owner is Owner.STUDENT):
                 self._context.call_executor(name)
