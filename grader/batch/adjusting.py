@@ -43,8 +43,7 @@ class ClassAdjustments:
             self._earlier[entry.attempt_of].append(entry)
         self._store = ReviewStore(ledger.out)
         self._now = now or datetime.now(timezone.utc)
-        file, assignment = self._written.course, self._written.assignment
-        self._course = _load(Path(file), ledger.out, assignment) if file else None
+        self._course = _remembered(self._written.course, ledger.out, self._written.assignment)
 
     def __call__(self, result: Result) -> Result:
         """A result of the class with all that is added to it."""
@@ -113,20 +112,27 @@ class ClassAdjustments:
 
 def course_of(out: Path, named: Path | None, assignment: str) -> Course | None:
     """The rules for a batch: those that are named, else those that it was graded with before."""
+    if named is not None:
+        return _load(named, assignment)
     try:
-        place = named or Ledger(out).read().course
+        place = Ledger(out).read().course
     except UsageError:
         # There is no batch yet, or its file is damaged and is written again from the class.
         return None
-    return _load(Path(place), out, assignment) if place is not None else None
+    return _remembered(place, out, assignment)
 
 
-def _load(file: Path, out: Path, assignment: str) -> Course:
-    if not file.is_file():
+def _remembered(place: str | None, out: Path, assignment: str) -> Course | None:
+    """The rules that lie where a batch remembers, if it was graded with any."""
+    if place is not None and not Path(place).is_file():
         raise UsageError(
-            f"{file}: does not exist, and the rules of {out} lie there. Put it back, or name "
+            f"{place}: does not exist, and the rules of {out} lie there. Put it back, or name "
             "another place with `rosgrade batch ... --course FILE`"
         )
+    return _load(Path(place), assignment) if place is not None else None
+
+
+def _load(file: Path, assignment: str) -> Course:
     found = load_course(file)
     # Refuse rules of other assignments at once.
     found.rules(assignment)

@@ -387,6 +387,11 @@ def test_a_time_that_cannot_be_is_no_time(course: Class, name: str) -> None:
     assert (lines(row), row.score) == ([], 8)
 
 
+def test_named_rules_that_are_not_there_say_only_that(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"nowhere.yaml: No such file or directory$"):
+        course_of(tmp_path / "out", tmp_path / "nowhere.yaml", "lesson")
+
+
 def test_rules_that_are_gone_are_one_message_and_change_nothing(course: Class) -> None:
     course.hand_in("ana", "bot")
     course.grade()
