@@ -7,9 +7,9 @@
   let panel = find("#panel"), current = 0, queue = Promise.resolve(), place = null, editing = null, shownFile = null;
 
   // What is typed outlives a reload, a conflict and the end of the server.
-  const draft = `draft ${location.pathname}`;
-  text.value = sessionStorage.getItem(draft) ?? "";
-  text.addEventListener("input", () => sessionStorage.setItem(draft, text.value));
+  const draft = `${location.pathname} ${panel.dataset.attempt}`;
+  const keep = () => sessionStorage.setItem(draft, JSON.stringify({ text: text.value, place, editing }));
+  text.addEventListener("input", keep);
 
   const fail = (said) => {
     saved.textContent = "";
@@ -25,7 +25,7 @@
     try {
       const answer = await fetch("review", {
         method: "POST", headers: { "Content-Type": "application/json" },
-        body: JSON.stringify({ version: panel.dataset.version, ...what }),
+        body: JSON.stringify({ version: panel.dataset.version, attempt: panel.dataset.attempt, ...what }),
       });
       const body = await answer.text();
       if (!answer.ok) return fail(`${body}\nNothing was saved. What you typed stays in its box.`);
@@ -71,7 +71,7 @@
     if (!entry) return;
     const chosen = find(".said", entry).textContent;
     text.value = text.value.trim() ? `${text.value.trimEnd()}\n${chosen}` : chosen;
-    sessionStorage.setItem(draft, text.value);
+    keep();
     text.focus();
   };
 
@@ -80,6 +80,7 @@
     editing = at;
     find("#where span").textContent = `${at === null ? "" : "changes the comment "}${now ? `at ${now.file}:${now.line}` : "about the whole submission"}`;
     find("#whole").hidden = !now && at === null;
+    keep();
   };
   find("#whole").addEventListener("click", () => { setPlace(null); text.focus(); });
   const comment = async () => {
@@ -87,10 +88,14 @@
     const sent = text.value;
     if (!await change({ do: "comment", text: sent, index: editing, ...place })) return;
     if (text.value === sent) text.value = "";
-    sessionStorage.removeItem(draft);
     setPlace(null);
   };
   find("#write").addEventListener("submit", (event) => { event.preventDefault(); comment(); });
+  find("#give").addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const form = event.target;
+    if (await change({ do: "give", ...Object.fromEntries(new FormData(form)) })) form.reset();
+  });
   notes.addEventListener("change", () => change({ do: "notes", notes: notes.value }));
 
   const show = (name, line) => {
@@ -173,11 +178,13 @@
     else if (target.matches(".place")) {
       const at = target.dataset.file ? target.dataset : entry.dataset;
       if (files && [...files.options].some((option) => option.value === at.file)) { files.value = at.file; show("source", at.line); }
-    } else if (target.matches(".remove")) change({ do: "uncomment", index: Number(entry.dataset.index) });
+    } else if (target.matches(".take")) change({ do: "take", index: Number(entry.dataset.index) });
+    else if (target.matches(".remove")) change({ do: "uncomment", index: Number(entry.dataset.index) });
     else if (target.matches(".edit")) {
       const { file, line, index } = entry.dataset;
       setPlace(file ? { file, line: Number(line) || null } : null, Number(index));
       text.value = find(".said", entry).textContent;
+      keep();
       text.focus();
     }
   });
@@ -230,6 +237,10 @@
   find("#undo").addEventListener("click", actions.u);
   find("#help").addEventListener("click", actions["?"]);
   find("#only").addEventListener("change", (event) => { location.search = event.target.checked ? "?waiting" : ""; });
+
+  const kept = JSON.parse(sessionStorage.getItem(draft) ?? "{}");
+  text.value = kept.text ?? "";
+  setPlace(kept.place ?? null, kept.editing ?? null);
 
   if (frame) frame.src = `report.html${location.hash}`;
   current = Math.max(0, items().findIndex((item) => item.dataset.points === ""));

@@ -14,7 +14,8 @@
   main.addEventListener("submit", async (event) => {
     event.preventDefault();
     const form = event.target, cluster = form.closest(".cluster");
-    const typed = Object.fromEntries(new FormData(form));
+    const sent = new FormData(form), typed = Object.fromEntries(sent);
+    if (form.dataset.do === "split") typed.students = sent.getAll("students");
     if (typed.share) typed.share = Number(typed.share) / 100;
     let said;
     try {

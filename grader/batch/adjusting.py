@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime, timezone
 from functools import cached_property
@@ -81,7 +81,11 @@ class ClassAdjustments:
         if entry is None:
             return self._reviewed(result, result.submission.id), ()
         tried = [*self._graded_before(entry), (entry, result)]
-        results = [self._reviewed(each, entry.review_key) for _, each in tried]
+        hashes = [one.sha256 for one, _ in tried]
+        results = [
+            self._reviewed(each, entry.review_key, hashes[:at])
+            for at, (_, each) in enumerate(tried)
+        ]
         times = [
             HandInTime(one.handed_in, one.handed_in_from, one.late, each.started)
             for one, each in tried
@@ -92,7 +96,10 @@ class ClassAdjustments:
             found = ruled(results, times, rules)
         several = len(tried) > 1
         parts = attempts_of(results, [one.at for one in times], found.counts) if several else ()
-        update = {"attempts": parts, "adjustments": (*results[-1].adjustments, *found.lines)}
+        # A person scores the attempt that counts.
+        added = [one for one in results[found.counts].adjustments if one.kind == "manual"]
+        added += [one for one in results[-1].adjustments if one.kind != "manual"]
+        update = {"attempts": parts, "adjustments": (*added, *found.lines)}
         return results[-1].model_copy(update=update), found.notes
 
     def _graded_before(self, entry: Entry) -> Iterator[tuple[Entry, Result]]:
@@ -102,8 +109,8 @@ class ClassAdjustments:
             if result is not None and result.submission.sha256 == one.sha256:
                 yield one, result
 
-    def _reviewed(self, result: Result, key: str) -> Result:
-        return adjusted(result, self._store.student(key).content, self._of_class)
+    def _reviewed(self, result: Result, key: str, before: Sequence[str] = ()) -> Result:
+        return adjusted(result, self._store.student(key).content, self._of_class, before)
 
     @cached_property
     def _of_class(self) -> ClassReview:

@@ -81,10 +81,12 @@ def all_standing(ledger: Ledger) -> list[Done]:
     return [standing(ledger, entry) for entry in ledger.read().entries]
 
 
-def class_rows(done: Sequence[Done], ledger: Ledger | None = None) -> list[ClassRow]:
-    """The rows of a class as the overview shows them, sorted by key."""
+def class_rows(
+    done: Sequence[Done], ledger: Ledger | None = None, *, attempts: bool = False
+) -> list[ClassRow]:
+    """The rows of a class as the overview shows them, sorted by key; ``attempts``: earlier too."""
     same = _same(done)
-    own = (item for item in done if not item.entry.attempt_of)
+    own = (item for item in done if attempts or not item.entry.attempt_of)
     rows = sorted(own, key=lambda item: item.entry.key)
     return [
         ClassRow(

@@ -69,7 +69,7 @@ class Entry:
     @property
     def review_key(self) -> str:
         """Whose review is this row's: a team has one, that of its first member."""
-        return self.team or self.key
+        return self.team or self.attempt_of or self.key
 
     @property
     def original(self) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from grader.course.late import HandInTime, lateness
 from grader.course.load import Rules
 from grader.course.model import Attempts
+from grader.grade.model import total
 from grader.report.model.result_model import AdjustmentPart, Result
 
 _NOT_COMPARED = "attempts without a grade, or of another version of the assignment, do not count"
@@ -39,8 +40,10 @@ def ruled(results: Sequence[Result], times: Sequence[HandInTime], rules: Rules) 
     if current.score is None:
         return Ruled(last)
     rule, most = rules.attempts or Attempts(), current.final_max_score
-    scores = [each.known_score or 0.0 for each in results]
-    late = [lateness(*each, rules, most) for each in zip(times, scores, strict=True)]
+    # What a person may still give could make an attempt the best one.
+    scores = [each.possible_score for each in results]
+    known = [each.known_score or 0.0 for each in results]
+    late = [lateness(*each, rules, most) for each in zip(times, known, strict=True)]
     version = current.assignment.sha256
     same = [
         at
@@ -51,21 +54,28 @@ def ruled(results: Sequence[Result], times: Sequence[HandInTime], rules: Rules) 
     allowed = [at for at in allowed if not late[at].closed] or allowed
     counts = allowed[-1]
     if rule.counts == "best":
-        counts = max(allowed, key=lambda at: (scores[at] - late[at].points, at))
+        counts = max(allowed, key=lambda at: (scores[at] - late[at].points, known[at], at))
     elif rule.counts == "last before the deadline":
         in_time = [at for at in allowed if not times[at].is_late(rules)]
         counts = (in_time or allowed)[-1]
     lines = [late[counts].line]
     if counts != last:
+        # Manual items are those of the attempt that counts.
+        judged, of_last = (_without_manual(results[at]) for at in (counts, last))
         line = AdjustmentPart(
             kind="attempts",
             title=f"Attempt {counts + 1} of {len(results)} counts ({rule.words})",
-            points=scores[counts] - scores[last],
-            reason=f"it has {scores[counts]:g} of {current.known_max_score:g} points, the last "
-            f"attempt has {scores[last]:g}",
+            points=judged - of_last,
+            reason=f"it has {judged:g} of {current.max_score:g} points, the last attempt has "
+            f"{of_last:g}",
         )
         lines.insert(0, line)
     notes = (late[counts].note, _NOT_COMPARED if rules.attempts and len(same) <= last else "")
     return Ruled(
         counts, tuple(line for line in lines if line is not None), tuple(filter(None, notes))
     )
+
+
+def _without_manual(result: Result) -> float:
+    added = (one.points for one in result.adjustments if one.kind != "manual")
+    return total(points for points in (result.score, *added) if points is not None)

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from grader.errors import UsageError
 from grader.findings.finding import Status
 from grader.grade.model import points_for, total
 from grader.report.model.cause import cause
 from grader.report.model.result_model import AdjustmentPart, CommentPart, Result
-from grader.review.model import ClassReview, ManualScore, StudentReview
+from grader.review.model import ClassReview, Given, ManualScore, StudentReview
 
 
 def adjusted(
     result: Result,
     review: StudentReview,
     of_class: ClassReview,
+    before: Collection[str] = (),
 ) -> Result:
     """A result with the points, comments and deductions as they are written down now.
 
@@ -26,21 +27,33 @@ def adjusted(
     A forgiven check gets back what it lost itself. A check that waited for it gets nothing: it was
     never judged, and would perhaps have failed.
 
+    Args:
+        before: Hashes of the student's earlier attempts, whose comments are shown as such.
+
     Raises:
         UsageError: A manual item has more points than it can give.
     """
+    written = review.of(result.submission.sha256)
     manual = [
-        _scored(one, review.manual.get(one.item or ""), review.key)
+        _scored(one, written.manual.get(one.item or ""), review.key)
         for one in result.adjustments
         if one.kind == "manual"
     ]
-    comments = (CommentPart(**one.model_dump()) for one in review.comments)
-    return result.model_copy(
-        update={
-            "adjustments": (*manual, *_forgiven(result, of_class)),
-            "comments": tuple(comments),
-        }
-    )
+    comments = [CommentPart(**one.model_dump()) for one in written.comments]
+    for earlier in review.others_than(written, before):
+        comments += [CommentPart(**one.model_dump(), earlier=True) for one in earlier.comments]
+    causes = written.causes
+    checks = (one.model_copy(update={"cause": causes.get(one.id, "")}) for one in result.checks)
+    result = result.model_copy(update={"checks": tuple(checks)})
+    points = (*manual, *_forgiven(result, of_class), *_given(result, written.given))
+    return result.model_copy(update={"adjustments": points, "comments": tuple(comments)})
+
+
+def _given(result: Result, given: Collection[Given]) -> Iterator[AdjustmentPart]:
+    titles = {check.id: check.title for check in result.checks}
+    for one in given:
+        title = titles.get(one.check or "", "Points by a person")
+        yield AdjustmentPart(kind="given", title=title, **one.model_dump())
 
 
 def _scored(item: AdjustmentPart, score: ManualScore | None, key: str) -> AdjustmentPart:

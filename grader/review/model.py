@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Collection
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -11,6 +12,8 @@ from grader.spec.source import Model
 
 Initials = Annotated[str, Field(min_length=1, max_length=40, description="Who wrote it.")]
 Text = Annotated[str, Field(min_length=1, max_length=20_000)]
+_LONG_ENOUGH = 16
+"""Characters of a hash that tell the attempts of a student apart."""
 
 
 class ManualScore(Model):
@@ -30,13 +33,61 @@ class Comment(Model):
     line: int | None = Field(None, ge=1)
 
 
-class StudentReview(Model):
+class Given(Model):
+    """Points that a person gives to one student, or takes away."""
+
+    points: float = Field(description="They are added.")
+    reason: Text
+    by: Initials
+    check: Id | None = Field(None, description="The check that they are about, if any.")
+
+
+class AttemptReview(Model):
+    """What is written about one attempt of a student."""
+
+    attempt: str = Field("", description="How its hash begins; empty for every attempt.")
+    manual: dict[Id, ManualScore] = Field(default_factory=dict, description="By manual item.")
+    comments: tuple[Comment, ...] = ()
+    given: tuple[Given, ...] = ()
+    causes: dict[Id, Annotated[str, Field(min_length=1, max_length=200)]] = Field(
+        default_factory=dict, description="By failed check: its cause, named by a person."
+    )
+
+
+class StudentReview(AttemptReview):
     """The review of one student, or of a team under the key of its first member."""
 
     key: str = Field(min_length=1, description="As in the column `submission` of grades.csv.")
-    manual: dict[Id, ManualScore] = Field(default_factory=dict, description="By manual item.")
-    comments: tuple[Comment, ...] = ()
     notes: str = Field("", description="Of an oral exam, say; only for instructors.")
+    others: tuple[AttemptReview, ...] = Field((), description="About other attempts.")
+
+    def of(self, attempt: str) -> AttemptReview:
+        """What is written about an attempt, by its hash."""
+        written = sorted((self, *self.others), key=lambda one: not one.attempt)
+        found = (one for one in written if attempt.startswith(one.attempt))
+        return next(found, AttemptReview())
+
+    def others_than(self, shown: AttemptReview, before: Collection[str]) -> list[AttemptReview]:
+        """What is written about the attempts before, by their hashes, first to last."""
+        found = {id(one): one for one in map(self.of, before) if one is not shown}
+        return list(found.values())
+
+    def about(self, attempt: str, **update: object) -> StudentReview:
+        """The review with another text about one attempt; what is about others stays beside it."""
+        now = self.of(attempt)
+        changed = AttemptReview(**_content(now) | {"attempt": attempt[:_LONG_ENOUGH]} | update)
+        others = tuple(one for one in self.others if one is not now)
+        if len(others) < len(self.others):
+            return self.model_copy(update={"others": (*others, changed)})
+        if now is not self and _content(self) != {"attempt": self.attempt}:
+            others = (*others, AttemptReview(**_content(self)))
+        return self.model_copy(update={**dict(changed), "others": others})
+
+
+def _content(review: AttemptReview) -> dict[str, Any]:
+    """What is written down about one attempt."""
+    names = AttemptReview.model_fields
+    return {name: value for name, value in review if name in names and (value or name == "attempt")}
 
 
 class BankEntry(Model):

@@ -87,7 +87,8 @@ class ReviewStore:
             ReviewConflict: It has another version by now; nothing was written.
         """
         file = self.file(content.key if isinstance(content, StudentReview) else None)
-        text = write_yaml(content.model_dump(mode="json", exclude_defaults=True))
+        written = content.model_dump(mode="json", exclude_defaults=True)
+        text = write_yaml(dict(sorted(written.items(), key=lambda item: item[0] != "key")))
         # What cannot be read again must not replace what can.
         parse_source(text, file).read(type(content))
         with self._writing():

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from contextlib import suppress
 from typing import Any
 
 from grader.errors import UsageError
-from grader.review.model import BankEntry, Comment, Forgiven, ManualScore, StudentReview
-from grader.review.store import ReviewConflict
+from grader.review.model import (
+    AttemptReview,
+    BankEntry,
+    Comment,
+    Forgiven,
+    Given,
+    ManualScore,
+    StudentReview,
+)
+from grader.review.store import ReviewConflict, Saved
 from grader.server.reviewed_class import ReviewedClass, ReviewedRow
 
 
@@ -20,34 +28,45 @@ def change_student(reviewed: ReviewedClass, row: ReviewedRow, sent: Any) -> None
         ReviewConflict: The page showed another version; nothing is written.
     """
     store, key = reviewed.store, row.entry.review_key
+    if sent.get("attempt", row.attempt) != row.attempt:
+        raise ReviewConflict("The student handed in again meanwhile. Load the page again.")
     if sent["do"] == "undo":
         store.undo(key, sent["version"])
         return
     review = store.student(key).content
-    store.save(review.model_copy(update=_update(review, row, sent, reviewed.by)), sent["version"])
+    if sent["do"] == "notes":
+        changed = review.model_copy(update={"notes": str(sent["notes"])})
+    elif sent["do"] == "score":
+        now = review.of(row.counts)
+        changed = review.about(row.counts, manual=dict(_scores(now, row, sent, reviewed.by)))
+    else:
+        changed = review.about(row.attempt, **_update(review.of(row.attempt), sent, reviewed.by))
+    store.save(changed, sent["version"])
     if sent["do"] == "comment" and sent.get("index") is None:
         _count(reviewed, sent["text"])
 
 
-def _update(review: StudentReview, row: ReviewedRow, sent: Any, by: str) -> dict[str, Any]:
-    if sent["do"] == "score":
-        return {"manual": dict(_scores(review, row, sent, by))}
-    if sent["do"] == "notes":
-        return {"notes": str(sent["notes"])}
+def _update(review: AttemptReview, sent: Any, by: str) -> dict[str, Any]:
     comments, index = list(review.comments), sent.get("index")
+    if sent["do"] == "give":
+        check = sent.get("check") or None
+        new = Given(points=float(sent["points"]), reason=str(sent["reason"]), by=by, check=check)
+        return {"given": (*review.given, new)}
+    if sent["do"] == "take":
+        return {"given": tuple(one for at, one in enumerate(review.given) if at != index)}
     if sent["do"] == "uncomment":
         del comments[index]
     elif sent["do"] == "comment":
-        new = Comment(text=sent["text"], by=by, file=sent.get("file"), line=sent.get("line"))
+        comment = Comment(text=sent["text"], by=by, file=sent.get("file"), line=sent.get("line"))
         begin, end = (len(comments), None) if index is None else (index, index + 1)
-        comments[begin:end] = [new]
+        comments[begin:end] = [comment]
     else:
         raise ValueError(sent["do"])
     return {"comments": tuple(comments)}
 
 
 def _scores(
-    review: StudentReview, row: ReviewedRow, sent: Any, by: str
+    review: AttemptReview, row: ReviewedRow, sent: Any, by: str
 ) -> Iterator[tuple[str, ManualScore]]:
     item, points = sent["item"], sent["points"]
     adjustments = row.row.result.adjustments if row.row.result else ()
@@ -62,20 +81,26 @@ def _scores(
 
 
 def change_cluster(reviewed: ReviewedClass, sent: Any) -> None:
-    """Forgive a cause of failures, take that back, or comment it for all who have it."""
+    """Forgive a cause of failures, take that back, comment it for all who have it, or split it."""
     check, cause, store = sent["check"], sent["cause"], reviewed.store
     found = [one for one in reviewed.clusters() if (one.check, one.cause) == (check, cause)]
     if not found:
         raise UsageError("Nobody fails for this cause any more. Load the page again.")
     if sent["do"] == "comment":
         comment = Comment(text=sent["text"], by=reviewed.by)
-        rows = (row for row in reviewed.rows() if row.row.id in found[0].lost)
-        for key in dict.fromkeys(row.entry.review_key for row in rows):
-            saved = store.student(key)
-            if comment.text not in (one.text for one in saved.content.comments):
-                comments = (*saved.content.comments, comment)
-                store.save(saved.content.model_copy(update={"comments": comments}), saved.version)
+        for saved, attempt in _reviews(reviewed, found[0].lost):
+            comments = saved.content.of(attempt).comments
+            if comment.text not in (one.text for one in comments):
+                changed = saved.content.about(attempt, comments=(*comments, comment))
+                store.save(changed, saved.version)
         _count(reviewed, comment.text)
+        return
+    if sent["do"] == "split":
+        name = str(sent["name"]).strip()
+        for saved, attempt in _reviews(reviewed, found[0].lost.keys() & sent["students"]):
+            causes = {**saved.content.of(attempt).causes, check: name}
+            causes = {one: named for one, named in causes.items() if named}
+            store.save(saved.content.about(attempt, causes=causes), saved.version)
         return
     if found[0].forgiven != sent["was"]:
         raise ReviewConflict("This was forgiven or taken back meanwhile. Load the page again.")
@@ -85,6 +110,15 @@ def change_cluster(reviewed: ReviewedClass, sent: Any) -> None:
         share, reason = float(sent["share"]), str(sent["reason"])
         kept.append(Forgiven(check=check, cause=cause, share=share, reason=reason, by=reviewed.by))
     store.save(now.content.model_copy(update={"forgiven": tuple(kept)}), now.version)
+
+
+def _reviews(
+    reviewed: ReviewedClass, keys: Container[str]
+) -> Iterator[tuple[Saved[StudentReview], str]]:
+    """The review of each student or team, with the attempt that is in the class."""
+    found = {row.entry.review_key: row for row in reviewed.rows() if row.row.id in keys}
+    for key, row in found.items():
+        yield reviewed.store.student(key), row.attempt
 
 
 def _count(reviewed: ReviewedClass, text: str) -> None:

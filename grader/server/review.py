@@ -19,6 +19,7 @@ from grader.batch.class_files import INSTRUCTOR_FOLDER
 from grader.batch.edited_assignment import load_before, new_place, with_text
 from grader.errors import RosgradeError, UsageError
 from grader.findings.finding import Status
+from grader.report.files import folder_name
 from grader.report.html.overview import render_overview
 from grader.report.html.page import environment, render_page
 from grader.report.html.shown_source import ShownSource
@@ -90,7 +91,8 @@ class ReviewServer(LocalServer):
 
     def _submission(self, request: Request) -> Response:
         row, rows = self._class.find(request.path_params["name"])
-        only_waiting, at = "waiting" in request.query_params, rows.index(row)
+        only_waiting = "waiting" in request.query_params
+        at = [one.row.id for one in rows].index(row.attempts[-1])
         wanted = [bool(one.row.waits_for) or not only_waiting for one in rows]
         return _page(
             "review",
@@ -103,6 +105,8 @@ class ReviewServer(LocalServer):
             waiting=sum(bool(one.row.waits_for) for one in rows),
             source=self._class.source(row),
             link=lambda one: f"../{quote(one.name)}/",
+            attempts=[f"../{quote(folder_name(key))}/" for key in row.attempts],
+            shown=row.attempts.index(row.row.id),
             panel=Markup(self._panel(row)),
             problem=self._background.problem,
         )
@@ -120,7 +124,8 @@ class ReviewServer(LocalServer):
             row=row,
             result=row.row.result,
             items=[one for one in adjustments if one.kind == "manual" and one.item],
-            others=[one for one in adjustments if one.kind != "manual"],
+            others=[one for one in adjustments if one.kind not in ("manual", "given")],
+            counts=row.counts,
             levels=levels,
             bank=self._class.store.of_class().content.bank[:MOST_OF_BANK],
             findings=[check for check in row.row.judged if check.status is not Status.PASSED],

@@ -18,7 +18,7 @@ from grader.report.files import file_version, folder_name
 from grader.report.model.class_row import ClassRow
 from grader.report.model.cluster import Cluster, clusters
 from grader.report.model.result_model import AdjustmentPart
-from grader.review.model import StudentReview
+from grader.review.model import AttemptReview, StudentReview
 from grader.review.store import ReviewStore, Saved
 from grader.submission.kept_source import SOURCE_FOLDER, KeptSource, read_source
 
@@ -28,12 +28,38 @@ _Read = tuple[Done, Saved[StudentReview], str]
 
 @dataclass(frozen=True)
 class ReviewedRow:
-    """A row with its review; ``problem`` says why that cannot be read."""
+    """A row with its review; ``problem`` says why that cannot be read.
+
+    ``attempts`` are the keys of all rows of the student, first to last.
+    """
 
     row: ClassRow
     entry: Entry
     saved: Saved[StudentReview]
     problem: str
+    attempts: tuple[str, ...]
+
+    @property
+    def attempt(self) -> str:
+        """The hash of what is shown."""
+        return self.entry.sha256 or "nothing"
+
+    @property
+    def counts(self) -> str:
+        """The hash of the attempt that counts, which is the one that a person scores."""
+        tried = self.row.result.attempts if self.row.result is not None else ()
+        return next((one.sha256 for one in tried if one.counts), self.attempt)
+
+    @property
+    def written(self) -> AttemptReview:
+        """What is written about what is shown."""
+        return self.saved.content.of(self.attempt)
+
+    @property
+    def earlier(self) -> list[AttemptReview]:
+        """What is written about the attempts before it."""
+        tried = self.row.result.attempts if self.row.result is not None else ()
+        return self.saved.content.others_than(self.written, [one.sha256 for one in tried])
 
     @property
     def name(self) -> str:
@@ -62,7 +88,10 @@ class ReviewedClass:
         return self._loaded[1]
 
     def rows(self) -> list[ReviewedRow]:
-        """All rows, sorted by key."""
+        """All rows without earlier attempts, sorted by key."""
+        return [row for row in self._all() if not row.entry.attempt_of]
+
+    def _all(self) -> list[ReviewedRow]:
         # Else who asks while the class is read would read all of it once more.
         with self._reading:
             return self._rows()
@@ -82,15 +111,23 @@ class ReviewedClass:
                 read = self._read(entry, adjust)
                 self._known[entry.key] = version, read
             found[entry.key] = read
-        rows = class_rows([done for done, _, _ in found.values()], self.ledger)
-        return [ReviewedRow(row, found[row.id][0].entry, *found[row.id][1:]) for row in rows]
+        attempts: dict[str, tuple[str, ...]] = {}
+        for entry in sorted(written.entries, key=lambda one: not one.attempt_of):
+            student = entry.attempt_of or entry.key
+            attempts[student] = (*attempts.get(student, ()), entry.key)
+        rows = []
+        for row in class_rows([one[0] for one in found.values()], self.ledger, attempts=True):
+            done, saved, problem = found[row.id]
+            of_student = attempts[done.entry.attempt_of or row.id]
+            rows.append(ReviewedRow(row, done.entry, saved, problem, of_student))
+        return rows
 
     def find(self, name: str) -> tuple[ReviewedRow, list[ReviewedRow]]:
-        """A row by the name in its address, and all rows."""
-        rows = self.rows()
+        """A row by the name in its address, and all rows without earlier attempts."""
+        rows = self._all()
         for row in rows:
             if row.name == name:
-                return row, rows
+                return row, [one for one in rows if not one.entry.attempt_of]
         raise UsageError(f"{name}: is no submission of this class any more")
 
     def clusters(self) -> tuple[Cluster, ...]:

@@ -41,7 +41,7 @@ def test_every_part_of_a_result_is_one_or_the_other() -> None:
     assert {name.rstrip("_") for name in Result.model_fields} == set(GRADE) | MEASURED | ADDED
     assert not set(GRADE) & (MEASURED | ADDED)
     of_a_check = set(GRADE["checks"]["__all__"])
-    assert set(CheckPart.model_fields) == of_a_check | MEASURED_OF_A_CHECK
+    assert set(CheckPart.model_fields) == of_a_check | MEASURED_OF_A_CHECK | {"cause"}
     assert not of_a_check & MEASURED_OF_A_CHECK
 
 

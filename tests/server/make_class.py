@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment, load_assignment
@@ -9,6 +12,7 @@ from grader.batch.class_files import standing, write_class
 from grader.batch.files import write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.batch.ledger import Entry, Ledger
+from grader.errors import UsageError
 from grader.grade import grade
 from grader.recording.model import to_json
 from grader.report.model.facts import Clock
@@ -75,6 +79,33 @@ def make_class(folder: Path) -> Path:
         ledger.write(entries, "lesson", loaded.sha256, loaded.location)
         write_class([standing(ledger, entry) for entry in entries], ledger)
     return folder / "out"
+
+
+@contextmanager
+def writing(out: Path) -> Iterator[Ledger]:
+    """Hold the folder of a class as a batch does, when the pages have written their changes."""
+    with ExitStack() as stack:
+        held = None
+        while held is None:
+            with suppress(UsageError):
+                held = stack.enter_context(Ledger(out).opened())
+        yield held
+
+
+def hand_in_again(out: Path, key: str, documented: int) -> str:
+    """Grade another attempt of a student, as a batch does; returns the key of the one before."""
+    loaded = load_assignment(out.parent / "lesson")
+    with writing(out) as ledger:
+        entries = {one.key: one for one in ledger.read().entries}
+        before = f"{key} (attempt 1)"
+        kept = replace(entries[key], key=before, attempt_of=key)
+        again = replace(entries[key], sha256=f"again-{key}")
+        submission = replace(record(key, documented), sha256=again.sha256)
+        put(ledger, loaded, replace(record(key, STUDENTS[key]), id=before))
+        put(ledger, loaded, submission)
+        rows = [*(entries | {key: again}).values(), kept]
+        ledger.write(rows, "lesson", loaded.sha256, loaded.location)
+    return before
 
 
 def put(ledger: Ledger, loaded: LoadedAssignment, submission: SubmissionRecord) -> None:

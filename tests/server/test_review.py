@@ -10,12 +10,16 @@ from urllib.parse import quote
 
 import pytest
 
+from grader.assignment.load import load_assignment
+from grader.batch.class_files import all_standing, read_class
+from grader.batch.files import RESULT_FILE
+from grader.batch.rendering import bring_up_to_date
 from grader.report.files import folder_name
 from grader.report.model.result import read_result
 from grader.review.store import ReviewStore
 from grader.server.review import ReviewServer
 from tests.server.conftest import Answer, Client
-from tests.server.make_class import NODE, STUDENTS, YAML
+from tests.server.make_class import NODE, STUDENTS, YAML, hand_in_again, writing
 
 ODD = 'd "<b>eli</b>'
 
@@ -271,3 +275,99 @@ def test_a_student_who_left_the_class_keeps_the_review(out: Path, client: Client
     file.with_name("gone.yaml").write_text("key: gone\nnotes: talked to\n", encoding="utf-8")
     assert "gone" in client.get("/").text
     assert file.with_name("gone.yaml").exists()
+
+
+def scores(out: Path) -> dict[str, float | None]:
+    return {row.id: row.score for row in read_class(out)}
+
+
+def test_comments_and_points_stay_with_the_attempt_that_they_were_written_about(
+    out: Path, client: Client
+) -> None:
+    for item in ("readme", "oral"):
+        change(client, "ana", do="score", item=item, points=1, note="")
+    change(client, "ana", do="give", points="0.5", reason="a good question", check="")
+    change(client, "ana", do="comment", text="Why here?", file=NODE, line=6)
+    assert scores(out)["ana"] == 6 + 2.5
+    before = hand_in_again(out, "ana", documented=1)
+    text = client.get(page("ana")).text
+    assert scores(out)["ana"] is None and "waits of 2" in text
+    assert 'class="comments"' not in text
+    earlier = text.partition("On an earlier attempt")[2]
+    assert "Why here?" in earlier and "readme: 1 (AK)" in earlier and "+0.5: a good" in earlier
+    for item in ("readme", "oral"):
+        change(client, "ana", do="score", item=item, points=2, note="")
+    change(client, "ana", do="comment", text="Better", file=NODE, line=1)
+    with writing(out) as ledger:
+        bring_up_to_date(all_standing(ledger), ledger)
+    now, old = (read_result(out / "submissions" / key / RESULT_FILE) for key in ("ana", before))
+    assert (now.final_score, old.final_score) == (1 + 4, 6 + 2.5)
+    assert [(one.text, one.earlier) for one in now.comments] == [
+        ("Better", False),
+        ("Why here?", True),
+    ]
+    assert [one.text for one in old.comments] == ["Why here?"]
+    report = (out / "submissions" / "ana" / "report.html").read_text(encoding="utf-8")
+    assert f"{NODE}:6 of an earlier attempt" in report
+
+
+def test_the_attempt_that_counts_is_the_one_that_a_person_scores(out: Path, client: Client) -> None:
+    before = hand_in_again(out, "ana", documented=1)
+    rules = "attempts: {counts: best}\nassignments: {lesson: {due: 2026-10-12 23:59}}\n"
+    course = out.parent / "course.yaml"
+    course.write_text(f"title: A course\ntime_zone: UTC\n{rules}", encoding="utf-8")
+    with writing(out) as ledger:
+        now = ledger.read()
+        used = load_assignment(out.parent / "lesson")
+        ledger.write(now.entries, now.assignment, used.sha256, now.location, str(course))
+    assert "of the attempt that counts" in client.get(page("ana")).text
+    for item in ("readme", "oral"):
+        assert change(client, "ana", do="score", item=item, points=1, note="").status == 200
+    assert scores(out)["ana"] == 6 + 2
+    review = ReviewStore(out).student("ana").content
+    assert review.of("ana").manual and not review.of("again-ana").manual
+    assert client.get(page(before)).text.count("Attempt ") == 2
+    change(client, before, do="comment", text="The first")
+    assert ReviewStore(out).student("ana").content.of("ana").comments[0].text == "The first"
+
+
+def test_what_is_sent_about_an_attempt_never_lands_at_the_next_one(
+    out: Path, client: Client
+) -> None:
+    sent = {"version": version(client, "ana"), "attempt": "ana", "do": "comment", "text": "Why?"}
+    hand_in_again(out, "ana", documented=2)
+    answer = client.post(f"{page('ana')}review", sent)
+    assert answer.status == 409 and "handed in again" in answer.text
+    assert not ReviewStore(out).file("ana").exists()
+
+
+def test_one_student_gets_points_with_a_reason_until_they_are_removed(
+    out: Path, client: Client
+) -> None:
+    answer = change(client, "ben", do="give", points="1.4", reason="right, but odd", check="docs")
+    assert answer.status == 200 and "+1.4 for docs: right, but odd" in answer.text
+    for item in ("readme", "oral"):
+        change(client, "ben", do="score", item=item, points=0, note="")
+    assert scores(out)["ben"] == 2.4
+    row = next(row for row in read_class(out) if row.id == "ben")
+    assert row.result and row.result.adjustments[-1].by == "AK"
+    change(client, "ben", do="take", index=0)
+    assert scores(out)["ben"] == 1
+    for wrong in ({"points": "nan", "reason": "x"}, {"points": 1, "reason": ""}):
+        assert change(client, "ben", do="give", **wrong).status == 422
+
+
+def test_a_cause_is_split_by_hand_and_then_forgiven_for_a_part(out: Path, client: Client) -> None:
+    whole = cluster(client)
+    split = {**whole, "do": "split", "students": ["ben"], "name": "a generated file"}
+    assert client.post("/clusters", split).status == 200
+    text = client.get("/clusters").text
+    assert "2 students" in text and "a generated file: " in text
+    named = {**whole, "cause": "a generated file", "do": "forgive", "share": 1, "reason": ""}
+    assert client.post("/clusters", named).status == 200
+    lines = {row.id: row.result.adjustments for row in read_class(out) if row.result}
+    assert [one.kind for one in lines["ben"]] == ["manual", "manual", "forgiven"]
+    assert [one.kind for one in lines["cai"]] == ["manual", "manual"]
+    back = {**named, "do": "split", "students": ["ben"], "name": " ", "was": 1}
+    assert client.post("/clusters", back).status == 200
+    assert "3 students" in client.get("/clusters").text

@@ -30,8 +30,10 @@ def cause(check: CheckPart) -> str:
     """Why a check failed, in words that are equal for those who made the same mistake.
 
     It is what the check observed; names of the assignment, of ROS and of Python stay, and any
-    other name, number, file and line becomes ``…``.
+    other name, number, file and line becomes ``…``. What a person named otherwise has that name.
     """
+    if check.cause:
+        return check.cause
 
     def name(match: re.Match[str]) -> str:
         mark, text = match.groups()

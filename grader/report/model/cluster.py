@@ -64,10 +64,14 @@ def clusters(
             name,
             members[0][1].title,
             why,
-            cut(one_line(members[0][1].observed), MOST_CHARACTERS),
+            cut(one_line(_example(members[0][1])), MOST_CHARACTERS),
             {key: total((check.max_points, -check.points)) for key, check in members},
             forgiven.get((name, why), 0.0),
         )
         for (name, why), members in found.items()
     ]
     return tuple(sorted(grouped, key=lambda one: (-len(one.lost), -one.at_stake)))
+
+
+def _example(check: CheckPart) -> str:
+    return f"{check.cause}: {check.observed}" if check.cause else check.observed

@@ -99,7 +99,8 @@ class CheckPart(FindingPart):
     """A check: its finding in the scenario that decided, and in the others.
 
     ``waits_for`` names the checks to correct first where this one was skipped, ``author_hint``
-    is the instructor's own hint to a check that did not pass, ``further_hints`` its next steps.
+    is the instructor's own hint to a check that did not pass, ``further_hints`` its next steps,
+    ``cause`` the name that a person gave to the cause of a failure; only for instructors.
     """
 
     id: str
@@ -111,6 +112,7 @@ class CheckPart(FindingPart):
     waits_for: tuple[str, ...]
     other_scenarios: tuple[FindingPart, ...]
     further_hints: tuple[str, ...] = ()
+    cause: str = ""
 
     @property
     def findings(self) -> tuple[FindingPart, ...]:
@@ -161,13 +163,14 @@ class AdjustmentPart(_Part):
     """Points that no check gives: a person's, or those of a rule of the course.
 
     ``kind`` is ``manual`` (an item that a person scores), ``forgiven`` (points of a check, given
-    back), ``late`` or ``attempts`` (rules of the course). ``points`` are added, so a deduction is
-    negative, and null where a manual item waits for a person; ``max_points`` is what a manual item
-    can give, else 0. ``by`` are the initials of the person, empty for a rule; ``item`` is the id of
-    the manual item, ``check`` that of the check that is forgiven.
+    back), ``given`` (to one student), ``late`` or ``attempts`` (rules of the course). ``points``
+    are added, so a deduction is negative, and null where a manual item waits for a person;
+    ``max_points`` is what a manual item can give, else 0. ``by`` are the initials of the person,
+    empty for a rule; ``item`` is the id of the manual item, ``check`` that of the check that is
+    forgiven, or that the points are about.
     """
 
-    kind: Literal["manual", "forgiven", "late", "attempts"]
+    kind: Literal["manual", "forgiven", "given", "late", "attempts"]
     title: str
     points: float | None
     max_points: float = 0.0
@@ -178,12 +181,16 @@ class AdjustmentPart(_Part):
 
 
 class CommentPart(_Part):
-    """What a person wrote to the student, at a line of a file or about the whole."""
+    """What a person wrote to the student, at a line of a file or about the whole.
+
+    ``earlier`` says that it is about an attempt before this one, and its line is one of then.
+    """
 
     text: str
     by: str
     file: str | None = None
     line: int | None = None
+    earlier: bool = False
 
 
 class AttemptPart(_Part):
@@ -266,6 +273,12 @@ class Result(_Part):
         """What :attr:`known_score` could be at most."""
         known = (one.max_points for one in self.adjustments if one.points is not None)
         return total((self.max_score, *known))
+
+    @property
+    def possible_score(self) -> float:
+        """Points as far as they are known, with all that a person may still give."""
+        waits = (one.max_points for one in self.adjustments if one.points is None)
+        return total((self.known_score or 0.0, *waits))
 
     def of(self, status: Status) -> tuple[CheckPart, ...]:
         """Checks that ended so, in the author's order."""

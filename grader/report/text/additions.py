@@ -22,9 +22,10 @@ def line(one: AdjustmentPart) -> str:
 
 
 def place(comment: CommentPart) -> str:
-    """``file:line`` of a comment, ``file``, or nothing for one about the whole."""
+    """``file:line`` of a comment, ``file``, or nothing; of an earlier attempt it says so."""
     parts = (comment.file or "", str(comment.line) if comment.file and comment.line else "")
-    return one_line(":".join(filter(None, parts)))
+    where = one_line(":".join(filter(None, parts)))
+    return " of ".join(filter(None, (where, "an earlier attempt" if comment.earlier else "")))
 
 
 def comment_line(comment: CommentPart) -> str:
