@@ -214,6 +214,11 @@ def _lacks(need: needs.Need, user: _User) -> Iterator[_Lack]:
 
 
 @_lacks.register
+def _(need: needs.Bags, user: _User) -> Iterator[_Lack]:
+    yield from ()
+
+
+@_lacks.register
 def _(need: needs.SimulatedRobot, user: _User) -> Iterator[_Lack]:
     for scenario in user.scenarios:
         needless = need.about and user.value(need.about) is None

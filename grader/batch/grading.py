@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
+from typing import TypeVar
 
 from grader.assignment.limits import BuildLimitOptions
 from grader.assignment.load import LoadedAssignment
 from grader.batch.reference_run import read_references
 from grader.batch.type_support import TypeSupport
-from grader.checks.need import StudentTests
+from grader.checks.check import Parameters
+from grader.checks.need import Bags, Need, StudentTests
 from grader.errors import GraderFault, UsageError, machine_fault
 from grader.findings.finding import Status
 from grader.grade import Grade, grade
@@ -37,6 +39,7 @@ SUBMISSION_FILE = "submission.json"
 MOST_RUNS = 3
 """Runs of a scenario before it is given up as disturbed."""
 _LONGEST_WORDS = 300
+_N = TypeVar("_N", bound=Need)
 
 OnRecorded = Callable[[SubmissionRecord, Mapping[str, Recording]], None]
 """Called with what is known of a submission: when it is read, when it is built (``build`` is there
@@ -78,6 +81,7 @@ class Grading:
         self._seed = seed
         self._first = first
         self._on_recorded = on_recorded
+        self._with_bags = any(True for _ in _needed(loaded, Bags))
         self._libraries = (*loaded.assignment.libraries, *([LIBRARY] if _tested(loaded) else ()))
         check_installed(self._libraries)
         self._build_limits = _build_limits(loaded.assignment.build_limits)
@@ -126,6 +130,7 @@ class Grading:
                 on_output=on_output,
                 tested=tested,
                 source_folder=source_folder,
+                with_bags=self._with_bags,
             )
         if name is not None:
             prepared = prepared.named(name)
@@ -287,12 +292,16 @@ class Grading:
 
 def _tested(loaded: LoadedAssignment) -> frozenset[str]:
     """The packages whose own tests a check judges."""
-    return frozenset(
-        getattr(bound.parameters, need.package)
-        for bound in loaded.checks
-        for need in bound.parameters.needs
-        if isinstance(need, StudentTests)
-    )
+    found = _needed(loaded, StudentTests)
+    return frozenset(getattr(parameters, need.package) for parameters, need in found)
+
+
+def _needed(loaded: LoadedAssignment, kind: type[_N]) -> Iterator[tuple[Parameters, _N]]:
+    """The needs of one kind that checks have, with the parameters of each check."""
+    for bound in loaded.checks:
+        for need in bound.parameters.needs:
+            if isinstance(need, kind):
+                yield bound.parameters, need
 
 
 def _build_limits(options: BuildLimitOptions) -> BuildLimits:

@@ -135,6 +135,13 @@ class StudentTests(Submitted):
 
 
 @dataclass(frozen=True)
+class Bags(Need):
+    """The bags of the submission, which are read for such a check only."""
+
+    words = "bags, as `ros2 bag record` writes them"
+
+
+@dataclass(frozen=True)
 class RuffRules(Need):
     """Rules that ruff has: others are never broken."""
 

@@ -70,6 +70,7 @@ def prepare(
     on_output: Callable[[str], None] = lambda _: None,
     tested: Callable[[SubmissionRecord], frozenset[str]] = lambda _: frozenset(),
     source_folder: Path | None = None,
+    with_bags: bool = False,
 ) -> Prepared:
     """Find the packages of a submission, read them, build them.
 
@@ -83,6 +84,7 @@ def prepare(
             comes at once.
         tested: Packages whose own tests are run after the build, by what was read before it.
         source_folder: Where the text files of the submission are kept, or None.
+        with_bags: Whether its bags are read.
 
     Raises:
         UsageError: Nothing is at ``path``, or it is a URL.
@@ -105,7 +107,10 @@ def prepare(
         with opened(source) as located:
             if source_folder is not None:
                 keep_source(located.root, source_folder)
-            return _prepare(located, replace(builder, is_second=is_second), store, tested)
+            bags = read_bags(located, ros, sandbox) if with_bags else None
+            builds = replace(builder, is_second=is_second)
+            prepared = _prepare(located, builds, store, tested)
+            return replace(prepared, record=replace(prepared.record, bags=bags))
 
     try:
         return once_more(attempt)
@@ -179,7 +184,6 @@ def _prepare(
         leftovers=located.leftovers,
         files=tuple(shown(file.path) for file in located.files[:_MOST_PATHS]),
         headings=read_headings(located.root, located.files),
-        bags=read_bags(located.root, located.files),
     )
     if record.problem is not None:
         return Prepared(record, None)

@@ -283,7 +283,7 @@ class SubmissionRecord:
         leftovers: What builds and runs made and was handed in too, such as ``build``.
         files: Paths of what was handed in; at most 5000.
         headings: Path of each text (Markdown, reStructuredText) -> its headings.
-        bags: Recordings of ``ros2 bag record``.
+        bags: Recordings of ``ros2 bag record``; None where no check asked for them.
         build: None where nothing was built.
         given: Variable of the assignment -> its value, from the roster or from `--set`.
     """
@@ -296,7 +296,7 @@ class SubmissionRecord:
     leftovers: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     headings: tuple[tuple[str, tuple[str, ...]], ...] = ()
-    bags: tuple[BagRecord, ...] = ()
+    bags: tuple[BagRecord, ...] | None = None
     given: tuple[tuple[str, str], ...] = ()
 
     @property

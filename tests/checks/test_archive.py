@@ -84,7 +84,13 @@ def test_a_bag_that_lacks_something_fails(bag, parameters, words):
 
 
 def test_no_bag_at_all_fails():
-    assert "there is no bag" in failing("archive.bag", submission())
+    assert "there is no bag" in failing("archive.bag", submission(bags=()))
+
+
+def test_bags_that_were_not_read_are_no_fault_of_the_student():
+    finding = judge("archive.bag", submission())
+    assert finding.status is Status.ERROR
+    assert "grade again" in finding.observed
 
 
 FILLED = {

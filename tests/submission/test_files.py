@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import zstandard
 
-from grader.submission.intake.listing import SubmissionFile
+from grader.ros import find as find_ros
+from grader.sandbox.limits import BUILD, MIB
+from grader.sandbox.sandbox import Sandbox
 from grader.submission.intake.locate import opened
+from grader.submission.prepare import prepare
+from grader.submission.read import bag as bag_reader
 from grader.submission.read.bag import read_bags
 from grader.submission.read.document import headings
+from grader.submission.record import BagRecord
 from tests.submission.samples import zip_bytes
 
 MADE = {
@@ -61,7 +68,7 @@ def test_headings_of_markdown_and_restructuredtext() -> None:
 
 @pytest.mark.parametrize("plugin", ["MCAP", "SQLITE3"])
 def test_a_recorded_bag_is_read_to_its_end(tmp_path: Path, plugin: str) -> None:
-    record = read_bags(tmp_path, write_bag(tmp_path, plugin))[0]
+    record = read(write_bag(tmp_path / "submission", plugin))
     assert record.problem is None
     assert record.duration_s == pytest.approx(2.0)
     assert [(one.name, one.type, one.messages) for one in record.topics] == [
@@ -70,21 +77,67 @@ def test_a_recorded_bag_is_read_to_its_end(tmp_path: Path, plugin: str) -> None:
 
 
 def test_a_damaged_bag_says_so(tmp_path: Path) -> None:
-    files = write_bag(tmp_path, "SQLITE3")
-    storage = next(tmp_path.glob("bag/*.db3"))
+    bag = write_bag(tmp_path / "submission", "SQLITE3")
+    storage = next(bag.glob("*.db3"))
     storage.write_bytes(storage.read_bytes()[:4000])
-    assert "cannot be read" in str(read_bags(tmp_path, files)[0].problem)
+    assert "cannot be read" in str(read(bag).problem)
 
 
 def test_a_bag_whose_recording_did_not_end_says_so(tmp_path: Path) -> None:
-    files = [one for one in write_bag(tmp_path, "MCAP") if "metadata" not in one.path]
-    assert "no metadata.yaml" in str(read_bags(tmp_path, files)[0].problem)
+    bag = write_bag(tmp_path / "submission", "MCAP")
+    (bag / "metadata.yaml").unlink()
+    assert "no metadata.yaml" in str(read(bag).problem)
 
 
-def write_bag(root: Path, plugin: str) -> list[SubmissionFile]:
+@pytest.mark.parametrize("isolated", [True, False], ids=["sandbox", "none"])
+def test_a_bag_that_unpacks_to_more_than_a_disk_fills_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, isolated: bool
+) -> None:
+    elsewhere = tmp_path / "tmp"
+    elsewhere.mkdir()
+    monkeypatch.setenv("TMPDIR", str(elsewhere))
+    monkeypatch.setattr(bag_reader, "BUILD", replace(BUILD, disk_bytes=8 * MIB, file_bytes=8 * MIB))
+    record = read(packed_bag(tmp_path / "submission", 64 * MIB), isolated=isolated)
+    assert "cannot be read" in str(record.problem)
+    assert not list(elsewhere.iterdir())
+
+
+def test_a_bag_is_read_only_where_a_check_asks_for_it(tmp_path: Path) -> None:
+    write_bag(tmp_path / "submission", "MCAP")
+    for asked in (True, False):
+        record = prepare(
+            tmp_path / "submission", find_ros(), cache=tmp_path / "cache", with_bags=asked
+        ).record
+        assert (record.bags is not None) is asked
+
+
+def read(bag: Path, *, isolated: bool = False) -> BagRecord:
+    sandbox = Sandbox(bag.parent.with_name("cache")) if isolated else None
+    with opened(bag.parent) as located:
+        (record,) = read_bags(located, find_ros(), sandbox)
+    return record
+
+
+def packed_bag(root: Path, size: int) -> Path:
+    """A bag with one file that zstd packed into next to nothing."""
+    bag = write_bag(root, "SQLITE3")
+    storage = next(bag.glob("*.db3"))
+    packed = zstandard.ZstdCompressor().compress(bytes(size))
+    storage.with_name(f"{storage.name}.zstd").write_bytes(packed)
+    storage.unlink()
+    metadata = bag / "metadata.yaml"
+    text = metadata.read_text().replace(storage.name, f"{storage.name}.zstd")
+    text = text.replace("compression_format: ''", "compression_format: zstd")
+    text = text.replace("compression_mode: ''", "compression_mode: FILE")
+    metadata.write_text(text)
+    return bag
+
+
+def write_bag(root: Path, plugin: str) -> Path:
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
+    root.mkdir(exist_ok=True)
     store = get_typestore(Stores.ROS2_JAZZY)
     kind = "std_msgs/msg/String"
     with Writer(root / "bag", version=9, storage_plugin=StoragePlugin[plugin]) as writer:
@@ -92,7 +145,4 @@ def write_bag(root: Path, plugin: str) -> list[SubmissionFile]:
         for second in range(3):
             data = store.serialize_cdr(store.types[kind](data="hello"), kind)
             writer.write(connection, second * 10**9, bytes(data))
-    return [
-        SubmissionFile(path.relative_to(root).as_posix(), path.stat().st_size)
-        for path in sorted((root / "bag").iterdir())
-    ]
+    return root / "bag"

@@ -7,6 +7,7 @@ from fnmatch import fnmatch
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check
+from grader.checks.need import Bags
 from grader.diagnosis.cause import Cause
 from grader.findings.finding import Finding
 from grader.findings.wording import code, codes, counted, listing
@@ -98,6 +99,8 @@ def _missing(parameters: File, headings: tuple[str, ...]) -> list[str]:
 class Bag(Parameters):
     """Parameters of archive.bag."""
 
+    needs = (Bags(),)
+
     topics: dict[TopicName, InterfaceName] = Field(
         default_factory=dict, description="Topics with messages in the bag -> their types."
     )
@@ -110,11 +113,13 @@ class Bag(Parameters):
 
 
 @check("archive.bag", Subject.SUBMISSION, Bag)
-def bag(submission: SubmissionRecord, parameters: Bag) -> Finding:
+def bag(submission: SubmissionRecord, parameters: Bag) -> Finding | Cause:
     """The submission holds a recorded bag that can be read.
 
     Judged by reading every message of the bags that `ros2 bag record` wrote, in MCAP or SQLite.
     """
+    if submission.bags is None:
+        return Cause("the bags were not read: grade again", ours=True)
     causes = [(one, _why_not(one, parameters)) for one in submission.bags]
     for one, cause in causes:
         if cause is None:
@@ -123,10 +128,8 @@ def bag(submission: SubmissionRecord, parameters: Bag) -> Finding:
             return Finding.passed(parameters.asked_for, observed)
     if not causes:
         nothing = "there is no bag, a folder with `metadata.yaml` and an `.mcap` or `.db3` file"
-        cause = Cause(nothing, "Hand in the whole folder that `ros2 bag record` made.")
-    else:
-        cause = next(cause for _, cause in causes if cause is not None)
-    return cause.finding(parameters.asked_for)
+        return Cause(nothing, "Hand in the whole folder that `ros2 bag record` made.")
+    return next(cause for _, cause in causes if cause is not None)
 
 
 def _why_not(bag: BagRecord, parameters: Bag) -> Cause | None:

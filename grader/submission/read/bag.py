@@ -1,90 +1,122 @@
 """Bags of a submission, as ``ros2 bag record`` writes them, read to their end.
 
-Each bag is read by a process of its own with bounded time and memory: its file is the student's.
+Each bag is read by a process of its own, in the sandbox and the limits of a build: its file is the
+student's, and a small one may unpack to a disk full.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import resource
+import shutil
+import signal
 import sys
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter
 
 from grader.errors import GraderFault
-from grader.submission.build.bounded import OutputLimits, run_bounded
-from grader.submission.intake.listing import SubmissionFile
+from grader.ros import RosInstallation
+from grader.sandbox.limits import BUILD, size_words
+from grader.sandbox.usage import folder_usage
+from grader.submission.build.bounded import Outcome, OutputLimits, run_bounded
+from grader.submission.intake.locate import Located
 from grader.submission.intake.paths import join, shown
-from grader.submission.record import BagRecord
+from grader.submission.record import BagRecord, BagTopic
+
+if TYPE_CHECKING:
+    from grader.sandbox.sandbox import Sandbox
 
 _METADATA = "metadata.yaml"
-_STORAGE = (".mcap", ".db3")
+_STORAGE = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
 _MOST_BAGS = 10
-_WALL_S = 30.0
-_MEMORY_BYTES = 2 * 2**30
+_CPU_S = 30
+_WALL_S = 300.0
 _OUTPUT = OutputLimits(head=256 * 1024, tail=4096)
+_LIBRARY = "rosbags"
+_PROGRAM = Path(__file__).with_name("bag_contents.py")
 _RECORD = TypeAdapter(BagRecord)
 
 
-def read_bags(root: Path, files: Sequence[SubmissionFile]) -> tuple[BagRecord, ...]:
-    """Read every bag of a submission."""
-    paths = {file.path for file in files}
+def read_bags(
+    located: Located, ros: RosInstallation, sandbox: Sandbox | None
+) -> tuple[BagRecord, ...]:
+    """Read every bag of a submission, at most ten.
+
+    Args:
+        located: The submission's private copy; what is unpacked of a bag lies beside it for a
+            while.
+
+    Raises:
+        GraderFault: One was not read within minutes, by no fault of its own.
+    """
+    paths = {file.path for file in located.files}
     folders = {path.rpartition("/")[0] or "." for path in paths if path.endswith(_STORAGE)}
     return tuple(
-        _read(root, folder, has_metadata=join(folder, _METADATA) in paths)
+        _read(located.root, folder, ros, sandbox)
+        if join(folder, _METADATA) in paths
+        else BagRecord(
+            shown(folder), f"it has no {_METADATA}, which is written when the recording ends"
+        )
         for folder in sorted(folders, key=os.fsencode)[:_MOST_BAGS]
     )
 
 
-def _read(root: Path, folder: str, *, has_metadata: bool) -> BagRecord:
+def _read(root: Path, folder: str, ros: RosInstallation, sandbox: Sandbox | None) -> BagRecord:
     path = shown(folder)
-    if not has_metadata:
-        return BagRecord(path, f"it has no {_METADATA}, which is written when the recording ends")
+    scratch = root.with_name("bag")
+    scratch.mkdir()
     try:
-        outcome = run_bounded(
-            [sys.executable, "-I", "-m", __name__, str(root / folder)],
-            cwd=root,
-            environment={"PATH": os.defpath, "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"},
+        outcome = _run(root, root / folder, scratch, ros, sandbox)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+    if outcome.ended_by_us == "time":
+        raise GraderFault(f"the bag {path} was not read within {_WALL_S:.0f} s")
+    if outcome.ended_by_us:
+        return BagRecord(path, f"it cannot be read: {outcome.ended_by_us}")
+    if outcome.status in (-signal.SIGXCPU, -signal.SIGKILL):
+        return BagRecord(path, f"it cannot be read within {_CPU_S} s of CPU time")
+    try:
+        found = _RECORD.validate_python({"path": path, **json.loads(outcome.output)})
+    except (ValueError, TypeError):
+        return BagRecord(path, "it cannot be read")
+    topics = (BagTopic(shown(one.name), shown(one.type), one.messages) for one in found.topics)
+    problem = found.problem and shown(found.problem)
+    return BagRecord(path, problem, found.duration_s, tuple(topics))
+
+
+def _run(
+    root: Path, bag: Path, scratch: Path, ros: RosInstallation, sandbox: Sandbox | None
+) -> Outcome:
+    program = _PROGRAM.read_text(encoding="utf-8")
+    command = [sys.executable, "-I", "-c", program, str(bag), str(_CPU_S)]
+    environment = {
+        "PATH": os.defpath,
+        "TMPDIR": str(scratch),
+        "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1",
+    }
+
+    def disk(_: int) -> str | None:
+        size, _ = folder_usage((scratch,), BUILD.disk_bytes, BUILD.files)
+        unpacked = f"it unpacks to more than {size_words(BUILD.disk_bytes)}"
+        return unpacked if size > BUILD.disk_bytes else None
+
+    excess: Callable[[int], str | None] = disk
+    with ExitStack() as stack:
+        if sandbox is not None:
+            room = stack.enter_context(
+                sandbox.allowing((_LIBRARY,)).build(ros, (scratch, root), BUILD)
+            )
+            command, environment = room.command(command, environment), dict(room.environment)
+            excess = room.excess
+        return run_bounded(
+            command,
+            cwd=scratch,
+            environment=environment,
             wall_s=_WALL_S,
             output=_OUTPUT,
+            excess=excess,
         )
-        return _RECORD.validate_python({"path": path, **json.loads(outcome.output)})
-    except (GraderFault, ValueError, TypeError):
-        return BagRecord(path, "it cannot be read")
-
-
-def _contents(bag: Path) -> dict[str, object]:
-    """What is in a bag, by reading each of its messages."""
-    from rosbags.rosbag2 import Reader
-
-    messages: Counter[tuple[str, str]] = Counter()
-    with Reader(bag) as reader:
-        messages.update({(one.topic, one.msgtype): 0 for one in reader.connections})
-        for connection, _, _ in reader.messages():
-            messages[connection.topic, connection.msgtype] += 1
-        duration_s = reader.duration / 1e9 if messages.total() else 0.0
-    topics = [
-        {"name": shown(name), "type": shown(kind), "messages": count}
-        for (name, kind), count in sorted(messages.items())
-    ]
-    return {"duration_s": duration_s, "topics": topics}
-
-
-def main() -> int:
-    """Print what is in the bag that the command line names, as JSON."""
-    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
-    try:
-        found = _contents(Path(sys.argv[1]))
-    # A damaged file makes any of the libraries below raise anything.
-    except Exception as error:
-        found = {"problem": f"it cannot be read: {shown(str(error))[:300] or type(error).__name__}"}
-    print(json.dumps(found))
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
