@@ -25,6 +25,7 @@ STUDENT_FILE = "student-report.html"
 """The report without hidden checks; only where there are some."""
 RESULT_FILE = "result.json"
 INSTALL_FOLDER = "install"
+_MARK = ".rosgrade-report"
 
 
 def write_graded(
@@ -88,15 +89,20 @@ def write_report(
         write_whole(file, render_report(graded.grade, copy, *shown))
 
 
-def refuse_foreign(folder: Path, *, keep: bool) -> None:
-    """Let no report replace a folder of its name that is not of an earlier report."""
-    recordings = folder / RECORDINGS_FOLDER
+def claim(folder: Path, *, keep: bool) -> None:
+    """Mark a folder as one for reports, so that one that is interrupted is in nobody's way.
+
+    Raises:
+        UsageError: Something of somebody else's is in the place of a folder that would be replaced.
+    """
+    recordings, mark = folder / RECORDINGS_FOLDER, folder / _MARK
     foreign = any(recordings.glob("*.mcap")) and not (recordings / SUBMISSION_FILE).is_file()
     others = [recordings] if foreign else []
-    if not (folder / RESULT_FILE).is_file():
+    if not ((folder / RESULT_FILE).is_file() or mark.is_file()):
         others += [folder / name for name in (SOURCE_FOLDER, *([INSTALL_FOLDER] if keep else []))]
     for other in filter(Path.exists, others):
         raise UsageError(f"{other}: does not belong to a report, so it stays; use another folder")
+    write_whole(mark, "rosgrade writes its reports here, over those of before.\n")
 
 
 def keep_install(graded: Graded, folder: Path) -> Path | None:

@@ -106,7 +106,7 @@ def check(
             # Imported while the cell gets ready.
             from grader.assignment.load import load_assignment
             from grader.assignment.selection import select, visible_part
-            from grader.batch.files import refuse_foreign
+            from grader.batch.files import claim
             from grader.batch.grading import RECORDINGS_FOLDER, Grading
             from grader.report.files import check_folder
             from grader.submission.intake.locate import check_path
@@ -117,7 +117,7 @@ def check(
             loaded = select(shown, tuple(only or ()), tuple(scenario or ()))
             check_path(submission)
             check_folder(report)
-            refuse_foreign(report, keep=keep)
+            claim(report, keep=keep)
             grading = Grading(loaded, runner, cache_folder(), seed=seed)
             with progress.shown():
                 graded = grading.grade(

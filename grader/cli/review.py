@@ -35,7 +35,7 @@ def review(
     say(f"Review of {out} by {initials}: {server.url}")
     say("Ctrl-C ends")
     if open_browser:
-        open_page(server.url)
+        open_page(server.door(out), server.url)
     try:
         threading.Event().wait()
     except KeyboardInterrupt:

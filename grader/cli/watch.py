@@ -76,7 +76,7 @@ def watch(
     from grader import ros
     from grader.assignment.load import load_assignment
     from grader.assignment.selection import select, visible_part
-    from grader.batch.files import refuse_foreign
+    from grader.batch.files import claim
     from grader.report.files import check_folder, refuse_inputs
     from grader.run.runner import Runner
     from grader.server.watch import ReportPage
@@ -92,7 +92,7 @@ def watch(
     loaded = load()
     check_path(submission)
     check_folder(report)
-    refuse_foreign(report, keep=False)
+    claim(report, keep=False)
     with ExitStack() as stack:
         page = ReportPage(report / "report.html", port)
         stack.callback(page.close)
@@ -108,7 +108,7 @@ def watch(
         console = output_console()
         say(f"Report page: {page.url}")
         if open_report:
-            open_page(page.url)
+            open_page(page.door(report), page.url)
         try:
             _follow(work, page, console)
         except KeyboardInterrupt:

@@ -39,6 +39,12 @@ class Guard:
         self._token = token
         # A browser sends the cookies of one address to all of its ports.
         self._cookie = f"rosgrade-{host.rpartition(':')[2]}"
+        self._once = ""
+
+    def token_for_once(self) -> str:
+        """A token that lets in the first who has it, instead of one given before."""
+        self._once = secrets.token_urlsafe(32)
+        return self._once
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request, or hand it on."""
@@ -59,10 +65,11 @@ class Guard:
         if request.headers.get("Host") != self._host:
             return PlainTextResponse("This is not the address of this server.", 403)
         given = request.query_params.get("token")
-        if given is not None and request.method == "GET" and self._is_token(given):
+        if given is not None and request.method == "GET" and self._lets_in(given):
             # The token leaves the address, so that no history and no screenshot shows it.
             answer = RedirectResponse(request.url.path, 303)
-            answer.set_cookie(self._cookie, self._token, httponly=True, samesite="strict")
+            # Not "strict": a browser that comes from a file would not send it after this answer.
+            answer.set_cookie(self._cookie, self._token, httponly=True, samesite="lax")
             return answer
         if not self._is_token(request.cookies.get(self._cookie, "")):
             text = "Open the whole address that rosgrade printed: it ends with a token."
@@ -75,6 +82,12 @@ class Guard:
         if not length.isdecimal():
             return PlainTextResponse("The length is missing.", 411)
         return PlainTextResponse("Too much at once.", 413) if int(length) > MOST_BYTES else None
+
+    def _lets_in(self, given: str) -> bool:
+        if self._once and secrets.compare_digest(given.encode(), self._once.encode()):
+            self._once = ""
+            return True
+        return self._is_token(given)
 
     def _is_token(self, given: str) -> bool:
         return secrets.compare_digest(given.encode(), self._token.encode())

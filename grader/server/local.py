@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import secrets
 import socket
 import threading
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.errors import UsageError
@@ -35,8 +37,10 @@ class LocalServer:
             raise UsageError(f"--port {port}: {error.strerror}") from error
         self.host = f"{ADDRESS}:{self._socket.getsockname()[1]}"
         """Address and port, as a browser names them in its requests."""
+        self._guard = Guard(app, self.host, self._token)
+        self._door: Path | None = None
         config = uvicorn.Config(
-            Guard(app, self.host, self._token),
+            self._guard,
             lifespan="off",
             ws="none",
             log_config=None,
@@ -56,8 +60,22 @@ class LocalServer:
         """What to open; no request without its token is answered."""
         return f"http://{self.host}/?token={self._token}"
 
+    def door(self, folder: Path) -> str:
+        """The address of a file in a folder that leads a browser to the page, once.
+
+        Every user of the machine can read the command line of a browser, but not this file.
+        """
+        door = self._door = folder / "open.html"
+        url = f"http://{self.host}/?token={self._guard.token_for_once()}"
+        door.unlink(missing_ok=True)
+        with os.fdopen(os.open(door, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+            file.write(f'<!doctype html><meta http-equiv="refresh" content="0; url={url}">')
+        return door.resolve().as_uri()
+
     def close(self) -> None:
         """Stop; requests that are being answered get a second."""
+        if self._door is not None:
+            self._door.unlink(missing_ok=True)
         self._server.should_exit = True
         self._thread.join()
         self._socket.close()

@@ -165,7 +165,9 @@ def test_a_report_never_replaces_a_folder_of_sources_that_is_not_its_own(
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_an_interrupted_check_leaves_nothing_behind(number: signal.Signals, tmp_path: Path) -> None:
+def test_an_interrupted_check_leaves_nothing_behind_that_stops_the_next(
+    number: signal.Signals, rosgrade: Rosgrade, tmp_path: Path
+) -> None:
     submission = copy(tmp_path, "PERIOD_S = 0.3", "PERIOD_S = 2.5")
     check = subprocess.Popen(
         [sys.executable, "-m", "grader", "check", "timed_publisher", str(submission)],
@@ -189,6 +191,8 @@ def test_an_interrupted_check_leaves_nothing_behind(number: signal.Signals, tmp_
     assert not (tmp_path / "rosgrade-report" / "result.json").exists()
     assert not list(tmp_path.glob("rosgrade-scratch-*"))
     assert not _running(str(tmp_path))
+    again = rosgrade("check", "timed_publisher", submission, "--only", "package")
+    assert again.returncode == 0, again.stderr
 
 
 def _running(fragment: str) -> list[bytes]:

@@ -15,10 +15,14 @@ from tests.server.make_class import make_class
 
 def test_the_printed_address_opens_the_class_and_ctrl_c_ends_it(tmp_path: Path) -> None:
     out = make_class(tmp_path)
+    browser_script = tmp_path / "browser"
+    browser_script.write_text('#!/bin/sh\necho "$1" > asked\n')
+    browser_script.chmod(0o755)
+    environ = {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1", "BROWSER": f"{browser_script} %s"}
     review = subprocess.Popen(
-        [sys.executable, "-m", "grader", "review", str(out), "--by", "AK"],
+        [sys.executable, "-m", "grader", "review", str(out), "--by", "AK", "--open"],
         cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"},
+        env={**os.environ, **environ},
         stderr=subprocess.STDOUT,
         stdout=subprocess.PIPE,
         text=True,
@@ -38,6 +42,9 @@ def test_the_printed_address_opens_the_class_and_ctrl_c_ends_it(tmp_path: Path) 
         review.kill()
         review.wait()
         review.stdout.close()
+    # The command line of a browser can be read by every user of the machine.
+    assert (tmp_path / "asked").read_text() == f"{(out / 'open.html').as_uri()}\n"
+    assert not (out / "open.html").exists()
     assert told.endswith("No longer serving.\n") and "Traceback" not in told
     assert review.returncode == 0
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import stat
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from starlette.applications import Starlette
@@ -35,8 +38,19 @@ def test_the_token_becomes_a_cookie_that_no_script_and_no_other_site_can_use(
     server: LocalServer,
 ) -> None:
     client = Client(server).open()
-    assert "HttpOnly" in client.cookie and "SameSite=strict" in client.cookie
+    assert "HttpOnly" in client.cookie and "SameSite=lax" in client.cookie
     assert client.get("/").body == b"grades"
+
+
+def test_a_browser_is_led_in_by_a_file_that_only_its_user_can_read_and_only_once(
+    server: LocalServer, tmp_path: Path
+) -> None:
+    file = Path(server.door(tmp_path).removeprefix("file://"))
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+    token = re.findall(r"token=([\w-]+)", file.read_text())[0]
+    assert token not in server.url
+    assert Client(server).get(f"/?token={token}").status == 303
+    assert Client(server).get(f"/?token={token}").status == 403
 
 
 def test_who_asks_for_another_host_is_refused_even_with_the_token(server: LocalServer) -> None:

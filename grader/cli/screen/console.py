@@ -41,8 +41,12 @@ def _print(label: str, style: str, message: str) -> None:
     console.print(Text.assemble((label, style), message))
 
 
-def open_page(url: str) -> None:
-    """Open a page in the user's browser, or say that it has to be opened by hand."""
+def open_page(url: str, shown_url: str = "") -> None:
+    """Open a page in the user's browser, or say that it has to be opened by hand.
+
+    Args:
+        shown_url: What is said instead of ``url``, if a person opens another address.
+    """
     import webbrowser
 
     # Without a display only browsers for terminals are found, which would take this terminal.
@@ -54,4 +58,4 @@ def open_page(url: str) -> None:
         work.start()
         work.join(2.0)
     if any(failed):
-        print_warning(f"--open: no browser could be started; the page is {url}")
+        print_warning(f"--open: no browser could be started; the page is {shown_url or url}")
