@@ -127,8 +127,20 @@ def test_links_to_the_sources_or_to_nothing_go_and_cost_nothing(tmp_path: Path) 
     (sources / "x.yaml").touch()
     (install / "lib/x.yaml").symlink_to(sources / "x.yaml")
     (install / "lib/gone.yaml").symlink_to("/home/student/ros2_ws/src/gone.yaml")
+    (install / "lib/nothing.sh").symlink_to("nothing")
     assert tidy(install, sources, most_bytes=10**6, most_files=10) is None
     assert list((install / "lib").iterdir()) == []
+
+
+def test_a_link_within_an_install_space_still_leads_there_when_it_was_moved(tmp_path: Path) -> None:
+    install = tmp_path / "install"
+    (install / "lib/bot").mkdir(parents=True)
+    (install / "bin").mkdir()
+    (install / "lib/bot/talk").write_text("hello")
+    (install / "bin/talk").symlink_to(install / "lib/bot/talk")
+    assert tidy(install, tmp_path / "src", most_bytes=10**6, most_files=10) is None
+    moved = install.rename(tmp_path / "moved")
+    assert (moved / "bin/talk").read_text() == "hello"
 
 
 def test_what_leads_out_of_an_install_space_is_named_and_nothing_of_it_is_used(

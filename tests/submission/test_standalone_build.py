@@ -121,6 +121,8 @@ def test_an_install_space_is_laid_where_it_belongs(tmp_path: Path) -> None:
         ': ${AMENT_CURRENT_PREFIX:="/cache/.unfinished-1/install"}'
     )
     (share / "link.sh").symlink_to("package.sh")
+    (share / "nothing.sh").symlink_to("nothing")
+    (share / "folder.sh").mkdir()
     lay("bot_msgs", built, install)
     for name in ("package.sh", "local_setup.sh"):
         text = (install / "share/bot_msgs" / name).read_text()

@@ -99,6 +99,7 @@ def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> s
     """See that an install space holds nothing that is dangerous to open or follow.
 
     Symbolic links to the submission's files, or to nothing, are removed: they will lead nowhere.
+    The others are made relative, as the install space will be moved.
 
     Returns:
         Why it cannot be used at all, in which case it is removed, or None.
@@ -120,6 +121,11 @@ def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> s
                         target = str(path.readlink())
                         planted.append(f"{_named(path, install)}, a link out to {target!r}")
                     path.unlink()
+                elif not Path(end).exists():
+                    path.unlink()
+                elif path.readlink().is_absolute():
+                    path.unlink()
+                    path.symlink_to(os.path.relpath(end, os.path.realpath(parent)))
             elif not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
                 planted.append(f"{_named(path, install)}, which is not a file, folder or link")
                 path.unlink()

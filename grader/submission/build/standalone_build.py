@@ -13,6 +13,7 @@ import shutil
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from grader.submission.build.installed import regular_files
 from grader.submission.intake.listing import SubmissionFile
 from grader.submission.intake.paths import is_within
 from grader.submission.read.manifest import MANIFEST
@@ -69,10 +70,14 @@ def lay(package: str, built: Path, install: Path) -> None:
     ignore = shutil.ignore_patterns("__pycache__")
     shutil.copytree(built, install, symlinks=True, dirs_exist_ok=True, ignore=ignore)
     share = install / "share" / package
-    built_at = _PREFIX.search((share / "package.sh").read_text(errors="surrogateescape"))
+    # Scripts for a plain shell cannot tell where they are, and name the place of the build.
+    scripts = {
+        script: script.read_text(errors="surrogateescape")
+        for script in regular_files(share)
+        if script.parent == share and script.suffix == ".sh"
+    }
+    built_at = _PREFIX.search(scripts.get(share / "package.sh", ""))
     if built_at is None:
         return
-    # Scripts for a plain shell cannot tell where they are, and name the place of the build.
-    for script in share.glob("*.sh"):
-        text = script.read_text(errors="surrogateescape")
+    for script, text in scripts.items():
         script.write_text(text.replace(built_at[1], str(install)), errors="surrogateescape")
