@@ -27,6 +27,10 @@ _OF_MACHINE = {
     errno.EIO: ("the disk cannot be read or written", "look at the system's log"),
 }
 """System errors for which the machine is the reason: in words, and what to do about them."""
+_NO_TEMPORARY = (
+    "no folder for temporary files can be written to",
+    "make room in /tmp, or set TMPDIR to a folder with room",
+)
 
 
 class RosgradeError(Exception):
@@ -84,9 +88,12 @@ def machine_fault(error: OSError, place: Path | None = None) -> GraderFault | No
     Args:
         place: What was written, where the error does not name it.
     """
-    if error.errno not in _OF_MACHINE:
+    # As tempfile.gettempdir() says it.
+    no_temporary = "No usable temporary directory" in (error.strerror or "")
+    found = _NO_TEMPORARY if no_temporary else _OF_MACHINE.get(error.errno or 0)
+    if found is None:
         return None
-    what, remedy = _OF_MACHINE[error.errno]
+    what, remedy = found
     named = error.filename2 or error.filename or place
     where = f" ({named})" if named else ""
     return GraderFault(f"this machine: {what}{where}; no point is lost by it: {remedy}")

@@ -13,11 +13,13 @@ from pathlib import Path
 
 import pytest
 
+from grader.errors import machine_fault
 from grader.scratch import Scratch, remove_stale
 
 HOLDS = """
 import sys, tempfile
 tempfile.tempdir = sys.argv[1]
+from grader.errors import machine_fault
 from grader.scratch import Scratch
 scratch = Scratch("test")
 (scratch.path / "file").touch()
@@ -35,6 +37,18 @@ def test_it_is_gone_after_its_block(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     twice.remove()
     twice.remove()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_where_no_temporary_file_can_be_written_one_sentence_says_what_to_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(tempfile, "_candidate_tempdir_list", lambda: [str(tmp_path / "gone")])
+    with pytest.raises(FileNotFoundError) as raised:
+        Scratch("test")
+    fault = str(machine_fault(raised.value))
+    assert "set TMPDIR to a folder with room" in fault
+    assert "[" not in fault
 
 
 def test_what_a_killed_process_left_goes_and_what_is_held_stays(tmp_path: Path) -> None:

@@ -85,10 +85,10 @@ class Grading:
         self._libraries = (*loaded.assignment.libraries, *([LIBRARY] if _tested(loaded) else ()))
         check_installed(self._libraries)
         self._build_limits = _build_limits(loaded.assignment.build_limits)
-        self._type_support = TypeSupport(loaded, runner.ros, cache)
+        self._stop = threading.Event()
+        self._type_support = TypeSupport(loaded, runner.ros, cache, self._stop)
         self._scenarios = loaded.assignment.scenarios
         self._builds = threading.BoundedSemaphore(cpu_count())
-        self._stop = threading.Event()
 
     def grade(
         self,
@@ -163,7 +163,7 @@ class Grading:
         loaded, unnamed = named(self._loaded, prepared.record)
         support = self._type_support
         if loaded is not self._loaded:
-            support = TypeSupport(loaded, self._runner.ros, self._cache)
+            support = TypeSupport(loaded, self._runner.ros, self._cache, self._stop)
         self._on_recorded(prepared.record, {})
         can_run = prepared.install is not None and unnamed is None
         # The longest start first: none of them is left to run alone in the end.

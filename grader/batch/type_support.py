@@ -54,8 +54,17 @@ def missing_underlays(loaded: LoadedAssignment) -> list[str]:
 class TypeSupport:
     """The underlays of an assignment; nothing is built before they are asked for."""
 
-    def __init__(self, loaded: LoadedAssignment, ros: RosInstallation, cache: Path) -> None:
+    def __init__(
+        self,
+        loaded: LoadedAssignment,
+        ros: RosInstallation,
+        cache: Path,
+        stop: threading.Event | None = None,
+    ) -> None:
         """Set up; nothing is built yet.
+
+        Args:
+            stop: Set when nothing needs to be built any more.
 
         Raises:
             MissingUnderlay: The assignment needs one that is not on this machine.
@@ -64,6 +73,7 @@ class TypeSupport:
         self._loaded = loaded
         self._ros = ros
         self._cache = cache
+        self._stop = stop
         self._lock = threading.Lock()
         self._found: dict[bool, RosInstallation] = {}
 
@@ -85,7 +95,7 @@ class TypeSupport:
             return found
 
     def _built(self, for_probe: bool, on_build: Say) -> RosInstallation:
-        store = UnderlayStore(self._cache, self._ros, on_build)
+        store = UnderlayStore(self._cache, self._ros, on_build, stop=self._stop)
         assignment = self._loaded.assignment
         ros = store.lay(underlays_of(self._loaded))
         handed_in = {package.name for package in assignment.packages}

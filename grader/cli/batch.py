@@ -66,7 +66,7 @@ def batch(
     from grader.assignment.load import load_assignment
     from grader.batch.adjusting import ClassAdjustments, course_of
     from grader.batch.batch import Batch
-    from grader.batch.class_files import GRADES_FILE, all_standing, write_class
+    from grader.batch.class_files import GRADES_FILE, all_standing, class_rows, write_class
     from grader.batch.executor import DaskExecutor, ExecutorLost, LocalExecutor
     from grader.batch.groups import strangers
     from grader.batch.intake import take_in, take_in_roster
@@ -152,10 +152,7 @@ def batch(
     console.print(_summary(done, time.monotonic() - began_s), soft_wrap=True)
     say(f"Overview: {overview}")
     say(f"Grades: {overview.with_name(GRADES_FILE)}")
-    graded = all(
-        item.result.graded if item.result is not None else not item.entry.fault for item in done
-    )
-    raise typer.Exit(0 if graded else NOT_GRADED)
+    raise typer.Exit(NOT_GRADED if any(row.cannot_be_graded for row in class_rows(done)) else 0)
 
 
 def _at_once(jobs: str) -> int | None:

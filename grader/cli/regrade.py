@@ -84,7 +84,7 @@ def _one(path: Path, assignment: str | None, *, write: bool) -> None:
 
 
 def _class(batch: Ledger, assignment: str | None, quiet: bool, *, write: bool) -> None:
-    from grader.batch.class_files import GRADES_FILE
+    from grader.batch.class_files import GRADES_FILE, class_rows
     from grader.batch.class_regrading import regrade_class, write_regraded
     from grader.batch.regrading import load_used
 
@@ -123,4 +123,5 @@ def _class(batch: Ledger, assignment: str | None, quiet: bool, *, write: bool) -
             f"{left} cannot be judged again from their recordings; run them again with "
             "`rosgrade batch ... --retry NAME`"
         )
-    raise typer.Exit(NOT_GRADED if left else 0)
+    rows_now = class_rows([row.done for row in rows])
+    raise typer.Exit(NOT_GRADED if any(row.cannot_be_graded for row in rows_now) or left else 0)

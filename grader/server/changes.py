@@ -54,6 +54,8 @@ def _update(review: AttemptReview, sent: Any, by: str) -> dict[str, Any]:
         return {"given": (*review.given, new)}
     if sent["do"] == "take":
         return {"given": tuple(one for at, one in enumerate(review.given) if at != index)}
+    if index is not None and index not in range(len(comments)):
+        raise IndexError(index)
     if sent["do"] == "uncomment":
         del comments[index]
     elif sent["do"] == "comment":

@@ -22,8 +22,8 @@ def posted(answer: Callable[[Request, Any], Response]) -> Callable[[Request], An
             return await run_in_threadpool(answer, request, await request.json())
         except ValidationError:
             raise
-        except (KeyError, TypeError, ValueError) as error:
-            return PlainTextResponse(f"This request makes no sense: {error!r}", 400)
+        except (AttributeError, LookupError, TypeError, ValueError) as error:
+            return PlainTextResponse(f"This request makes no sense: {error!r}", 422)
 
     return endpoint
 

@@ -92,7 +92,7 @@ def prepare(
     """
     source = check_path(path)
     on_progress("reading the submission")
-    store = UnderlayStore(cache, replace(ros, underlays=()), on_progress)
+    store = UnderlayStore(cache, replace(ros, underlays=()), on_progress, stop=stop)
     builder = Builder(
         ros=ros,
         cache=BuildCache(cache),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from grader import resources, ros
 from grader.assignment.interfaces import FOLDER
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.type_support import TypeSupport, missing_underlays, wanted_underlays
-from grader.errors import AssignmentError
+from grader.errors import AssignmentError, GraderFault
 from grader.recording.interface import sections_of
 from grader.ros import RosInstallation
 from grader.submission.underlay.store import MissingUnderlay
@@ -145,3 +146,17 @@ def test_interfaces_of_an_underlay_that_is_not_built_are_not_refused_but_it_is_t
     assert [str(tmp_path / "arms/robots.repos") in one for one in missing_underlays(loaded)] == [
         True
     ]
+
+
+@pytest.mark.ros
+def test_an_interrupt_ends_the_build_of_interfaces(tmp_path: Path) -> None:
+    stop = threading.Event()
+    support = TypeSupport(load_assignment("custom_interface"), ros.find(), tmp_path, stop)
+
+    def on_build(told: str) -> None:
+        if ": building " in told:
+            stop.set()
+
+    with pytest.raises(GraderFault, match="interrupted"):
+        support.prefixes(on_build)
+    assert stop.is_set() and not list(tmp_path.glob("builds/*/build.json"))

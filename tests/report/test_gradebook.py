@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.errors import UsageError
-from grader.report.formats.gradebook import canvas_csv, cell, grades_csv, read_canvas
+from grader.report.formats.gradebook import canvas_csv, cell, csv_text, grades_csv, read_canvas
 from grader.report.model.class_row import ClassRow
 from tests.grade.sample import Told, make_submission
 from tests.report.sample import full_points, judged, lost_points, not_graded
@@ -246,6 +246,13 @@ def test_students_of_the_gradebook_without_any_row_handed_in_nothing():
 def test_a_grade_goes_before_what_could_not_be_read():
     both = [unreadable("90211"), row("alopez")]
     assert canvas_reads(fill(both).text)["90211"] == {"ROS 2 Publisher (48211)": "3"}
+
+
+@pytest.mark.parametrize("text", ["a;=b", "a\tb", 'a"b', "a,b", "a\r\nb"])
+def test_a_cell_stays_one_cell_whatever_separates_cells_in_the_reader_s_country(text):
+    written = csv_text([["x", text]])
+    assert written.startswith('x,"')
+    assert rows(written) == [["x", text]]
 
 
 @settings(deadline=None)

@@ -121,11 +121,14 @@ def test_an_undo_takes_back_the_last_change(out: Path, client: Client) -> None:
         ({"do": "score", "item": "readme", "points": 3, "note": ""}, 422),
         ({"do": "score", "item": "readme", "points": -1, "note": ""}, 422),
         ({"do": "score", "item": "another", "points": 1, "note": ""}, 422),
-        ({"do": "score", "item": "readme", "points": "many", "note": ""}, 400),
+        ({"do": "score", "item": "readme", "points": "many", "note": ""}, 422),
         ({"do": "comment", "text": ""}, 422),
         ({"do": "comment", "text": "x", "line": -1}, 422),
-        ({"do": "delete everything"}, 400),
-        ({}, 400),
+        ({"do": "comment", "text": "x", "index": 7}, 422),
+        ({"do": "uncomment", "index": 0}, 422),
+        ({"do": "uncomment", "index": -1}, 422),
+        ({"do": "delete everything"}, 422),
+        ({}, 422),
     ],
 )
 def test_nonsense_changes_nothing(out: Path, client: Client, sent: object, status: int) -> None:

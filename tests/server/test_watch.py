@@ -108,9 +108,9 @@ def test_a_hint_that_is_opened_is_counted_beside_the_report(
         ({"check": "topic", "number": 0}, 404),
         ({"check": "topic", "number": "1"}, 404),
         ({"check": "other", "number": 1}, 404),
-        ({"check": ["topic"], "number": 1}, 400),
-        ({"number": 1}, 400),
-        ([], 400),
+        ({"check": ["topic"], "number": 1}, 422),
+        ({"number": 1}, 422),
+        ([], 422),
     ],
 )
 def test_a_hint_that_is_not_there_is_not_counted(

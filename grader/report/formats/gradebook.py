@@ -26,6 +26,7 @@ from grader.spec.nearest_name import did_you_mean
 
 # Some spreadsheets take the wide forms of East Asian keyboards for the same.
 _FORMULA = ("=", "+", "-", "@", "\uff1d", "\uff0b", "\uff0d", "\uff20")
+_TO_QUOTE = re.compile(r'[",;\t\r\n]')
 # Canvas takes columns that are called so for its own totals, and drops them without a word.
 _DROPPED = re.compile(
     r"(Current|Final) (Score|Points|Grade)|Override (Score|Grade|Status)|[Ff]inal", re.ASCII
@@ -226,10 +227,17 @@ def canvas_csv(
 
 
 def csv_text(rows: Iterable[Sequence[str]]) -> str:
-    """Rows as CSV."""
-    stream = io.StringIO()
-    csv.writer(stream).writerows(rows)
-    return stream.getvalue()
+    """Rows as CSV (RFC 4180).
+
+    A cell with another separator is quoted too: where the decimal mark is a comma, spreadsheets
+    separate by semicolons.
+    """
+    return "".join(f"{','.join(map(_quoted, row))}\r\n" for row in rows)
+
+
+def _quoted(text: str) -> str:
+    doubled = text.replace('"', '""')
+    return f'"{doubled}"' if _TO_QUOTE.search(text) else text
 
 
 def cell(text: str) -> str:

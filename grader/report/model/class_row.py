@@ -65,6 +65,11 @@ class ClassRow:
         return self.status is RowStatus.GRADED
 
     @property
+    def cannot_be_graded(self) -> bool:
+        """Whether something was handed in that got no grade."""
+        return self.status in (RowStatus.NOT_GRADED, RowStatus.UNREADABLE)
+
+    @property
     def score(self) -> float | None:
         """Its points with the adjustments; None where there is no grade, or not all of it yet."""
         return self.result.final_score if self.result is not None and self.graded else None

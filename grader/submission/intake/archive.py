@@ -27,7 +27,7 @@ from functools import partial
 from pathlib import Path
 from typing import IO
 
-from grader.errors import GraderFault, SubmissionError
+from grader.errors import GraderFault, SubmissionError, machine_fault
 from grader.submission.intake.contents import check_directory, tar_members, zip_members
 from grader.submission.intake.members import MIB, ArchiveLimits, Kind, Member, Refused, admit
 from grader.submission.intake.paths import shown
@@ -111,7 +111,8 @@ def _translated(name: str) -> Iterator[None]:
         # archive tells them to.
         if error.errno in (None, errno.EINVAL):
             raise SubmissionError(f"{name}: is broken and cannot be unpacked") from error
-        raise GraderFault(f"{name}: could not be unpacked here: {error}") from error
+        fault = GraderFault(f"{name}: could not be unpacked here: {error}")
+        raise machine_fault(error) or fault from error
 
 
 def _plain_tar(

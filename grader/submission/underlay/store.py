@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+import threading
 from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -88,12 +89,14 @@ class UnderlayStore:
         ros: RosInstallation,
         on_progress: Callable[[str], None] = lambda _: None,
         sandbox: Sandbox | None = None,
+        stop: threading.Event | None = None,
     ) -> None:
         """Name the cache folder.
 
         Args:
             ros: Without underlays.
             sandbox: In which packages are built.
+            stop: Set when nothing needs to be built any more.
         """
         self._folder = cache / _FOLDER
         self._kept = BuildCache(self._folder, is_pruned=False)
@@ -101,6 +104,7 @@ class UnderlayStore:
         self._ros = ros
         self._say = on_progress
         self._sandbox = sandbox
+        self._stop = stop
 
     def lay(self, underlays: Iterable[Underlay]) -> RosInstallation:
         """The ROS installation with underlays; a later one is seen before those named earlier.
@@ -335,6 +339,7 @@ class UnderlayStore:
                     cache=cache,
                     limits=_LIMITS,
                     sandbox=self._sandbox,
+                    stop=self._stop,
                     on_progress=progress,
                     is_second=is_second,
                 )
