@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import re
 import secrets
-import subprocess
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -24,10 +23,14 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from grader.cli.options import file_option
+from grader.errors import GraderFault
 from grader.report import formats
 
 if TYPE_CHECKING:
     from grader.report.model.result_model import Result
+
+
+_GIT_LIMIT_S = 20.0
 
 
 class JunitFamily(str, Enum):
@@ -204,15 +207,11 @@ def _write_classroom50(result: Result, folder: Path) -> None:
 
 def _committed(folder: Path) -> str:
     """When the commit that is checked out was made, in UTC; now where there is no commit."""
+    from grader.submission.git import run_git
+
     try:
-        shown = subprocess.run(
-            ["git", "show", "--no-patch", "--format=%ct", "HEAD"],
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        time = datetime.fromtimestamp(int(shown.stdout), timezone.utc)
-    except (OSError, subprocess.CalledProcessError, ValueError):
+        shown = run_git(["show", "--no-patch", "--format=%ct", "HEAD"], folder, _GIT_LIMIT_S)
+        time = datetime.fromtimestamp(int(shown), timezone.utc)
+    except (GraderFault, OSError, OverflowError, ValueError):
         time = datetime.now(timezone.utc)
     return time.strftime("%Y-%m-%dT%H:%M:%SZ")

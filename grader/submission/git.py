@@ -13,6 +13,8 @@ from grader.submission.intake.paths import shown
 _SAFE = {
     "core.hooksPath": "/dev/null",
     "core.fsmonitor": "false",
+    # Else the program that the repository names for signatures is run.
+    "log.showSignature": "false",
     "protocol.ext.allow": "never",
     # A server that sends nothing for so long is given up.
     "http.lowSpeedLimit": "1",
