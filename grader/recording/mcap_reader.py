@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
 from functools import cache, lru_cache
 from operator import itemgetter
 from pathlib import Path
+from types import GenericAlias
 from typing import Any
 
 from mcap.reader import make_reader
@@ -19,12 +21,22 @@ from pydantic import TypeAdapter
 
 from grader.errors import UsageError
 from grader.recording.interface import FEEDBACK
-from grader.recording.mcap_writer import FACTS, FORMAT, JOIN, SENT, TOPIC, RawMessage
+from grader.recording.mcap_writer import (
+    FACTS,
+    FACTS_SUFFIX,
+    FORMAT,
+    JOIN,
+    LAUNCHED,
+    SENT,
+    TOPIC,
+    RawMessage,
+)
 from grader.recording.model import Message, Recording
 from grader.submission.record import SubmissionRecord
 
 # Types of the primitive fields, and of an array of bytes.
 _PLAIN = frozenset({bool, int, float, str, bytes})
+_LISTS = {name: GenericAlias(list, (kind,)) for name, kind in FACTS.items()}
 
 
 @cache
@@ -34,7 +46,7 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 def get_ready() -> None:
     """Make what validates the facts; otherwise the first recording waits for it."""
-    for kind in (*FACTS.values(), Recording):
+    for kind in (*_LISTS.values(), Recording):
         _adapter(kind)
 
 
@@ -83,13 +95,17 @@ def _read(stream: Any) -> Recording:
             frame = _frame(record)
         elif isinstance(record, Attachment) and record.name == "submission.json":
             submission = _adapter(SubmissionRecord).validate_json(record.data)
+        elif isinstance(record, Attachment) and record.name.removesuffix(FACTS_SUFFIX) in FACTS:
+            name = record.name.removesuffix(FACTS_SUFFIX)
+            data = gzip.decompress(record.data)
+            facts[name] += enumerate(_adapter(_LISTS[name]).validate_json(data))
         elif isinstance(record, Record):
             channel = channels[record.channel_id]
             name = channel.topic.removeprefix("/rosgrade/")
             if channel.message_encoding == "json" and name in facts:
                 fact = _adapter(FACTS[name]).validate_json(record.data)
                 facts[name].append((record.sequence, fact))
-            if channel.message_encoding == "json":
+            if channel.message_encoding == "json" or channel.topic == LAUNCHED:
                 continue
             if has_ended:
                 # What follows has no checksum: a flipped bit makes a message of a summary.
@@ -205,7 +221,7 @@ def read_inputs(file: Path, recording: Recording) -> tuple[RawMessage, ...]:
 
 def _frame(record: Metadata) -> dict[str, Any]:
     frame = {key: json.loads(value) for key, value in record.metadata.items()}
-    if frame.pop("format", None) != FORMAT:
+    if frame.pop("format", None) not in ("2", FORMAT):
         raise _NotARecording(f"made by another version of rosgrade (not format {FORMAT})")
     return frame
 

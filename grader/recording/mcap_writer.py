@@ -1,15 +1,18 @@
-"""A recording into an MCAP file that any MCAP reader opens.
+"""A recording into an MCAP file that any reader of ROS bags opens.
 
-Messages of ROS keep their CDR bytes and get a ``ros2msg`` schema. Everything else is JSON:
-one channel per kind under ``/rosgrade/``, one message per fact; the submission's facts are
-the attachment ``submission.json``, the frame of the run is the metadata ``rosgrade``.
+Its channels hold messages of ROS only, with their CDR bytes and a ``ros2msg`` schema; one on
+``/rosgrade/launched`` marks time zero. Everything else is an attachment: ``<kind>.json.gz`` for
+each kind of fact, ``submission.json`` for the submission's; the frame of the run is the metadata
+``rosgrade``.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import gzip
 import json
 import os
+import struct
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
@@ -17,20 +20,23 @@ from typing import get_args, get_origin, get_type_hints
 
 from mcap.writer import CompressionType, Writer
 
-from grader.recording.model import Recording, to_json
+from grader.recording.model import NS, Recording, to_json
 
 # Metadata of a channel of messages.
 JOIN, TOPIC, SENT = "rosgrade_join", "rosgrade_topic", "rosgrade_sent"
 
-FORMAT = "2"
-"""Version of the layout; a reader refuses another one."""
+FORMAT = "3"
+"""Version of the layout; 2 had the facts as channels of JSON under ``/rosgrade/``."""
+FACTS_SUFFIX = ".json.gz"
+LAUNCHED = "/rosgrade/launched"
+_TIME = "builtin_interfaces/msg/Time", "ros2msg", b"int32 sec\nuint32 nanosec\n"
 
 FACTS: dict[str, type] = {
     name: get_args(kind)[0]
     for name, kind in get_type_hints(Recording).items()
     if get_origin(kind) is tuple and is_dataclass(get_args(kind)[0])
 }
-"""Fields of the recording that are kept as JSON -> class of a fact, which its first time dates."""
+"""Fields of the recording that are kept as JSON -> class of a fact."""
 
 _FRAME = (
     *("scenario", "seed", "launched_ns", "matched_ns", "stop_ns", "end_ns", "faults"),
@@ -80,6 +86,7 @@ def write_recording(
             writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
             writer.start(profile="ros2", library="rosgrade")
             writer.add_metadata("rosgrade", _frame(recording))
+            _write_launched(writer, recording.launched_ns)
             _write_messages(writer, messages, definitions)
             _write_facts(writer, recording)
             at_ns = recording.launched_ns
@@ -91,15 +98,19 @@ def write_recording(
 
 
 def _write_facts(writer: Writer, recording: Recording) -> None:
-    schema = writer.register_schema("rosgrade", "jsonschema", b'{"type": "object"}')
-    for name, kind in FACTS.items():
-        dated = next(one.name for one in dataclasses.fields(kind) if one.name.endswith("_ns"))
-        facts = getattr(recording, name)
-        if facts:
-            channel = writer.register_channel(f"/rosgrade/{name}", "json", schema)
-        for number, fact in enumerate(facts):
-            time_ns = getattr(fact, dated)
-            writer.add_message(channel, time_ns, to_json(fact), time_ns, number)
+    at_ns = recording.launched_ns
+    for name in FACTS:
+        if facts := getattr(recording, name):
+            # Without a time in it, so that the same recording is the same bytes.
+            data = gzip.compress(b"[%b]" % b",".join(map(to_json, facts)), mtime=0)
+            writer.add_attachment(at_ns, at_ns, f"{name}{FACTS_SUFFIX}", "application/gzip", data)
+
+
+def _write_launched(writer: Writer, at_ns: int) -> None:
+    """The launch as a message, so that a bag begins with it in any tool."""
+    channel = writer.register_channel(LAUNCHED, "cdr", writer.register_schema(*_TIME))
+    cdr = b"\x00\x01\x00\x00" + struct.pack("<iI", *divmod(at_ns, NS))
+    writer.add_message(channel, at_ns, cdr, at_ns)
 
 
 def _write_messages(

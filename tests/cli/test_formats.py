@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import json
 import re
 from collections.abc import Iterator
@@ -66,10 +67,9 @@ def recorded(file: Path) -> Iterator[str]:
     """All facts of a recording, whose file is compressed."""
     with file.open("rb") as stream:
         reader = make_reader(stream)
-        for _, channel, message in reader.iter_messages():
-            if channel.message_encoding == "json":
-                yield f"{channel.topic} {message.data.decode()}"
-        yield from (attachment.data.decode() for attachment in reader.iter_attachments())
+        for one in reader.iter_attachments():
+            data = gzip.decompress(one.data) if one.name.endswith(".gz") else one.data
+            yield f"{one.name} {data.decode()}"
         yield from (str(metadata) for metadata in reader.iter_metadata())
 
 
@@ -112,7 +112,7 @@ def test_a_student_s_run_announces_what_is_hidden_and_leaks_nothing(
             texts += recorded(file)
         elif file.is_file() and "install" not in file.parts:
             texts.append(file.read_bytes().decode(errors="replace"))
-    assert any("/rosgrade/endpoints" in text and "/cmd_vel" in text for text in texts)
+    assert any(text.startswith("endpoints") and "/cmd_vel" in text for text in texts)
     assert not [text for text in texts if "zq" in text]
 
     again = rosgrade("report", report, place, "--junit", tmp_path / "again.xml")

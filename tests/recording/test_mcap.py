@@ -11,12 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
 
 from grader.errors import UsageError
 from grader.recording.event import Disturbance, Intervention, Wait
 from grader.recording.interaction import Asked, Feedback, Goal, Service
 from grader.recording.interface import concatenated_definition, definition_finder
-from grader.recording.mcap_reader import read_recording
+from grader.recording.mcap_reader import read_inputs, read_recording
 from grader.recording.mcap_writer import RawMessage, write_recording
 from grader.recording.model import (
     Call,
@@ -217,7 +218,7 @@ def test_any_mcap_reader_opens_it(tmp_path: Path) -> None:
         assert summary is not None
         topics = {channel.topic for channel in summary.channels.values()}
         decoded = [m for _, _, _, m in reader.iter_decoded_messages(topics=["/cmd_vel"])]
-    assert {"/cmd_vel", "/rosgrade/nodes", "/rosgrade/log"} <= topics
+    assert topics == {"/cmd_vel", "/rosgrade/launched"}
     assert decoded[0].angular.z == 0.5
 
 
@@ -267,3 +268,44 @@ def test_the_host_s_share_is_what_overlaps_the_interval() -> None:
     assert recording.stolen_s(2_500, 2_600) == pytest.approx(250e-9)
     assert recording.stolen_s(2_500, 3_500) == pytest.approx(650e-9)
     assert recording.stolen_s(5_000, 6_000) == 0.0
+
+
+def with_every_channel(folder: Path) -> Path:
+    heard = raw(3_000, 1, 0, 0, 0, 0, 0.5)
+    sent = dataclasses.replace(raw(2_500, 2, 0, 0, 0, 0, 0), topic="/goal", is_sent=True)
+    late = dataclasses.replace(raw(3_000, 1, 0, 0, 0, 0, 0), received_ns=4_600, join="late")
+    again = dataclasses.replace(heard, is_sent=True)
+    return written(
+        folder, a_recording(sent={"/chatter": (), "/goal": ()}), heard, sent, late, again
+    )
+
+
+def test_a_recording_of_before_is_read_as_before(tmp_path: Path) -> None:
+    """The file is one that the writer of format 2 wrote."""
+    old = read_recording(Path(__file__).with_name("format_2.mcap"))
+    file = with_every_channel(tmp_path)
+    new = read_recording(file)
+    assert dataclasses.replace(new, sent={**new.sent, "/cmd_vel": ()}) == dataclasses.replace(
+        old, sent={**old.sent, "/cmd_vel": ()}
+    )
+    assert [sent.is_sent for sent in read_inputs(file, new)] == [True, True]
+
+
+def test_rosbags_reads_a_recording_that_begins_at_the_launch(tmp_path: Path) -> None:
+    file = with_every_channel(tmp_path)
+    with AnyReader([file]) as reader:
+        topics = {connection.topic for connection in reader.connections}
+        found = [
+            (reader.deserialize(raw, connection.msgtype), time_ns - reader.start_time)
+            for connection, time_ns, raw in reader.messages()
+            if connection.topic == "/rosgrade/joins/late"
+        ]
+        assert reader.start_time == a_recording().launched_ns
+    assert topics == {"/cmd_vel", "/goal", "/rosgrade/joins/late", "/rosgrade/launched"}
+    assert [(message.linear.x, since_ns) for message, since_ns in found] == [(1.0, 3_600)]
+
+
+def test_the_same_recording_is_the_same_bytes(tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    one, other = with_every_channel(tmp_path), with_every_channel(tmp_path / "other")
+    assert one.read_bytes() == other.read_bytes()

@@ -1,7 +1,7 @@
 """A layout for Foxglove, so that a recording opens with something to see.
 
-Panels are chosen from what was recorded: the robot's path and speeds where there is a robot,
-every numeric field of every topic over time, the scan in 3D, and the output of the processes.
+Panels are chosen from what was recorded: the robot's path where there is a robot, every numeric
+field of every topic over time, and the scan in 3D.
 Source of the form: a layout exported by Foxglove (Layouts, Export to file).
 """
 
@@ -12,26 +12,22 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from grader.assignment.model import LASER_SCAN
+from grader.recording.mcap_writer import LAUNCHED
 from grader.recording.model import Recording
 
 LAYOUT_FILE = "foxglove-layout.json"
 _MOST_PATHS = 8
 _MOST_ELEMENTS = 4
-_SPEEDS = ("linear_m_s", "command_m_s", "angular_rad_s", "command_rad_s")
 
 
 def render_layout(recordings: Iterable[Recording]) -> str:
     """Render the layout for all recordings of one submission, as JSON that Foxglove imports."""
     panels: dict[str, dict[str, Any]] = {}
     runs = tuple(recordings)
-    if any(run.truth for run in runs):
-        panels["Plot!path"] = _plot(
-            "Path of the robot (m)", ["/rosgrade/truth.y_m"], x_axis="/rosgrade/truth.x_m"
-        )
-        panels["Plot!speed"] = _plot(
-            "True and commanded speed (m/s, rad/s)",
-            [f"/rosgrade/truth.{name}" for name in _SPEEDS],
-        )
+    for topic in {run.scene.odometry_topic for run in runs if run.scene}:
+        if any(run.on(topic) for run in runs):
+            place = f"{topic}.pose.pose.position"
+            panels["Plot!path"] = _plot("Path of the robot (m)", [f"{place}.y"], f"{place}.x")
     for topic, (kind, paths) in _topics(runs).items():
         if kind == LASER_SCAN:
             panels[f"3D!{topic}"] = {"topics": {topic: {"visible": True}}, "layers": {}}
@@ -39,7 +35,8 @@ def render_layout(recordings: Iterable[Recording]) -> str:
             panels[f"Plot!{topic}"] = _plot(topic, paths)
         else:
             panels[f"RawMessages!{topic}"] = {"topicPath": topic, "diffEnabled": False}
-    panels["RawMessages!log"] = {"topicPath": "/rosgrade/log", "diffEnabled": False}
+    if not panels:
+        panels["RawMessages!launched"] = {"topicPath": LAUNCHED, "diffEnabled": False}
     layout = {
         "configById": panels,
         "globalVariables": {},
