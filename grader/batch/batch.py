@@ -16,7 +16,7 @@ from grader.batch.files import write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.batch.handed_in import HandedIn
 from grader.batch.last_attempt import EARLIER
-from grader.batch.ledger import Entry, Ledger
+from grader.batch.ledger import Entry, Ledger, TakenFrom
 from grader.batch.regrading import find, regrade, regrade_command
 from grader.errors import GraderFault, RosgradeError, UsageError, machine_fault
 from grader.recording.model import to_json
@@ -47,13 +47,16 @@ class Done:
 class Batch:
     """Grades the rows of a class into a folder.
 
-    ``retry`` holds keys, ``all`` or ``errors``; ``course`` is the path of the rules, if any.
+    ``retry`` holds keys, ``all`` or ``errors``; ``course`` is the path of the rules, if any. With
+    ``keep`` a student whose submission is not there any more stays as graded before.
     """
 
     loaded: LoadedAssignment
     ledger: Ledger
     retry: frozenset[str] = frozenset()
     course: str | None = None
+    taken_from: TakenFrom | None = None
+    keep: bool = False
     _entries: dict[str, Entry] = field(default_factory=dict)
     _twins: dict[str, list[str]] = field(default_factory=dict)
     _given: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -96,6 +99,14 @@ class Batch:
                 elif not entry.fault:
                     paths[row.key] = row.path
             self._entries[row.key] = entry
+        for key, old in earlier.items() if self.keep else ():
+            now = self._entries.get(key, Entry(key))
+            if old.sha256 and not (old.attempt_of or now.sha256 or now.fault):
+                twin = old.same_as if old.same_as in self._entries else ""
+                self._entries[key] = replace(old, same_as=twin)
+                self._given.setdefault(key, {})
+                if twin:
+                    self._twins.setdefault(twin, []).append(key)
         self._keep_attempts(earlier)
         to_do = {key: path for key, path in paths.items() if not self._is_done(key)}
         self._refuse_changed(set(paths) - set(to_do))
@@ -161,7 +172,8 @@ class Batch:
             raise UsageError(
                 f"{self.ledger.out}: {len(changed)} ({', '.join(changed[:_MOST_NAMED])}{more}) "
                 f"graded with another version of {self.loaded.assignment.id}. "
-                f"{regrade_command(self.ledger.out, self.loaded)} judges their recordings again; "
+                f"{regrade_command(self.ledger.out, self.loaded)} judges their recordings again "
+                f"with this one; `rosgrade batch {self.ledger.out}` goes on with theirs; "
                 "`--retry all` runs all of them again, `--retry NAME` one"
             )
 
@@ -242,7 +254,7 @@ class Batch:
     def _write(self) -> None:
         loaded = self.loaded
         version = (loaded.assignment.id, loaded.sha256, loaded.location)
-        self.ledger.write(self._entries.values(), *version, self.course)
+        self.ledger.write(self._entries.values(), *version, self.course, self.taken_from)
 
 
 def _teams(rows: Sequence[HandedIn]) -> dict[str, str]:

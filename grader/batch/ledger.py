@@ -10,8 +10,8 @@ import fcntl
 import json
 import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, fields, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import TypeVar
@@ -82,13 +82,28 @@ class Entry:
 
 
 @dataclass(frozen=True)
+class TakenFrom:
+    """Where a batch found its submissions and its roster, and the seed that it was given."""
+
+    submissions: str
+    roster: str | None = None
+    seed: int | None = None
+
+
+@dataclass(frozen=True)
 class BatchRows:
-    """The assignment and the rows of a batch; ``course`` is the path of the rules, if any."""
+    """The assignment and the rows of a batch; ``course`` is the path of the rules, if any.
+
+    ``before`` are the hashes of the assignments that the class was graded with earlier.
+    """
 
     assignment: str
     location: str | None
     entries: tuple[Entry, ...]
     course: str | None = None
+    sha256: str = ""
+    before: tuple[str, ...] = ()
+    taken_from: TakenFrom | None = None
 
 
 class Ledger:
@@ -198,12 +213,21 @@ class Ledger:
         assignment_sha256: str,
         location: str | None = None,
         course: str | None = None,
+        taken_from: TakenFrom | None = None,
     ) -> None:
-        """Write the assignment and the rows."""
+        """Write the assignment and the rows; what is known of earlier ones stays."""
         names = [one.name for one in fields(Entry)]
+        before: dict[str, None] = {}
+        with suppress(UsageError):
+            earlier = self.read()
+            before = dict.fromkeys((*earlier.before, earlier.sha256))
+            taken_from = taken_from or earlier.taken_from
+        before.pop(assignment_sha256, None)
+        used = {"id": assignment, "sha256": assignment_sha256, "location": location}
         data = {
-            "assignment": {"id": assignment, "sha256": assignment_sha256, "location": location},
+            "assignment": {**used, "before": list(before)},
             "course": course,
+            "taken_from": taken_from and asdict(taken_from),
             "rows": [{one: getattr(entry, one) for one in names} for entry in entries],
         }
         write_whole(self.out / BATCH_FILE, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
@@ -215,8 +239,16 @@ class Ledger:
             data = json.loads(file.read_text(encoding="utf-8"))
             entries = tuple(Entry(**row) for row in data["rows"])
             assignment = data["assignment"]
-            location, course = assignment.get("location"), data.get("course")
-            return BatchRows(str(assignment["id"]), location, entries, course)
+            taken = data.get("taken_from")
+            return BatchRows(
+                str(assignment["id"]),
+                assignment.get("location"),
+                entries,
+                data.get("course"),
+                assignment["sha256"],
+                tuple(assignment.get("before", ())),
+                TakenFrom(**taken) if taken else None,
+            )
         except FileNotFoundError as error:
             raise UsageError(f"{self.out}: is not the folder of a batch") from error
         except (OSError, ValueError, KeyError, TypeError) as error:

@@ -100,10 +100,26 @@ def load_used(
     )
 
 
+def in_use(ledger: Ledger, named: LoadedAssignment) -> LoadedAssignment:
+    """The version that a class is graded with by now, where the one that is named was used before.
+
+    Such as after `rosgrade regrade OUT CHANGED`, or after *Apply* in a review.
+    """
+    try:
+        used = ledger.read()
+    except UsageError:
+        # There is no batch yet, or its file is damaged.
+        return named
+    if used.assignment != named.assignment.id or named.sha256 not in used.before:
+        return named
+    now = load_used(ledger)
+    return now if now.sha256 == used.sha256 else named
+
+
 def regrade_command(path: Path, loaded: LoadedAssignment) -> str:
     """The command that judges something again with an assignment."""
-    words = ["rosgrade", "regrade", str(path), *([loaded.location] if loaded.location else [])]
-    return f"`{shlex.join(words)}`"
+    name = loaded.location or loaded.assignment.id
+    return f"`{shlex.join(['rosgrade', 'regrade', str(path), name])}`"
 
 
 def refuse_other(folder: Path, name: str, loaded: LoadedAssignment) -> None:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.options import AssignmentName, Quiet, SandboxChoice, Seed, assignment_places
+from grader.cli.arguments import assignment_argument
+from grader.cli.options import Quiet, SandboxChoice, Seed, assignment_places
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
 from grader.errors import UsageError
@@ -30,15 +31,22 @@ _AUTO = "auto"
 
 def batch(
     context: typer.Context,
-    assignment: AssignmentName,
+    assignment: Annotated[
+        str,
+        typer.Argument(
+            metavar="ASSIGNMENT",
+            help="Id of the assignment, or its folder. Or OUT, to go on with all as it is in use.",
+            callback=lambda name: name if is_batch(name) else assignment_argument(name),
+        ),
+    ],
     submissions: Annotated[
-        Path,
+        Path | None,
         typer.Argument(
             help="A folder of submissions (folders, archives or clones; also from Canvas or "
             "Gradescope), an archive of it, or a roster (.csv) with a column `submission`."
         ),
-    ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for all results.")],
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for all results.")] = None,
     jobs: Annotated[
         str, typer.Option(help="Submissions at once; auto adapts to the load of the machine.")
     ] = _AUTO,
@@ -58,7 +66,7 @@ def batch(
     sandbox: SandboxChoice = Choice.AUTO,
     quiet: Quiet = False,
 ) -> None:
-    """Grade a class. The same command continues where it stopped.
+    """Grade a class. `rosgrade batch OUT` continues where it stopped, also with new submissions.
 
     Writes a report for each submission, an overview (index.html) and grades.csv to OUT. Ends
     with 0 if every submission was graded, whatever the grades, and with 3 if one was not.
@@ -70,7 +78,8 @@ def batch(
     from grader.batch.executor import DaskExecutor, ExecutorLost, LocalExecutor
     from grader.batch.groups import strangers
     from grader.batch.intake import take_in, take_in_roster
-    from grader.batch.ledger import Ledger
+    from grader.batch.ledger import Ledger, TakenFrom
+    from grader.batch.regrading import in_use, load_used
     from grader.batch.rendering import bring_up_to_date
     from grader.batch.roster import read_roster
     from grader.batch.worker import Order, make_grading
@@ -82,9 +91,24 @@ def batch(
         # What a shell makes of `class/*`.
         count = 1 + len(context.args)
         raise UsageError(f"batch takes one folder, not {count} submissions: give their folder")
-    refuse_inputs([out], [*assignment_places(assignment), submissions, roster, course])
+    again = is_batch(assignment)
+    if again:
+        out, before = Path(assignment), Ledger(Path(assignment)).read().taken_from
+        if before is None and submissions is None:
+            raise UsageError(f"{out}: say where the submissions lie: rosgrade batch {out} FOLDER")
+        if before is not None:
+            submissions = submissions or Path(before.submissions)
+            roster = roster or (Path(before.roster) if before.roster else None)
+            seed = before.seed if seed is None else seed
+        loaded = load_used(Ledger(out))
+    else:
+        loaded = load_assignment(assignment)
+    if submissions is None or out is None:
+        raise UsageError("name the submissions and a folder for the results, SUBMISSIONS --out OUT")
+    places = [] if again else assignment_places(assignment)
+    refuse_inputs([out], [*places, submissions, roster, course])
     check_folder(out)
-    loaded = load_assignment(assignment)
+    named, loaded = loaded, in_use(Ledger(out), loaded)
     refuse_part(out, loaded.folder, f"the assignment in {loaded.folder}")
     rules = course_of(out, course, loaded.assignment.id)
     order = Order(str(loaded.folder.resolve()), loaded.sha256, seed, sandbox)
@@ -95,16 +119,18 @@ def batch(
     with Scratch("batch") as staging, Progress(quiet).shown() as progress:
         if grading is not None and not quiet:
             progress.note(f"sandbox: {grading.process_sandbox}")
+        if again or loaded is not named:
+            progress.note(f"graded with {loaded.file}, as the class is")
         is_roster = submissions.suffix.lower() == ".csv" and submissions.is_file()
-        named = submissions if is_roster else roster
-        names = read_roster(named) if named is not None else None
+        listed = submissions if is_roster else roster
+        names = read_roster(listed) if listed is not None else None
         if names is not None and is_roster:
             progress.begin("fetching", len(names.students))
             rows = take_in_roster(names, submissions.parent, staging, progress.advance, rules)
         else:
             rows = take_in(submissions, staging, names, progress.note, out, rules)
         for problem in names.problems if names is not None else ():
-            progress.note(f"{named}: {problem}")
+            progress.note(f"{listed}: {problem}")
         for stranger in strangers(rows, rules) if rules is not None else ():
             progress.note(stranger)
         for row in rows:
@@ -113,7 +139,9 @@ def batch(
                 refuse_part(out, row.path, f"the submission of {row.key}")
         with Ledger(out).opened() as ledger:
             place = str(rules.file.resolve()) if rules is not None else None
-            work = Batch(loaded, ledger, frozenset(retry or ()), place)
+            lists = str(roster.resolve()) if roster is not None else None
+            taken = TakenFrom(str(submissions.resolve()), lists, seed)
+            work = Batch(loaded, ledger, frozenset(retry or ()), place, taken, keep=again)
             progress.begin("reading", len(rows))
             entries, to_do = work.read(rows, progress.advance)
             # What people wrote must be readable before anything is run.
@@ -136,8 +164,8 @@ def batch(
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
                 signal.signal(signal.SIGTERM, signal.SIG_IGN)
                 progress.note(
-                    f"interrupted; {len(done)} of {len(entries)} are in {out}. Run the same "
-                    "command again to grade the others"
+                    f"interrupted; {len(done)} of {len(entries)} are in {out}. "
+                    f"`rosgrade batch {out}` grades the others"
                 )
                 write_class(bring_up_to_date(all_standing(ledger), ledger), ledger)
                 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -153,6 +181,11 @@ def batch(
     say(f"Overview: {overview}")
     say(f"Grades: {overview.with_name(GRADES_FILE)}")
     raise typer.Exit(NOT_GRADED if any(row.cannot_be_graded for row in class_rows(done)) else 0)
+
+
+def is_batch(name: str) -> bool:
+    """Whether a name is the folder of a batch."""
+    return (Path(name) / "batch.json").is_file()
 
 
 def _at_once(jobs: str) -> int | None:

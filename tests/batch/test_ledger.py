@@ -102,7 +102,7 @@ def test_rows_come_back_as_they_were_written(tmp_path: Path) -> None:
     ledger = Ledger(tmp_path)
     entries = (Entry("ana", late=True), Entry("b\n🤖", sha256="0" * 64, same_as="ana"))
     ledger.write(entries, "timed_publisher", "1" * 64)
-    assert ledger.read() == BatchRows("timed_publisher", None, entries)
+    assert ledger.read() == BatchRows("timed_publisher", None, entries, sha256="1" * 64)
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"rows": [{"nobody": 1}]}'])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -186,3 +187,39 @@ def test_after_ctrl_c_there_is_an_overview_of_what_is_graded(
         assert row["note"] == ("" if graded else "not graded yet; run the batch again")
     overview = (out / "index.html").read_text(encoding="utf-8")
     assert "not graded yet; run the batch again" in overview
+
+
+def test_a_class_goes_on_with_the_assignment_that_it_was_judged_with_last(
+    rosgrade: Rosgrade, tmp_path: Path, course: Path
+) -> None:
+    """Nothing can be built here, so that only the way of the assignment is tried."""
+    lesson, changed = (tmp_path / name / "timed_publisher" for name in ("lesson", "changed"))
+    shutil.copytree(ROOT / "assignments" / "timed_publisher", lesson)
+    shutil.copytree(lesson, changed)
+    for folder, title in ((lesson, "As it was"), (changed, "As it is now")):
+        yaml = folder / "assignment.yaml"
+        text = yaml.read_text(encoding="utf-8")
+        yaml.write_text(re.sub("(?m)^title: .*$", f"title: {title}", text), encoding="utf-8")
+    for name in ("ana", "ben"):
+        (course / name).mkdir()
+        (course / name / "notes.txt").write_text(name)
+    out, documented = tmp_path / "out", ("batch", lesson, course, "--out", tmp_path / "out")
+    assert rosgrade(*documented, "--seed", "7", "--sandbox", "none").returncode == 3
+    assert rosgrade("regrade", out, changed).returncode in (0, 3)
+    (course / "ana" / "notes.txt").write_text("on Wednesday")
+    again = rosgrade(*documented, "--sandbox", "none")
+    assert again.returncode == 3 and f"graded with {changed}" in again.stderr, again.stderr
+    shutil.rmtree(course / "ben")
+    (course / "ana" / "notes.txt").write_text("on Thursday")
+    alone = rosgrade("batch", out, "--sandbox", "none")
+    assert alone.returncode == 3 and "(1 now" in alone.stdout, alone.stderr
+    # Whose submission is not there any more stays as graded before.
+    assert list(grades(out)) == ["ana", "ben"]
+    written = json.loads((out / "batch.json").read_text())
+    assert written["assignment"]["location"] == str(changed)
+    assert written["taken_from"] == {"submissions": str(course), "roster": None, "seed": None}
+    yaml = lesson / "assignment.yaml"
+    yaml.write_text(yaml.read_text().replace("As it was", "As it will be"))
+    refused = rosgrade(*documented, "--sandbox", "none")
+    assert refused.returncode == 2 and f"`rosgrade regrade {out} {lesson}`" in refused.stderr
+    assert f"`rosgrade batch {out}` goes on with theirs" in refused.stderr
