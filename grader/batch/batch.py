@@ -101,7 +101,8 @@ class Batch:
             self._entries[row.key] = entry
         for key, old in earlier.items() if self.keep else ():
             now = self._entries.get(key, Entry(key))
-            if old.sha256 and not (old.attempt_of or now.sha256 or now.fault):
+            own = old.sha256 and not (old.attempt_of or old.shared_by)
+            if own and not (now.sha256 or now.fault):
                 twin = old.same_as if old.same_as in self._entries else ""
                 self._entries[key] = replace(old, same_as=twin)
                 self._given.setdefault(key, {})
@@ -206,27 +207,13 @@ class Batch:
             row = self._entries[twin.key] = replace(twin, fault=entry.fault)
             if result is not None:
                 try:
-                    self._copy(key, twin)
+                    copy_result(self.loaded, self.ledger, key, twin)
                 except RosgradeError as error:
                     why = str(error).partition("\n")[0]
                     again = GraderFault(f"{why}; `--retry {key}` grades both again")
                     row = self._entries[twin.key] = self._with_fault(twin, again)
             known = result is not None and not row.fault
             yield Done(row, self.ledger.result(twin.key) if known else None, fresh)
-
-    def _copy(self, key: str, twin: Entry) -> None:
-        """Give an identical submission of another student the same result, under its own name."""
-        known, original = map(self.ledger.whole_result, (twin.key, key))
-        if known and original and grade_json(known) == grade_json(original):
-            return
-        partial = self.ledger.partial(twin.key)
-        history = shutil.ignore_patterns(EARLIER)
-        shutil.copytree(self.ledger.folder(key), partial, dirs_exist_ok=True, ignore=history)
-        found = find(partial)
-        record = replace(found.submission, id=twin.key)
-        write_whole(partial / RECORDINGS_FOLDER / SUBMISSION_FILE, to_json(record))
-        write_graded(regrade(self.loaded, replace(found, submission=record)), partial, Clock())
-        self.ledger.put(twin.key, partial)
 
     def _keep_attempts(self, earlier: Mapping[str, Entry]) -> None:
         """Keep the grades of students who handed in again, each as a row of its own."""
@@ -245,7 +232,7 @@ class Batch:
             name = next(name for name in names if name not in self._entries)
             kept = replace(old, key=name, attempt_of=key, same_as="", problem="")
             try:
-                self._copy(key, kept)
+                copy_result(self.loaded, self.ledger, key, kept)
                 self._entries[name] = kept
             except RosgradeError as error:
                 why = f"an earlier attempt could not be kept: {error}".partition("\n")[0]
@@ -255,6 +242,21 @@ class Batch:
         loaded = self.loaded
         version = (loaded.assignment.id, loaded.sha256, loaded.location)
         self.ledger.write(self._entries.values(), *version, self.course, self.taken_from)
+
+
+def copy_result(loaded: LoadedAssignment, ledger: Ledger, key: str, twin: Entry) -> None:
+    """Give an identical submission of another student the same result, under its own name."""
+    known, original = map(ledger.whole_result, (twin.key, key))
+    if known and original and grade_json(known) == grade_json(original):
+        return
+    partial = ledger.partial(twin.key)
+    history = shutil.ignore_patterns(EARLIER)
+    shutil.copytree(ledger.folder(key), partial, dirs_exist_ok=True, ignore=history)
+    found = find(partial)
+    record = replace(found.submission, id=twin.key)
+    write_whole(partial / RECORDINGS_FOLDER / SUBMISSION_FILE, to_json(record))
+    write_graded(regrade(loaded, replace(found, submission=record)), partial, Clock())
+    ledger.put(twin.key, partial)
 
 
 def _teams(rows: Sequence[HandedIn]) -> dict[str, str]:

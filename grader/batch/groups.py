@@ -3,31 +3,77 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any, TypeVar
 
+from grader.batch.batch import copy_result
 from grader.batch.handed_in import NOTHING, HandedIn
+from grader.batch.ledger import Entry, Ledger
+from grader.batch.regrading import load_used
 from grader.course.load import Course, written
 from grader.findings.wording import listing
 from grader.spec.nearest_name import did_you_mean
 
+_DIFFERENT = " of one group handed in different files"
+_OF_A_GROUP = {"path", "sha256", "source", "fault", "late", "handed_in", "handed_in_from"}
+R = TypeVar("R", bound=Entry)
 
-def with_groups(rows: Sequence[HandedIn], course: Course | None) -> list[HandedIn]:
+
+def with_groups(rows: Sequence[R], course: Course | None) -> list[R]:
     """Rows in which a group has what the one of them handed in who did."""
-    found = list(rows)
+    givers = {row.shared_by for row in rows}
+    found = [_alone(replace(row, team="") if row.key in givers else row) for row in rows]
+    rows = list(found)
     places = {written(row.key): at for at, row in enumerate(rows)}
     for group in course.spec.groups if course is not None else ():
         members = [places[name] for name in map(written, group) if name in places]
-        handed = [at for at in members if rows[at].path is not None or rows[at].fault]
-        paths = {rows[at].path for at in handed}
+        handed = [at for at in members if _given(rows[at]) or rows[at].fault]
+        paths = {_given(rows[at]) for at in handed}
         for at in members if len(paths) > 1 else ():
             names = listing([rows[one].key for one in handed])
-            found[at] = rows[at].with_problem(f"{names} of one group handed in different files")
+            found[at] = rows[at].with_problem(f"{names}{_DIFFERENT}")
         for at in set(members) - set(handed) if len(paths) == 1 else ():
             row, other = rows[at], rows[handed[0]]
             parts = (part for part in row.problem.split("; ") if not part.startswith(NOTHING))
-            row = replace(row, path=other.path, fault=other.fault, problem="; ".join(parts))
-            found[at] = replace(row, late=other.late).at((other.handed_in, other.handed_in_from))
+            first = rows[min(at, handed[0])].key if other.sha256 else ""
+            row = replace(row, problem="; ".join(parts), shared_by=other.key, team=first)
+            found[at] = replace(row, **{name: getattr(other, name) for name in _shared(row)})
+            found[handed[0]] = replace(found[handed[0]], team=found[handed[0]].team or first)
     return found
+
+
+def regroup(ledger: Ledger, course: Course) -> None:
+    """Give the rows of a graded class what the groups of its rules share now; nothing is run."""
+    before = ledger.read()
+    rows = with_groups(before.entries, course)
+    if rows == list(before.entries):
+        return
+    loaded = load_used(ledger)
+    for row in rows:
+        if row.shared_by and ledger.result(row.shared_by) is not None:
+            copy_result(loaded, ledger, row.shared_by, row)
+    ledger.write(rows, before.assignment, before.sha256, before.location, before.course)
+
+
+def _given(row: Entry) -> object:
+    """What tells the submission of a row: where it lies, or its hash once that is read."""
+    return getattr(row, "path", None) or row.sha256
+
+
+def _shared(row: Entry) -> list[str]:
+    return [one.name for one in fields(row) if one.name in _OF_A_GROUP]
+
+
+def _alone(row: R) -> R:
+    """A row without what it has of its group."""
+    parts = (part for part in row.problem.split("; ") if not part.endswith(_DIFFERENT))
+    row = replace(row, problem="; ".join(parts))
+    if not row.shared_by:
+        return row
+    nothing: dict[str, Any] = {
+        one.name: one.default for one in fields(row) if one.name in _OF_A_GROUP
+    }
+    return replace(row, **nothing, shared_by="", team="").with_problem(NOTHING)
 
 
 def strangers(rows: Sequence[HandedIn], course: Course) -> Iterator[str]:

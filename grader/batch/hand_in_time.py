@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from grader.batch.handed_in import HandedIn
 from grader.course.instant import read_time
-from grader.errors import GraderFault
+from grader.errors import GraderFault, UsageError
 from grader.submission.git import run_git
 
 _COLUMNS = ("handed_in", "handed in", "submitted_at")
 NOT_KNOWN = ("", "")
+CANVAS_TIMES = "submissions*.json"
 _IN_NAME = re.compile(
     r"(\d{4}-\d\d-\d\d)[T_ -](\d\d)[-:.](\d\d)(?:[-:.](\d\d))?(Z|\+\d\d:?\d\d|-\d\d:\d\d)?(?!\d)"
 )
@@ -43,6 +45,19 @@ def of_metadata(about: Mapping[str, Any]) -> tuple[str, str]:
     created = about.get(":created_at")
     text = created.isoformat() if isinstance(created, datetime) else ""
     return _valid(text, "Gradescope's metadata")
+
+
+def of_canvas(folders: Iterable[Path]) -> dict[str, tuple[str, str]]:
+    """When Canvas says that each user handed in: what its API told, as the instructor kept it."""
+    times = {}
+    for file in (one for folder in folders for one in sorted(folder.glob(CANVAS_TIMES))):
+        try:
+            for about in json.loads(file.read_bytes()):
+                if about.get("submitted_at"):
+                    times[str(about["user_id"])] = _iso(str(about["submitted_at"])), "Canvas"
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            raise UsageError(f"{file}: is no list of submissions of Canvas: {error!r}") from error
+    return times
 
 
 def of_name(name: str) -> tuple[str, str]:

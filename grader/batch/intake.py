@@ -13,7 +13,14 @@ from typing import Any
 import yaml
 
 from grader.batch.groups import with_groups
-from grader.batch.hand_in_time import of_metadata, of_name, timed
+from grader.batch.hand_in_time import (
+    CANVAS_TIMES,
+    NOT_KNOWN,
+    of_canvas,
+    of_metadata,
+    of_name,
+    timed,
+)
 from grader.batch.handed_in import (
     FOREIGN,
     NOTHING,
@@ -27,6 +34,8 @@ from grader.batch.roster import Roster, Student
 from grader.batch.roster_match import matched, unique
 from grader.course.load import Course
 from grader.errors import GraderFault, RosgradeError, SubmissionError, UsageError
+from grader.findings.wording import listing
+from grader.report.formats.canvas_comments import carrier
 from grader.report.formats.gradebook import DOWNLOAD
 from grader.submission.git import run_git
 from grader.submission.intake.archive import SUFFIXES, unpack
@@ -55,7 +64,11 @@ def take_in(
     """Find out who handed in what, and when."""
     folder = _opened(source, staging)
     _refuse_single(folder, source)
-    entries = list(_entries(folder, staging, on_left_out, out))
+    times = of_canvas([folder, *([source.parent] if source.is_file() else [])])
+    entries = [
+        row.at(times.get(row.names[0], NOT_KNOWN)) if row.download else row
+        for row in _entries(folder, staging, on_left_out, out)
+    ]
     if not entries:
         raise UsageError(f"{source}: holds no submission; expected one folder or archive for each")
     rows = matched(entries, roster) if roster else entries
@@ -159,7 +172,7 @@ def _entries(
     metadata = _gradescope(folder / GRADESCOPE_METADATA)
     canvas: dict[str, list[tuple[Path, re.Match[str]]]] = {}
     for item in sorted(folder.iterdir(), key=lambda path: os.fsencode(path.name)):
-        if is_ignored(item) or item.name == GRADESCOPE_METADATA:
+        if is_ignored(item) or item.name == GRADESCOPE_METADATA or item.match(CANVAS_TIMES):
             continue
         # Path.resolve() raises at a link that leads to itself.
         if out is not None and os.path.realpath(item) == os.path.realpath(out):
@@ -185,7 +198,7 @@ def _entries(
 
 def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> HandedIn:
     match = files[0][1]
-    named = _names(files)
+    named, again = _names(files)
     path, fault = only_archive(named), ""
     if path is None:
         path = staging / f"canvas-{match['user']}"
@@ -197,20 +210,32 @@ def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> Handed
         path=None if fault else path,
         item=path,
         names=(match["user"], match["name"]),
+        download=carrier([file.name for file, _ in files]),
+        problem=again,
     )
 
 
-def _names(files: list[tuple[Path, re.Match[str]]]) -> dict[str, Path]:
+def _names(files: list[tuple[Path, re.Match[str]]]) -> tuple[dict[str, Path], str]:
     """Each file under the name that it was handed in with, as far as that tells them apart.
 
-    Of an archive that was handed in several times (``ws.zip``, ``ws-1.zip``) only the last counts.
+    Of an archive that was handed in several times (``ws.zip``, ``ws-1.zip``) only the last counts,
+    and a note says so.
     """
     ordered = sorted(files, key=lambda one: int(one[1]["attachment"]))
     plain = [_AGAIN.sub("", named["file"]) for _, named in ordered]
-    return {
-        name if plain.count(name) == 1 or name.lower().endswith(SUFFIXES) else named["file"]: file
-        for name, (file, named) in zip(plain, ordered, strict=True)
-    }
+    given, names = [named["file"] for _, named in ordered], {}
+    same: dict[str, list[str]] = {}
+    for name, called, (file, _) in zip(plain, given, ordered, strict=True):
+        is_archive = name.lower().endswith(SUFFIXES)
+        names[name if plain.count(name) == 1 or is_archive else called] = file
+        if is_archive:
+            same.setdefault(name, []).append(called)
+    notes = (
+        f"{listing(one)} are taken for one archive that was handed in again: only the last counts"
+        for one in same.values()
+        if len(one) > 1
+    )
+    return names, shown("; ".join(notes))
 
 
 def _gather(files: Mapping[str, Path], folder: Path) -> str:

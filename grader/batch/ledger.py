@@ -50,6 +50,8 @@ class Entry:
         handed_in: ISO 8601, without an offset where its source has none; or empty.
         handed_in_from: What tells it, such as ``Gradescope's metadata``.
         attempt_of: Key of the student's row, where this is an earlier attempt.
+        download: Name that Canvas gave to the file, or to one of them; or empty.
+        shared_by: Key of the student of the same group who handed it in for this one, or empty.
     """
 
     key: str
@@ -65,6 +67,8 @@ class Entry:
     handed_in: str = ""
     handed_in_from: str = ""
     attempt_of: str = ""
+    download: str = ""
+    shared_by: str = ""
 
     @property
     def review_key(self) -> str:

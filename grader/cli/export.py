@@ -154,18 +154,25 @@ def canvas(
 
 
 def _write_comments(file: Path, out: Path, scored: Sequence[str]) -> list[str]:
-    """Write comments for those who have a score; who gets none, and why."""
+    """Write comments for all with a score, or with a submission that is unreadable.
+
+    Returns:
+        Who gets none, and why.
+    """
     from grader.batch.feedback import class_feedback
     from grader.report.files import write_whole
-    from grader.report.formats.canvas_comments import is_download, upload_zip
+    from grader.report.formats.canvas_comments import carrier, upload_zip
 
     comments, problems = {}, []
     for one in class_feedback(out)[0]:
-        name = Path(one.entry.source).name
-        if one.entry.key in scored and is_download(name):
+        if one.entry.key not in scored and not one.result.submission.problem:
+            continue
+        # A batch of before kept no other name.
+        name = one.entry.download or carrier([Path(one.entry.source).name])
+        if name:
             comments[name] = one.result, one.report.read_bytes()
-        elif one.entry.key in scored:
-            why = "Canvas takes one only for a zip that was downloaded from it"
+        else:
+            why = "Canvas takes one only for a file that was downloaded from it"
             problems.append(f"{one.entry.key}: no comment: {why}")
     write_whole(file, upload_zip(comments))
     say(f'{file}: {counted(len(comments), "comment")} for "Upload Submissions"')

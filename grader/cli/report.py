@@ -35,15 +35,21 @@ def report(
     The options of the formats work for one report. For a class, every report is written, with what
     `rosgrade review` added, and so are the gradebook and the overview.
     """
-    from grader.batch.adjusting import ClassAdjustments
+    from grader.batch.adjusting import ClassAdjustments, course_of
     from grader.batch.class_files import all_standing, find_reports, write_class
     from grader.batch.files import REPORT_FILE, RESULT_FILE
     from grader.batch.grading import RECORDINGS_FOLDER
+    from grader.batch.groups import regroup
     from grader.batch.ledger import Ledger
     from grader.batch.rendering import bring_up_to_date, render_again
     from grader.errors import UsageError
     from grader.report.files import refuse_inputs
 
+    ledger = Ledger.around(out)
+    rules = course_of(ledger.out, None, ledger.read().assignment) if ledger is not None else None
+    if ledger is not None and rules is not None:
+        with ledger.opened():
+            regroup(ledger, rules)
     folders = find_reports(out)
     formats = Formats(files, junit_family, gradescope_metadata, github)
     if len(folders) > 1 and (files or gradescope_metadata or github):
@@ -51,7 +57,6 @@ def report(
             f"{out} has {len(folders)} reports, and a file of such a format holds one: "
             "give the folder of one report"
         )
-    ledger = Ledger.around(out)
     adjust = ClassAdjustments(ledger) if ledger is not None else None
     for key in adjust.vanished() if adjust is not None else ():
         print_warning(f"the review of {key} stays, but the class has no such student")

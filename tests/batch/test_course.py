@@ -22,7 +22,7 @@ from grader.batch.class_files import read_class, standing, write_class
 from grader.batch.class_regrading import regrade_class
 from grader.batch.files import REPORT_FILE, RESULT_FILE, STUDENT_FILE, write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
-from grader.batch.groups import strangers
+from grader.batch.groups import regroup, strangers
 from grader.batch.intake import take_in
 from grader.batch.ledger import Ledger
 from grader.batch.regrading import find, regrade
@@ -400,3 +400,28 @@ def test_rules_that_are_gone_are_one_message_and_change_nothing(course: Class) -
     with pytest.raises(UsageError, match=r"course.yaml: does not exist, and the rules of"):
         read_class(course.out)
     assert (course.out / "grades.csv").read_text() == before
+
+
+def test_groups_that_are_written_down_later_are_applied_by_a_report(course: Class) -> None:
+    course.hand_in("ben", "bot", "extra")
+    roster = "login,name\nana,Ana\nben,Ben\ncai,Cai\n"
+    assert course.grade(roster)["ana"].missing
+
+    def reported() -> dict[str, ClassRow]:
+        rules = course_of(course.out, None, course.name)
+        assert rules is not None
+        with Ledger(course.out).opened() as ledger:
+            regroup(ledger, rules)
+        return {row.id: row for row in read_class(course.out)}
+
+    course.rules(COURSE + "groups: [[ana, ben]]\n")
+    for _ in range(2):
+        rows = reported()
+        assert (rows["ana"].score, rows["ana"].note) == (rows["ben"].score, "") != (None, "")
+    entries = {one.key: one for one in Ledger(course.out).read().entries}
+    assert {entries[key].review_key for key in ("ana", "ben")} == {"ana"}
+    assert course.grade(roster)["ana"].score == rows["ben"].score
+    course.rules(COURSE + "groups: [[ben, cai]]\n")
+    rows = reported()
+    assert rows["ana"].missing and rows["cai"].score == rows["ben"].score
+    assert Ledger(course.out).read().entries[1].review_key == "ben"

@@ -139,6 +139,29 @@ def test_of_an_archive_that_canvas_has_twice_the_last_one_counts(
         archive(course / f"lopezana_90211_{attachment}_{name}")
     (row,) = take_in(course, staging)
     assert row.path == course / "lopezana_90211_100_ws-1.zip"
+    assert row.download == "lopezana_90211_100_ws-1.zip"
+
+
+def test_two_archives_of_one_name_and_two_numbers_leave_a_note(course: Path, staging: Path) -> None:
+    for attachment, name in ((99, "x-1.zip"), (100, "x-2.zip")):
+        archive(course / f"lopezana_90211_{attachment}_{name}")
+    (row,) = take_in(course, staging)
+    assert row.path == course / "lopezana_90211_100_x-2.zip"
+    assert row.problem.startswith("x-1.zip and x-2.zip are taken for one archive")
+
+
+def test_canvas_says_when_something_was_handed_in(course: Path, staging: Path) -> None:
+    archive(course / "lopezana_LATE_90211_1_ws.zip")
+    archive(course / "ngwei_90212_2_ws.zip")
+    told = '[{"user_id": 90211, "submitted_at": "2026-10-12T22:20:00Z"}]'
+    (course / "submissions-1.json").write_text(told)
+    left_out: list[str] = []
+    ana, wei = take_in(course, staging, None, left_out.append)
+    assert (ana.handed_in, ana.handed_in_from) == ("2026-10-12T22:20:00+00:00", "Canvas")
+    assert (wei.handed_in, left_out) == ("", [])
+    (course / "submissions-1.json").write_text('{"errors": []}')
+    with pytest.raises(UsageError, match=r"submissions-1\.json: is no list of submissions"):
+        take_in(course, staging)
 
 
 def test_moodle_s_folders_and_files_are_read(course: Path, staging: Path) -> None:

@@ -6,6 +6,7 @@ import csv
 import io
 import mailbox
 import re
+import tarfile
 import zipfile
 from contextlib import closing
 from dataclasses import replace
@@ -17,7 +18,7 @@ import pytest
 
 from grader.batch.files import RESULT_FILE
 from grader.batch.ledger import Entry, Ledger
-from grader.report.formats.canvas_comments import is_download
+from grader.report.formats.canvas_comments import carrier, upload_zip
 from grader.report.model.result import result_json
 from grader.report.model.result_model import AdjustmentPart
 from grader.review.adjust import adjusted
@@ -176,14 +177,36 @@ def test_comments_to_upload_are_called_as_canvas_called_the_downloads(
 
 
 @pytest.mark.parametrize(
-    ("name", "takes"),
+    ("names", "best"),
     [
-        ("lopezana_90211_555_ws.zip", True),
-        ("lopezana_LATE_90211_555_my_ws-2.ZIP", True),
-        ("lopezana_90211_555_ws.tar.gz", False),
-        ("ana.zip", False),
-        ("", False),
+        (["lopezana_90211_555_ws.zip"], 0),
+        (["lopezana_LATE_90211_555_my_ws-2.ZIP"], 0),
+        (["l_1_1_report.pdf", "l_1_2_ws.tar.gz"], 1),
+        (["l_1_1_report.pdf", "l_1_2_bot_pub.py", "l_1_3_package.xml"], 1),
+        (["l_1_1_report.pdf"], 0),
+        (["ana.zip", ""], None),
     ],
 )
-def test_canvas_takes_only_what_was_downloaded_as_a_zip(name: str, takes: bool) -> None:
-    assert is_download(name) is takes
+def test_a_comment_takes_the_file_from_canvas_that_holds_it_best(
+    names: list[str], best: int | None
+) -> None:
+    assert carrier(names) == ("" if best is None else names[best])
+
+
+@pytest.mark.parametrize("name", ["l_1_2_ws.tar.gz", "l_1_2_ws.TXZ", "l_1_2_ws.tar"])
+def test_a_comment_on_a_tar_is_a_tar(name: str) -> None:
+    made = upload_zip({name: (full_points().result, b"<html>")})
+    with (
+        zipfile.ZipFile(io.BytesIO(made)) as outer,
+        tarfile.open(fileobj=io.BytesIO(outer.read(name))) as inner,
+    ):
+        assert inner.getnames() == ["feedback.txt", "report.html"]
+
+
+def test_a_comment_on_a_single_file_is_the_text_or_the_page() -> None:
+    made = upload_zip(
+        {name: (full_points().result, b"<html>") for name in ("a_1_2_n.py", "b_2_3_n.html")}
+    )
+    with zipfile.ZipFile(io.BytesIO(made)) as outer:
+        assert outer.read("a_1_2_n.py").startswith(b"timed_publisher: 3 of")
+        assert outer.read("b_2_3_n.html") == b"<html>"
