@@ -135,10 +135,43 @@ def test_every_action_runs_on_a_node_that_github_still_has():
         *("action.yml", ".github/workflows/test.yml", "templates/export/github-workflow.yml.j2"),
         "templates/course/workflow.yml.j2",
     )
-    form = re.compile(r"uses: actions/([\w-]+)(?:/\w+)?@v(\d+)\n")
+    # By its commit: a tag can be moved to other code.
+    form = re.compile(r"uses: actions/([\w-]+)(?:/\w+)?@[0-9a-f]{40}  # v(\d+)\.\d+\.\d+\n")
+    plain = re.compile(r"uses: actions/")
     used = [found for file in files for found in form.findall((ROOT / file).read_text())]
     assert {name for name, _ in used} == set(first)
     assert [(name, number) for name, number in used if int(number) < first[name]] == []
+    assert len(used) == sum(len(plain.findall((ROOT / file).read_text())) for file in files)
+
+
+def test_no_workflow_leaves_a_token_in_the_checkout_or_runs_twice_for_one_push(loaded, tmp_path):
+    exported = export.github(loaded, tmp_path, "my-course/rosgrade@v1").read_text()
+    ours = (ROOT / ".github/workflows/test.yml").read_text()
+    for text in (WORKFLOWS["course kit"], exported, ours):
+        data = yaml.safe_load(text)
+        assert "github.ref" in data["concurrency"]["group"]
+        (job,) = data["jobs"].values()
+        (checkout,) = (one for one in job["steps"] if "/checkout@" in one.get("uses", ""))
+        assert checkout["with"] == {"persist-credentials": False}
+
+
+def test_the_workflow_of_a_kit_is_not_green_where_nothing_was_graded(tmp_path):
+    steps = yaml.safe_load(WORKFLOWS["course kit"])["jobs"]["grade"]["steps"]
+    script = next(one["run"] for one in steps if one.get("name") == "Grade")
+    (tmp_path / "work").mkdir()
+
+    def ended():
+        shell = ["bash", "-e", "-c", script]
+        return subprocess.run(shell, cwd=tmp_path, capture_output=True, check=False).returncode
+
+    assert ended() == 2
+    rosgrade = tmp_path / ".venv" / "bin" / "rosgrade"
+    rosgrade.parent.mkdir(parents=True)
+    for code in (0, 1, 3):
+        rosgrade.write_text(f"#!/bin/sh\nexit {code}\n")
+        rosgrade.chmod(0o755)
+        (tmp_path / "work" / "timed_publisher").mkdir(exist_ok=True)
+        assert ended() == code
 
 
 def test_the_action_declares_every_output_that_grading_sets():
@@ -193,6 +226,9 @@ def test_what_took_long_is_kept_also_when_points_are_lost(text):
     (grading,) = (index for index, one in enumerate(steps) if "check " in one.get("run", ""))
     environment, builds = (index for index, one in enumerate(used) if one == "actions/cache/save")
     assert environment < grading < builds and "always()" in steps[builds]["if"]
+    # GitHub gives the cache of a tag to no other run.
+    for index in (environment, builds):
+        assert "github.ref_type != 'tag'" in steps[index]["if"]
 
 
 def test_the_action_says_how_long_it_took(tmp_path):
