@@ -15,9 +15,21 @@ import sys
 import sysconfig
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Dict, Iterable, Iterator, List, Mapping, NamedTuple, Optional, Set, Tuple
+from typing import (
+    Callable,
+    Dict,
+    Iterable,
+    Iterator,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Set,
+    Tuple,
+)
 
 Version = Tuple[int, int]
+OnLine = Callable[[str], object]
 
 DISTRO = "jazzy"
 SUPPORTED = ((3, 13), (3, 12), (3, 11), (3, 10))
@@ -25,11 +37,23 @@ WHEELS_PLATFORM = "linux-x86_64"
 VENV = ".venv"
 STAMP = "rosgrade-setup.json"
 
+COMPILERS = {"cmake": "cmake", "c++": "g++", "make": "make"}
+"""What a package needs that is not pure Python -> what it is called by Debian and Ubuntu."""
+_PROGRAMS = {**COMPILERS, "bwrap": "bubblewrap", "git": "git"}
+_PARTS_OF_PYTHON = {
+    "dev": "import os, sysconfig; os.stat(os.path.join(sysconfig.get_path('include'), 'Python.h'))",
+    "venv": "import ensurepip, venv",
+}
+APT = " ".join([*sorted(_PROGRAMS.values()), *("python3-" + part for part in _PARTS_OF_PYTHON)])
+"""All that rosgrade takes from the system, for `sudo apt install`."""
+
 # ROS's extensions are built against the system's numpy 1, which numpy 2 breaks, and its message
 # generators are written for the system's empy and lark.
 _FROM_SYSTEM = {"numpy", "empy", "lark-parser"}
 # One package of the lock has no wheel and is built by these, so they are installed before it.
 _BUILD_TOOLS = {"setuptools"}
+_TOLD_EACH = 20
+"""Packages between two lines of progress."""
 
 
 class SetupError(Exception):
@@ -187,7 +211,12 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
             raise SetupError(f"{venv} is not a virtual environment: move it away")
         # A sandbox runs as another user where rosgrade runs as root; there is no secret in it.
         os.umask(0o022)
+        lacks = lacking(chosen.interpreter)
         if {**installed, "pyproject": ""} != without_rosgrade:
+            if any(package.endswith("-venv") for package in lacks):
+                raise SetupError(
+                    f"rosgrade needs Python's venv: sudo apt install {' '.join(lacks)}"
+                )
             _remove(venv)
             try:
                 _create(venv, chosen)
@@ -205,6 +234,9 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
         _write_stamp(venv, wanted)
         if chosen.ros == "wheels":
             _add_ros2(venv, environ)
+    if lacks:
+        what = "for the sandbox and for packages that are compiled"
+        _say(f"not here, {what}: sudo apt install {' '.join(lacks)}")
     if not is_kit:
         _say(f"ready: {VENV}/bin/rosgrade --help")
 
@@ -221,14 +253,19 @@ def main(root: Optional[str] = None) -> int:
     return 0
 
 
+def lacking(interpreter: Interpreter) -> List[str]:
+    """Return the packages of Debian and Ubuntu that rosgrade needs and this machine lacks."""
+    found = [package for program, package in _PROGRAMS.items() if not shutil.which(program)]
+    for part, code in _PARTS_OF_PYTHON.items():
+        if _run([interpreter.path, "-I", "-c", code]).returncode:
+            found.append(f"python{_dotted(interpreter.version)}-{part}")
+    return found
+
+
 def _create(venv: Path, chosen: Plan) -> None:
     version = _dotted(chosen.interpreter.version)
     python = chosen.interpreter.path
     system = chosen.ros == "system"
-    if _run([python, "-I", "-c", "import ensurepip, venv"]).returncode:
-        raise SetupError(
-            f"rosgrade needs Python's venv module: sudo apt install python{version}-venv"
-        )
     _say(f"creating {VENV} (Python {version}{', with the sourced ROS' * system})")
     options = ["--system-site-packages"] if system else []
     command = [python, "-I", "-m", "venv", *options, str(venv)]
@@ -237,8 +274,20 @@ def _create(venv: Path, chosen: Plan) -> None:
 
 def _install_lock(venv: Path, lock_text: str) -> None:
     entries = read_lock(lock_text)
-    names = {entry.name for entry in entries}
-    _say(f"installing {len(names)} packages (a minute or two)")
+    # Some have an entry for each version of Python.
+    count = len({entry.name for entry in entries})
+    seen = 0
+
+    def tell(line: str) -> None:
+        nonlocal seen
+        if line.startswith(("Collecting ", "Requirement already satisfied: ")):
+            seen += 1
+            if seen % _TOLD_EACH == 0:
+                _say(f"{seen} of {count} packages are here")
+        elif seen > _TOLD_EACH and line.startswith("Installing collected packages"):
+            _say(f"{seen} of {count} packages are here and being unpacked (a minute or less)")
+
+    _say(f"fetching {count} packages")
     for stage, tools in enumerate((True, False)):
         text = "".join(entry.text for entry in entries if (entry.name in _BUILD_TOOLS) == tools)
         path = venv / f"requirements-{stage}.txt"
@@ -246,21 +295,27 @@ def _install_lock(venv: Path, lock_text: str) -> None:
         # Built without isolation, a source uses the locked tools: nothing unlocked is fetched.
         options = ["--no-deps", "--no-build-isolation", "--use-pep517", "--require-hashes"]
         problem = "the packages could not be installed; is the package index reachable?"
-        _pip(venv, [*options, "-r", str(path)], problem)
+        _pip(venv, [*options, "-r", str(path)], problem, tell)
 
 
 def _add_ros2(venv: Path, environ: Mapping[str, str]) -> None:
     """Build the command `ros2`, which no wheel has, where its sources can be had; else say how."""
     _say("building the command ros2 (a minute; not where github.com cannot be reached)")
     rosgrade = str(venv / "bin" / "rosgrade")
-    command = [rosgrade, "underlay", "add", "--quiet", "--wait", "10", "ros2cli"]
+    command = [rosgrade, "underlay", "add", "--wait", "10", "ros2cli"]
+    error_mark = "rosgrade: error: "
+
+    def tell(line: str) -> None:
+        if not line.startswith(error_mark):
+            print(line, end="", flush=True)
+
     try:
-        done = _run(command, _clean(environ))
+        done = _run(command, _clean(environ), tell)
         problem = "" if not done.returncode else (done.stdout.splitlines() or ["no reason"])[-1]
     except OSError as error:
         problem = str(error)
     if problem:
-        reason = problem.replace("rosgrade: error: ", "")
+        reason = problem.replace(error_mark, "")
         _say(f"no ros2 yet ({reason}); to get it: {VENV}/bin/rosgrade underlay add ros2cli")
 
 
@@ -274,28 +329,38 @@ def _check_imports(venv: Path, environ: Mapping[str, str]) -> None:
     _expect(command, "what was installed does not work together", _clean(environ))
 
 
-def _pip(venv: Path, arguments: List[str], problem: str) -> None:
+def _pip(venv: Path, arguments: List[str], problem: str, on_line: OnLine = str) -> None:
     # -I: neither a sourced ROS nor the working directory gets among pip's own modules.
     pip = [str(venv / "bin" / "python"), "-I", "-m", "pip", "--disable-pip-version-check"]
-    _expect([*pip, "install", "--quiet", "--no-input", *arguments], problem)
+    _expect([*pip, "install", "--no-input", *arguments], problem, on_line=on_line)
 
 
 def _run(
-    command: List[str], environ: Optional[Mapping[str, str]] = None
+    command: List[str], environ: Optional[Mapping[str, str]] = None, on_line: OnLine = str
 ) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
+    with subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         universal_newlines=True,
+        errors="replace",
         env=None if environ is None else dict(environ),
-        check=False,
-    )
+    ) as process:
+        lines = []
+        for line in process.stdout or ():
+            lines.append(line)
+            on_line(line)
+    return subprocess.CompletedProcess(command, process.returncode, "".join(lines))
 
 
-def _expect(command: List[str], problem: str, environ: Optional[Mapping[str, str]] = None) -> None:
-    done = _run(command, environ)
+def _expect(
+    command: List[str],
+    problem: str,
+    environ: Optional[Mapping[str, str]] = None,
+    on_line: OnLine = str,
+) -> None:
+    done = _run(command, environ, on_line)
     if done.returncode:
         sys.stderr.write(done.stdout)
         raise SetupError(problem)

@@ -15,7 +15,7 @@ from pathlib import Path
 from grader import resources
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.selection import visible_part
-from grader.bootstrap import DISTRO, WHEELS_PLATFORM, read_lock
+from grader.bootstrap import APT, DISTRO, WHEELS_PLATFORM, read_lock
 from grader.errors import AssignmentError, UsageError
 from grader.export import Member, checkout, write_members
 from grader.report.files import refuse_part
@@ -61,6 +61,7 @@ def write_kit(chosen: Sequence[LoadedAssignment], out: Path, title: str, tag: st
         "handouts": [make_handout(visible_part(loaded)) for loaded in chosen],
         "hidden": any(visible_part(loaded).withheld.checks for loaded in chosen),
         "distro": DISTRO,
+        "apt": APT,
         "platform": WHEELS_PLATFORM.removeprefix("linux-"),
     }
     for path, template in _RENDERED.items():

@@ -13,13 +13,14 @@ from pathlib import Path
 
 from grader import resources
 from grader.assignment.load import LoadedAssignment
+from grader.bootstrap import APT
 from grader.errors import UsageError
 from grader.report.files import refuse_inputs, refuse_part, write_whole
 from grader.starter import rendered
 from grader.visible_files import files_in, grading_files, visible_files
 
 _CHECKOUT = ("pyproject.toml", "requirements.lock", "README.md", "LICENSE")
-_PACKAGES = ("grader", "sim", "templates")
+_FOLDERS = ("grader", "sim", "templates", "docs/concepts")
 _OWN_FOLDER = "rosgrade"
 # A zip holds no earlier date; with a fixed one the same files give the same bytes.
 _DATE = (1980, 1, 1, 0, 0, 0)
@@ -104,8 +105,8 @@ def checkout(assignments: Mapping[str, Mapping[str, bytes]]) -> dict[str, Member
             f"install: there is no {', '.join(missing)} in {root}"
         )
     paths = {name: root / name for name in _CHECKOUT}
-    for package in _PACKAGES:
-        for path in files_in(root / package):
+    for folder in _FOLDERS:
+        for path in files_in(root / folder):
             paths[path.relative_to(root).as_posix()] = path
     members = {
         name: Member(path.read_bytes(), path.stat().st_mode & 0o100 != 0)
@@ -118,7 +119,7 @@ def checkout(assignments: Mapping[str, Mapping[str, bytes]]) -> dict[str, Member
 
 
 def _template(name: str, loaded: LoadedAssignment, *, executable: bool = False) -> Member:
-    text = rendered(f"export/{name}", assignment=loaded.assignment.id)
+    text = rendered(f"export/{name}", assignment=loaded.assignment.id, apt=APT)
     return Member(text.encode(), executable)
 
 

@@ -39,6 +39,7 @@ def diagnose() -> Iterator[Part]:
     else:
         where = "wheels in " if installation.source == "wheels" else "sourced from "
         where += ", ".join(map(str, installation.prefixes))
+        where += installation.notice and f"; {installation.notice}"
         yield Part("ROS 2", True, f"{installation.distro}, {where}", required=True)
         yield _rmw(installation)
     yield _colcon()
@@ -95,12 +96,27 @@ def _underlays(installation: ros.RosInstallation) -> Iterator[Part]:
     remedy = "what an assignment may need besides; `rosgrade underlay add NAME`"
     absent = f"; not here: {', '.join(sorted(missing))} ({remedy})" if missing else ""
     yield Part("underlays", True, f"{', '.join(there) or 'none'}{absent}")
-    tools = missing_tools(installation.environment({})["PATH"])
-    lacks = [f"sudo apt install {' '.join(tools)}"] if tools else []
-    lacks += ["rosgrade underlay add rclcpp"] if "rclcpp" in missing else []
-    yield Part("nodes in C++", not lacks, "can be graded", "; then ".join(lacks))
+    remedy = remedy_for_cpp(installation)
+    yield Part("nodes in C++", not remedy, "can be graded", remedy)
     found = find_command(installation)
     yield Part("ros2", found is not None, str(found), REMEDY)
+
+
+def remedy_for_cpp(installation: ros.RosInstallation) -> str:
+    """What to do before nodes in C++ can be built and run here, or nothing."""
+    from grader.resources import cache_folder
+    from grader.submission.underlay.definition import find_underlay
+    from grader.submission.underlay.store import UnderlayStore
+
+    packages = missing_tools(installation.environment({})["PATH"])
+    try:
+        _ = installation.preloaded
+    except GraderFault:
+        packages.append(headers_package())
+    commands = [f"sudo apt install {' '.join(packages)}"] if packages else []
+    if UnderlayStore(cache_folder(), installation).missing([find_underlay("rclcpp")]):
+        commands.append("rosgrade underlay add rclcpp (once, some minutes)")
+    return "; then ".join(commands)
 
 
 def _discovery(installation: ros.RosInstallation) -> Part:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sys
 import sysconfig
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,6 +18,8 @@ from grader.errors import GraderFault
 
 DISTRO = "jazzy"
 _WHEELS = "ros_*.libs"
+_INDEX = "share/ament_index/resource_index/packages"
+_APT = f"sudo apt install ros-{DISTRO}-rclpy ros-{DISTRO}-common-interfaces"
 
 _KEPT = ("LANG", "LC_ALL", "LC_CTYPE", "TZ", "XDG_RUNTIME_DIR", "TMPDIR", "HOME", "USER")
 
@@ -29,6 +31,8 @@ class RosInstallation:
     Attributes:
         source: ``wheels`` or ``sourced``.
         inherited: Variables that a sourced installation needs, taken from the environment.
+        left_out: Workspaces that are sourced as well. They may hold anything, also solutions, so
+            nothing is built or run with them.
         underlays: Install spaces (merged layout) with the packages that it lacks; see
             :mod:`grader.submission.underlay`.
     """
@@ -39,13 +43,23 @@ class RosInstallation:
     inherited: tuple[tuple[str, str], ...] = ()
     distro: str = DISTRO
     underlays: tuple[Path, ...] = ()
+    left_out: tuple[Path, ...] = ()
+
+    @property
+    def notice(self) -> str:
+        """What to say of sourced workspaces, or nothing if there are none."""
+        places = ", ".join(map(str, self.left_out))
+        return places and (
+            f"left out: {places} (sourced, but no part of ROS: what submissions need of it stands "
+            "under `underlays` in assignment.yaml)"
+        )
 
     @cached_property
     def packages(self) -> frozenset[str]:
         """Names of all packages in the ament index."""
         found: set[str] = set()
         for prefix in (*self.underlays, *self.prefixes):
-            index = prefix / "share/ament_index/resource_index/packages"
+            index = prefix / _INDEX
             if index.is_dir():
                 found.update(entry.name for entry in index.iterdir())
         return frozenset(found)
@@ -84,10 +98,13 @@ class RosInstallation:
                 their ``local_setup.bash``.
         """
         overlays = (*overlays, *self.underlays)
-        prefixes = os.pathsep.join(str(path) for path in (*overlays, *self.prefixes))
+        all_prefixes = (*overlays, *self.prefixes)
+        prefixes = os.pathsep.join(map(str, all_prefixes))
+        # The command `ros2` and what other packages install for a shell.
+        programs = dict.fromkeys([self.python.parent, *(path / "bin" for path in all_prefixes)])
         result = {name: environ[name] for name in _KEPT if name in environ} | {
             **dict(self.inherited),
-            "PATH": os.pathsep.join([str(self.python.parent), "/usr/local/bin:/usr/bin:/bin"]),
+            "PATH": os.pathsep.join([*map(str, programs), "/usr/local/bin:/usr/bin:/bin"]),
             "ROS_DISTRO": self.distro,
             "ROS_VERSION": "2",
             "ROS_PYTHON_VERSION": "3",
@@ -154,16 +171,43 @@ def find(
                 f"ROS 2 {distro} is sourced, but rosgrade grades with {DISTRO}: open a shell "
                 f"without it, or source /opt/ros/{DISTRO}/setup.bash"
             )
+        sourced = [Path(path) for path in environ["AMENT_PREFIX_PATH"].split(os.pathsep) if path]
+        prefixes = _distribution(sourced)
+        if not prefixes:
+            raise GraderFault(f"ROS 2 {distro} is sourced, but has no rclpy: {_APT}")
         names = ("PYTHONPATH", "LD_LIBRARY_PATH")
+        inherited = ((name, _below(prefixes, environ.get(name, ""))) for name in names)
+        others = (path for path in sourced if path not in prefixes)
         return RosInstallation(
             source="sourced",
             python=executable,
-            prefixes=tuple(Path(p) for p in environ["AMENT_PREFIX_PATH"].split(os.pathsep) if p),
-            inherited=tuple((name, environ[name]) for name in names if environ.get(name)),
+            prefixes=prefixes,
+            inherited=tuple((name, paths) for name, paths in inherited if paths),
+            left_out=tuple(dict.fromkeys(map(_install_space, others))),
         )
-    if (prefix / "share/ament_index/resource_index/packages/rclpy").exists():
+    if (prefix / _INDEX / "rclpy").exists():
         return RosInstallation(source="wheels", python=executable, prefixes=(prefix,))
     raise GraderFault(
         "no ROS 2 found: source /opt/ros/jazzy/setup.bash, or install the wheels with "
         "pip install 'rosgrade[ros]' (make setup does it)"
+    )
+
+
+def _distribution(sourced: Sequence[Path]) -> tuple[Path, ...]:
+    """The prefixes of ROS itself: the lowest one with rclpy, or all of an isolated build of it."""
+    with_rclpy = [path for path in sourced if (path / _INDEX / "rclpy").exists()]
+    if with_rclpy and _install_space(with_rclpy[-1]) != with_rclpy[-1]:
+        return tuple(path for path in sourced if path.parent == with_rclpy[-1].parent)
+    return tuple(with_rclpy[-1:])
+
+
+def _install_space(prefix: Path) -> Path:
+    """The folder that colcon installed to: by default each package has a prefix in it."""
+    return prefix.parent if (prefix / _INDEX / prefix.name).exists() else prefix
+
+
+def _below(prefixes: Sequence[Path], paths: str) -> str:
+    parts = (part for part in paths.split(os.pathsep) if part)
+    return os.pathsep.join(
+        part for part in parts if any(Path(part).is_relative_to(prefix) for prefix in prefixes)
     )

@@ -243,6 +243,43 @@ def test_after_a_set_up_that_was_killed_the_next_one_makes_it_whole(
     assert made_for(tmp_path) == "one"
 
 
+PIP = """\
+import sys
+for name in range(45):
+    print(f"Collecting name-{name}")
+print("Installing collected packages: name-0")
+"""
+
+
+def test_a_set_up_says_how_far_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def pip(venv, arguments, problem, on_line=str) -> None:
+        bootstrap._expect([sys.executable, "-c", PIP], problem, on_line=on_line)
+
+    monkeypatch.setattr(bootstrap, "_pip", pip)
+    bootstrap._install_lock(tmp_path, "\n".join(f"name-{number}==1" for number in range(45)))
+    told = capsys.readouterr().out
+    assert "fetching 45 packages" in told and "40 of 45 packages are here\n" in told
+    assert "45 of 45 packages are here and being unpacked" in told
+
+
+def test_one_line_installs_all_that_the_system_lacks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bare = tmp_path / "python3.12"
+    bare.write_text("#!/bin/sh\nexit 1\n")
+    bare.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    lacks = bootstrap.lacking(Interpreter((3, 12), str(bare)))
+    assert [name.replace("3.12", "3") for name in sorted(lacks)] == bootstrap.APT.split()
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/first-grade.md"])
+def test_the_pages_name_all_that_rosgrade_takes_from_the_system(page: str) -> None:
+    assert f"sudo apt install {bootstrap.APT}\n" in (ROOT / page).read_text(encoding="utf-8")
+
+
 def test_a_set_up_without_the_sources_of_ros2_says_in_one_line_how_to_get_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -255,7 +292,8 @@ def test_a_set_up_without_the_sources_of_ros2_says_in_one_line_how_to_get_it(
     bootstrap._add_ros2(tmp_path, os.environ)
     told = capsys.readouterr().out.splitlines()
     assert told[1:] == [
-        "rosgrade: no ros2 yet (no network); to get it: .venv/bin/rosgrade underlay add ros2cli"
+        "fetching",
+        "rosgrade: no ros2 yet (no network); to get it: .venv/bin/rosgrade underlay add ros2cli",
     ]
 
 

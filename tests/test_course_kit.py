@@ -24,9 +24,11 @@ from grader.bootstrap import read_lock
 from grader.course_kit import write_kit
 from grader.errors import UsageError
 from grader.report.concepts import concepts
-from grader.report.html.handout import make_handout
+from grader.report.html.handout import make_handout, render_handout
 from grader.spec.document import parse_yaml, write_yaml
+from grader.starter import starter_files
 from grader.visible_files import visible_files
+from tests.alone import alone
 from tests.assignment.lessons import GOOD, HEAD
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -206,11 +208,26 @@ def test_the_readme_speaks_of_this_course(kit: Path) -> None:
     text = (kit / "README.md").read_text(encoding="utf-8")
     assert text.startswith('# My "course"\n')
     assert "and 2.5 points for 1 more check at grading" in text
-    assert "rosgrade start bot_controller work/bot_controller/src" in text
+    assert "rosgrade start bot_controller ~/ros2_ws/src" in text
     (idea,) = re.findall(r"rosgrade explain (\w+)", text)
     assert idea in concepts()
     for path in re.findall(r"\]\((assignments/\w+)\)", text):
         assert (kit / path / "assignment.yaml").is_file()
+
+
+def test_handouts_readme_and_starter_agree_on_one_workspace(kit: Path) -> None:
+    texts = {"kit": (kit / "README.md").read_text(encoding="utf-8")}
+    for name in list_assignments():
+        loaded = load_assignment(name)
+        texts[name] = (loaded.folder / "README.md").read_text(encoding="utf-8")
+        texts[f"{name} page"] = render_handout(make_handout(loaded))
+        texts[f"{name} starter"] = next(
+            text for path, text in starter_files(loaded).items() if path.endswith("/README.md")
+        )
+    command = re.compile(r"rosgrade (?:start|watch|check)(?: --cpp)? \w+ ([~.\w/-]+)")
+    for name, text in texts.items():
+        named = {path.removesuffix("/src") for path in command.findall(text)}
+        assert named == {"~/ros2_ws"}, (name, named)
 
 
 def test_a_kit_is_renewed_and_other_files_beside_it_stay(kit: Path, tmp_path: Path) -> None:
@@ -260,8 +277,24 @@ def test_a_set_up_of_a_kit_installs_its_wheel(kit: Path) -> None:
     shutil.rmtree(kit / ".venv")
 
 
+def names_in(wheel: Path) -> set[str]:
+    with zipfile.ZipFile(wheel) as archive:
+        return {
+            name
+            for name in archive.namelist()
+            if not name.startswith("grader/_data/assignments/") and ".dist-info/" not in name
+        }
+
+
+def test_the_wheel_of_a_kit_lacks_nothing_of_rosgrade_but_other_assignments(
+    kit: Path, tmp_path: Path
+) -> None:
+    (built,) = WheelBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
+    assert names_in(next(kit.glob("*.whl"))) == names_in(Path(built))
+
+
 @pytest.mark.ros
-def test_what_pip_installs_from_the_wheel_lists_starts_and_checks(
+def test_what_pip_installs_from_the_wheel_lists_explains_starts_and_checks(
     kit: Path, tmp_path: Path
 ) -> None:
     (wheel,) = kit.glob("*.whl")
@@ -270,16 +303,11 @@ def test_what_pip_installs_from_the_wheel_lists_starts_and_checks(
     subprocess.run([*pip, "--target", str(site), str(wheel)], check=True)
 
     def rosgrade(*arguments: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, "-m", "grader", *arguments],
-            cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": str(site)},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        return alone(site, *arguments, cwd=tmp_path)
 
     assert "lesson" in rosgrade("list").stdout
+    for idea in re.findall(r"rosgrade explain (\w+)", (kit / "README.md").read_text()):
+        assert concepts()[idea].title in rosgrade("explain", idea).stdout
     started = rosgrade("start", "simple_publisher", "ws/src")
     assert started.returncode == 0, started.stderr
     checked = rosgrade("check", "simple_publisher", "ws", "--json", "result.json")

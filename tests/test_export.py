@@ -18,7 +18,9 @@ import yaml
 from grader import export
 from grader.assignment.load import load_assignment
 from grader.errors import UsageError
+from grader.report.concepts import concepts
 from grader.starter import rendered
+from tests.alone import alone
 from tests.assignment.lessons import GOOD, HEAD
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -275,6 +277,17 @@ def test_the_solution_does_not_go_where_submissions_are_graded(tmp_path, kind):
     files = [path for path in out.rglob("*") if path.is_file() and path.suffix != ".zip"]
     assert [path for path in files if path.name == "assignment.yaml"]
     assert not [path for path in files if b"'zq'" in path.read_bytes()]
+
+
+@pytest.mark.parametrize("kind", ["classroom50", "gradescope"])
+def test_what_a_report_of_an_export_names_can_be_read_there(loaded, tmp_path, kind):
+    if kind == "gradescope":
+        zipfile.ZipFile(export.gradescope(loaded, tmp_path)).extractall(tmp_path / "out")
+    else:
+        export.classroom50(loaded, tmp_path / "out")
+    (site,) = (path.parent for path in tmp_path.rglob("grader/__main__.py"))
+    told = alone(site.parent, "explain", "executors", cwd=tmp_path)
+    assert concepts()["executors"].title in told.stdout, told.stderr
 
 
 @pytest.mark.parametrize("kind", ["github", "classroom50"])

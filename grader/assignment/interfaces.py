@@ -163,7 +163,7 @@ def _unknown(
     elif known.prefixes is not None and package not in elsewhere:
         text = (
             f"there is no package {package!r}: not in ROS, not in {FOLDER}/ beside the assignment, "
-            "and not in 'packages' or their 'depends'."
+            "not in 'underlays', and not in 'packages' or their 'depends'."
         )
         yield source.problem(place, text + did_you_mean(package, known.packages))
 

@@ -138,9 +138,10 @@ class Grading:
         return self.grade_prepared(prepared, folder)
 
     @property
-    def process_sandbox(self) -> str:
-        """The sandbox that is in force, in a few words."""
-        return self._runner.sandbox.description if self._runner.sandbox else "none"
+    def surroundings(self) -> list[str]:
+        """The sandbox that is in force, and what is sourced and not used: a line for each."""
+        sandbox = self._runner.sandbox.description if self._runner.sandbox else "none"
+        return [f"sandbox: {sandbox}", *filter(None, [self._runner.ros.notice])]
 
     def close(self) -> None:
         """End every build and cell that runs; what is being graded ends as interrupted."""

@@ -118,7 +118,8 @@ def batch(
     began_s = time.monotonic()
     with Scratch("batch") as staging, Progress(quiet).shown() as progress:
         if grading is not None and not quiet:
-            progress.note(f"sandbox: {grading.process_sandbox}")
+            for line in grading.surroundings:
+                progress.note(line)
         if again or loaded is not named:
             progress.note(f"graded with {loaded.file}, as the class is")
         is_roster = submissions.suffix.lower() == ".csv" and submissions.is_file()

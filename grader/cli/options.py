@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -101,9 +102,12 @@ def chosen_names(loaded: LoadedAssignment, chosen: list[str] | None) -> LoadedAs
 
 
 def chosen_sandbox(choice: Choice, progress: Progress) -> Sandbox | None:
-    """The sandbox that was asked for; says which one it is, or that there is none."""
+    """The sandbox that was asked for; says which it is, and what of the shell it leaves out."""
+    from grader.ros import find, is_sourced
     from grader.sandbox.trial import choose
 
     sandbox, notice = choose(choice, resources.cache_folder())
     progress.say(notice or f"sandbox: {sandbox.description if sandbox else 'none'}")
+    if is_sourced(os.environ) and (left_out := find().notice):
+        progress.say(left_out)
     return sandbox

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from grader.cli.options import AssignmentName, Chosen, chosen_names
-from grader.cli.screen.console import say
+from grader.cli.screen.console import print_warning, say
+from grader.errors import GraderFault
 
 
 def start(
@@ -26,10 +28,19 @@ def start(
 
     You write what it does. Existing files are never overwritten.
     """
+    from grader import ros
     from grader.assignment.load import load_assignment
     from grader.assignment.selection import with_values
+    from grader.prerequisites import remedy_for_cpp
     from grader.starter import write_starter
 
+    if cpp:
+        try:
+            remedy = remedy_for_cpp(ros.find())
+        except GraderFault as fault:
+            remedy = str(fault)
+        if remedy:
+            print_warning(f"before C++ can be built here: {remedy}")
     loaded = chosen_names(load_assignment(assignment), chosen)
     loaded = with_values(loaded, {**loaded.values, **loaded.given})
     for name, variable in loaded.assignment.variables.items():
@@ -38,9 +49,10 @@ def start(
             say(f"{name} is {example} in these files; choose another with --set {name}=VALUE")
     for written in write_starter(loaded, folder, cpp=cpp):
         say(f"Written: {written}")
+    workspace = folder.parent if folder.name == "src" else folder
     say("\nNext, read the task, then grade your work after every save:\n")
     say(f"  rosgrade show {assignment}")
-    say(f"  rosgrade watch {assignment} {folder}")
+    say(f"  rosgrade watch {assignment} {shlex.quote(str(workspace))}")
 
 
 def new(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -84,7 +85,13 @@ def list_command() -> None:
     from grader.submission.underlay.store import UnderlayStore
 
     store = UnderlayStore(cache_folder(), ros.find())
-    built = {one.name: " ".join(one.packages) for one, _ in store.installed()}
+    kept = [one for one, _ in store.installed()]
+    names = Counter(one.name for one in kept)
+    # Those of one name are told apart by where they are defined.
+    built = {
+        one.places[0] if names[one.name] > 1 and one.places else one.name: " ".join(one.packages)
+        for one in kept
+    }
     table = Table("UNDERLAY", "HERE", "PACKAGES", box=None, pad_edge=False)
     for name in named_sets():
         underlay = find_underlay(name)

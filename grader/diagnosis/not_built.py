@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
+from grader.bootstrap import COMPILERS
 from grader.diagnosis.build_error import BuildError
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
@@ -13,7 +14,6 @@ from grader.findings.wording import code, codes
 from grader.spec.name import package_name
 from grader.spec.nearest_name import nearest
 from grader.submission.build.build_log import modules_not_found, not_found
-from grader.submission.build.toolchain import TOOLS
 from grader.submission.intake.paths import is_within
 from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
 from grader.submission.underlay.definition import ways_to_get
@@ -293,7 +293,7 @@ def _lacking(submission: SubmissionRecord, build: BuildRecord, name: str) -> lis
         found = modules_not_found(written)
         package = submission.package(one)
         if package is None or package.build_type != "ament_python":
-            found |= not_found(written) | set(TOOLS.values())
+            found |= not_found(written) | set(COMPILERS.values())
         missing |= found
         # Another package of the submission is not there, which lacks something itself.
         ahead += found & set(build.failed_packages) - seen

@@ -418,9 +418,13 @@ class Runner:
             type_support=tuple(map(str, type_support)),
             tells_output=self.verbose,
         )
+        if self.sandbox is None or ros.source == "sourced":
+            # A sandbox shows the system's libraries, which Python finds where ROS is sourced.
+            shown = Path("/" if self.sandbox is None else "/usr")
+            modules = unlisted(submission.foreign_imports, assignment.libraries, shown)
+            order = replace(order, facts={**order.facts, "unlisted": " ".join(modules)})
         if self.sandbox is None:
-            modules = unlisted(submission.foreign_imports, assignment.libraries)
-            return replace(order, facts={**order.facts, "unlisted": " ".join(modules)})
+            return order
         limits = (scenario.limits or assignment.limits).limits()
         sandbox = self.sandbox.allowing(assignment.libraries)
         return sandboxed(order, folder, sandbox, ros, install, limits)

@@ -31,6 +31,8 @@ VERSION = 3
 _ROOTS = re.compile(
     r"ros-.*|colcon-.*|setuptools|numpy|pyyaml|lark|empy|argcomplete|psutil|packaging|osrf-pycommon"
 )
+# A name that was given up, and the name that Debian and Ubuntu have: the module is the same.
+_RENAMED = {"lark-parser": "lark"}
 _NAME = re.compile(r"[A-Za-z0-9._-]+")
 _UNFINISHED = ".unfinished-"
 _UNUSED_S = 30 * 24 * 3600.0
@@ -92,7 +94,7 @@ def not_installed(libraries: Collection[str], who: str = "the assignment allows"
     installed = set(_installed()) if libraries else set()
     found = []
     for name in libraries:
-        if _normal(name) not in installed:
+        if installed.isdisjoint((_normal(name), _RENAMED.get(_normal(name)))):
             near = did_you_mean(name, installed)
             found.append(
                 f"{who} the library {name!r}, which is not installed here.{near} "
@@ -102,18 +104,25 @@ def not_installed(libraries: Collection[str], who: str = "the assignment allows"
     return found
 
 
-def unlisted(modules: Collection[str], libraries: Collection[str]) -> tuple[str, ...]:
-    """Find modules that can be imported here, but not in the environment of a sandbox."""
+def unlisted(
+    modules: Collection[str], libraries: Collection[str], within: Path = Path("/")
+) -> tuple[str, ...]:
+    """Find modules that can be imported here, but not in the environment of a sandbox.
+
+    Args:
+        within: Only what lies in this folder.
+    """
     foreign = set(modules) - sys.stdlib_module_names - {"numpy"}
     if not foreign:
         return ()
-    allowed = _closure({_normal(name) for name in libraries})
-    owners = metadata.packages_distributions()
-    return tuple(
-        module
-        for module in sorted(foreign & owners.keys())
-        if not any(_normal(owner) in allowed for owner in owners[module])
-    )
+    installed, allowed = _installed(), _closure({_normal(name) for name in libraries})
+    found = []
+    for module, names in metadata.packages_distributions().items():
+        owners = {_normal(name) for name in names}
+        is_there = any(_is_in(installed[owner], within) for owner in owners)
+        if module in foreign and allowed.keys().isdisjoint(owners) and is_there:
+            found.append(module)
+    return tuple(sorted(found))
 
 
 def prune(folder: Path) -> None:
@@ -135,6 +144,10 @@ def _normal(name: str) -> str:
 
 def _installed() -> dict[str, metadata.Distribution]:
     return {_normal(item.metadata["Name"]): item for item in metadata.distributions()}
+
+
+def _is_in(distribution: metadata.Distribution, folder: Path) -> bool:
+    return Path(str(distribution.locate_file(""))).is_relative_to(folder)
 
 
 def _closure(libraries: Collection[str]) -> dict[str, metadata.Distribution]:

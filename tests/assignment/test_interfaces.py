@@ -70,7 +70,8 @@ MISTAKES = [
     (
         {"judged": "geometry_msg/msg/Twist"},
         ["19: checks[0].with.type: there is no package 'geometry_msg': not in ROS, not in "
-         "interfaces/ beside the assignment, and not in 'packages' or their 'depends'. "
+         "interfaces/ beside the assignment, not in 'underlays', and not in 'packages' or their "
+         "'depends'. "
          "Did you mean 'geometry_msgs'?"],
     ),
     (

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
 
+from grader import ros
 from tests.cli.conftest import Rosgrade
 
 
@@ -38,6 +40,18 @@ def test_a_starter_with_an_interface_generates_it(rosgrade: Rosgrade, tmp_path: 
     found = statuses(tmp_path)
     assert (found["generated"], found["builds"]) == ("passed", "passed")
     assert found["fields"] == "failed"
+
+
+def test_a_start_in_cpp_says_first_what_this_machine_lacks(
+    rosgrade: Rosgrade, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    started = rosgrade("start", "timed_publisher", "--cpp", "my ws/src")
+    if ros.is_sourced(os.environ):
+        pytest.skip("a sourced ROS has rclcpp")
+    warning = " ".join(started.stderr.split())
+    assert "before C++ can be built here: rosgrade underlay add rclcpp" in warning
+    assert "rosgrade watch timed_publisher 'my ws'\n" in started.stdout
 
 
 def test_a_file_that_is_there_is_never_overwritten(rosgrade: Rosgrade, tmp_path: Path) -> None:

@@ -58,6 +58,11 @@ def test_an_ordinary_run_is_not_worth_a_word() -> None:
             "`/cmdvel:=/cmd_vel`",
         ),
         (
+            {"environment": {"unlisted": "scipy", "sandbox": "bwrap (userns)"}},
+            "the code imports `scipy`, and a sourced ROS finds more",
+            "what the assignment allows",
+        ),
+        (
             {"environment": {"unlisted": "pandas cv2"}},
             "the code imports `pandas` and `cv2`",
             "what the assignment allows",

@@ -153,3 +153,16 @@ def test_a_student_inherits_no_descriptor_but_its_own(run_node: RunNode) -> None
     # The tracer's two pipes, and nothing of the prefork server's or of another cell's.
     assert len([target for target in others if target.startswith("pipe:")]) == 2
     assert not [target for target in others if target.startswith("socket:")]
+
+
+def test_a_cell_imports_nothing_of_the_folder_in_which_the_command_was_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "grader").mkdir()
+    (tmp_path / "grader" / "__init__.py").write_text("raise SystemExit('not ours')\n")
+    monkeypatch.chdir(tmp_path)
+    prefork_server = PreforkServer(ros.find())
+    cell = CellProcess(prefork_server)
+    assert process_of(cell, prefork_server)
+    cell.close()
+    prefork_server.close()

@@ -12,7 +12,7 @@ import pytest
 
 from grader import ros
 from grader.errors import GraderFault
-from grader.sandbox import bubblewrap, sandbox, trial
+from grader.sandbox import bubblewrap, python_tree, sandbox, trial
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.choice import Choice
 from grader.sandbox.python_tree import check_installed, prune, student_prefix, unlisted
@@ -144,6 +144,21 @@ def test_what_only_rosgrade_needs_is_distinguished_from_what_a_student_may_impor
     modules = ["jinja2", "scipy", "numpy", "math", "yaml", "rclpy", "nobody_has_this"]
     assert unlisted(modules, ()) == ("jinja2", "scipy")
     assert unlisted(modules, ("SciPy",)) == ("jinja2",)
+
+
+def test_the_system_s_libraries_are_told_apart_from_rosgrade_s(tmp_path: Path, monkeypatch) -> None:
+    about = tmp_path / "zq_system-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: zq-system\nVersion: 1.0\n")
+    (about / "top_level.txt").write_text("zq_system\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert unlisted(["jinja2", "zq_system"], (), tmp_path) == ("zq_system",)
+    assert unlisted(["jinja2", "zq_system"], ("zq_system",), tmp_path) == ()
+
+
+def test_a_library_under_the_name_that_ubuntu_has_is_the_library(monkeypatch) -> None:
+    monkeypatch.setattr(python_tree, "_installed", lambda: {"lark": None})
+    check_installed(["lark-parser"])
 
 
 def test_what_was_not_used_for_a_month_is_thrown_away(tmp_path: Path) -> None:

@@ -69,10 +69,12 @@ def _tricks(recording: Recording) -> Iterator[str]:
                 f"{code(process)} wrote into the channel through which rosgrade reports from "
                 "inside a process; such a report is never proof"
             )
-    # Without a sandbox there are libraries that are missing where a class is graded.
+    # Such libraries are perhaps missing where a class is graded.
     modules = recording.environment.get("unlisted", "").split()
     if modules:
+        has_none = recording.environment.get("sandbox", "none") == "none"
+        why = "this run had no sandbox" if has_none else "a sourced ROS finds more"
         yield (
-            f"the code imports {codes(modules)}, and this run had no sandbox: in a sandbox, Python "
-            "has only the standard library, ROS 2, `numpy`, and what the assignment allows"
+            f"the code imports {codes(modules)}, and {why}: elsewhere, Python has only "
+            "the standard library, ROS 2, `numpy`, and what the assignment allows"
         )

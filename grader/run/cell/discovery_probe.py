@@ -18,7 +18,8 @@ def discovery_time_s(ros: RosInstallation) -> float:
     """Seconds from the creation of a publisher to its match with a subscription."""
     with lock_domain() as domain:
         done = subprocess.run(
-            [str(ros.python), "-m", "grader.run.cell.discovery_probe"],
+            [str(ros.python), "-m", __name__],
+            cwd="/",
             env={**cell_environment(ros), "ROS_DOMAIN_ID": str(domain.domain_id)},
             capture_output=True,
             text=True,

@@ -95,6 +95,8 @@ class PreforkServer:
         with theirs:
             self._popen = subprocess.Popen(
                 command,
+                # Python imports from where it is started, before all else.
+                cwd="/",
                 env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,

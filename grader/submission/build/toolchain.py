@@ -8,11 +8,10 @@ import sysconfig
 from collections.abc import Collection
 from pathlib import Path
 
+from grader.bootstrap import COMPILERS
 from grader.errors import GraderFault
 from grader.submission.build.build_log import PYTHON_HEADERS
 
-TOOLS = {"cmake": "cmake", "c++": "g++", "make": "make"}
-"""What every package needs that is not pure Python -> what it is called by Debian and Ubuntu."""
 _HINT = "this machine cannot build packages that are not pure Python, because tools are missing:"
 # What CMake calls the libraries that rosdep installs for the packages of ROS 2 Jazzy.
 _LIBRARIES = """
@@ -26,7 +25,7 @@ _FOLDERS = ("lib/cmake", "lib/*/cmake", "include")
 
 def missing_tools(path: str) -> list[str]:
     """Packages of Debian and Ubuntu with what compiles and is not there."""
-    return [package for tool, package in TOOLS.items() if not shutil.which(tool, path=path)]
+    return [package for tool, package in COMPILERS.items() if not shutil.which(tool, path=path)]
 
 
 def check_toolchain(path: str) -> None:

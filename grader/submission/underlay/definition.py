@@ -69,6 +69,12 @@ class Underlay:
     folder: Path | None = None
 
     @property
+    def place(self) -> str:
+        """Where it is defined: courses may have files or folders of one name."""
+        is_set = self.repos is not None and self.given == self.name
+        return self.name if is_set else str(Path(self.given).resolve())
+
+    @property
     def listed(self) -> frozenset[str]:
         """Its packages, where all of them are listed."""
         parts = [one.packages for one in self.repos.repositories.values()] if self.repos else [()]

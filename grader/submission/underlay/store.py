@@ -59,11 +59,13 @@ class Installed:
 
     Attributes:
         ros: The prefix of the ROS installation that it was built on.
+        places: Where it is defined; older notes have none.
     """
 
     name: str
     ros: str
     packages: tuple[str, ...]
+    places: tuple[str, ...] = ()
 
 
 _INSTALLED = TypeAdapter(Installed)
@@ -144,17 +146,18 @@ class UnderlayStore:
             answer_s: Longest time until a git server answers.
         """
         done = [name for one in _required(underlay) for name in self.add(one, answer_s)]
-        for lack in not_installed(underlay.python, f"the underlay {underlay.name} needs"):
-            raise GraderFault(lack)
         if not self._wanted(underlay):
             self._say(f"{underlay.name}: this ROS has its packages, nothing is built")
             return done
+        for lack in not_installed(underlay.python, f"the underlay {underlay.name} needs"):
+            raise GraderFault(lack)
         with Scratch("underlay") as staging:
             folder, ros = underlay.folder, self._ros
             if folder is None:
                 key = self._key(underlay)
                 if self._kept.find(key) and (self._entry(key) / _NOTE).is_file():
                     self._say(f"{underlay.name}: is there already")
+                    self._note(underlay, key)
                     return done
                 self._fetch(underlay, staging, answer_s)
                 below = [path for one in _required(underlay) for path in self._prefixes(one)]
@@ -162,11 +165,7 @@ class UnderlayStore:
             else:
                 key = self._folder_key(folder, ros)
             self._build(underlay.name, folder, ros, self._kept, key)
-        mine, packages = str(self._ros.prefixes[0]), _indexed(self._entry(key) / INSTALL)
-        # What was built of it before is thrown away.
-        self.remove(underlay.name, besides=key)
-        note = Installed(underlay.name, mine, tuple(sorted(packages)))
-        (self._entry(key) / _NOTE).write_bytes(_INSTALLED.dump_json(note, indent=1))
+        self._note(underlay, key)
         return [*done, underlay.name]
 
     def folder_prefix(
@@ -206,18 +205,47 @@ class UnderlayStore:
         mine = str(self._ros.prefixes[0])
         return [(one, at / INSTALL) for one, at in self._entries() if one.ros == mine]
 
-    def remove(self, name: str, besides: str = "") -> bool:
-        """Remove a kept underlay by its name, also for installations of ROS that are gone."""
-        ros = str(self._ros.prefixes[0])
-        gone = [
-            at
-            for one, at in self._entries()
-            if (one.name == name and at.name != besides)
-            and (one.ros == ros or not Path(one.ros).exists())
-        ]
-        for folder in gone:
+    def remove(self, name: str) -> bool:
+        """Remove a kept underlay by its name or place, also for installations that are gone.
+
+        Raises:
+            UsageError: Underlays of several places have the name.
+        """
+        found = [(one, at) for one, at in self._own() if name in (one.name, *one.places)]
+        places = sorted({one.places for one, _ in found if name not in one.places})
+        if len(places) > 1:
+            each = " or ".join(place for some in places for place in some[:1])
+            raise UsageError(f"several underlays are called {name!r}: remove {each}")
+        for _, folder in found:
             shutil.rmtree(folder)
-        return bool(gone)
+        return bool(found)
+
+    def _own(self) -> list[tuple[Installed, Path]]:
+        """Kept underlays of this ROS installation, and of installations that are gone."""
+        mine = str(self._ros.prefixes[0])
+        return [
+            (one, at)
+            for one, at in self._entries()
+            if one.ros == mine or not Path(one.ros).exists()
+        ]
+
+    def _note(self, underlay: Underlay, key: str) -> None:
+        """Keep a build; what was built of the same place before is thrown away."""
+        places, before = {underlay.place}, None
+        for one, at in self._own():
+            of = one.places or (one.name,)
+            if at.name == key:
+                places.update(one.places)
+                before = one
+            elif of == (underlay.place,):
+                shutil.rmtree(at)
+            elif underlay.place in of:
+                _write_note(at, replace(one, places=tuple(set(of) - {underlay.place})))
+        packages = sorted(_indexed(self._entry(key) / INSTALL))
+        mine = str(self._ros.prefixes[0])
+        note = Installed(underlay.name, mine, tuple(packages), tuple(sorted(places)))
+        if note != before:
+            _write_note(self._entry(key), note)
 
     def _entry(self, key: str) -> Path:
         return self._folder / BUILDS / key
@@ -376,6 +404,10 @@ def on_top(ros: RosInstallation, prefixes: Sequence[Path]) -> RosInstallation:
             )
         ros = replace(ros, underlays=(prefix, *ros.underlays))
     return ros
+
+
+def _write_note(folder: Path, note: Installed) -> None:
+    (folder / _NOTE).write_bytes(_INSTALLED.dump_json(note, indent=1))
 
 
 def packages_in(folder: Path) -> dict[str, Path]:

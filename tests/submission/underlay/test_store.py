@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from tests.submission.underlay.conftest import Repository
 
 
 def repos(tmp_path: Path, *entries: str) -> Underlay:
+    tmp_path.mkdir(exist_ok=True)
     (tmp_path / "course.repos").write_text("repositories:\n" + "".join(entries))
     return find_underlay("course.repos", tmp_path)
 
@@ -29,6 +31,18 @@ def test_where_ros_has_the_packages_nothing_is_built_and_nothing_is_missing(
     assert store.missing([underlay]) == store.add(underlay, 1.0) == []
     assert store.lay([underlay]) == named_ros
     assert told == ["tf2: this ROS has its packages, nothing is built"]
+
+
+def test_where_nothing_is_built_no_library_is_looked_for(
+    named_ros: RosInstallation, repository: Repository, tmp_path: Path
+) -> None:
+    entry = repository.entry("1.0.0", packages="[arm]")
+    underlay = repos(tmp_path, entry, "python: [no-such-library]\n")
+    store = UnderlayStore(tmp_path / "cache", named_ros)
+    with pytest.raises(GraderFault, match=r"course needs the library 'no-such-library'"):
+        store.add(underlay, 1.0)
+    (named_ros.prefixes[0] / "share/ament_index/resource_index/packages/arm").touch()
+    assert UnderlayStore(tmp_path / "cache", replace(named_ros)).add(underlay, 1.0) == []
 
 
 def test_what_is_missing_is_a_fault_of_ours_with_the_command_that_gets_it(
@@ -88,6 +102,32 @@ def test_a_file_is_built_once_laid_under_submissions_and_removed(
         store.lay([underlay, folder])
     assert store.remove("course")
     assert store.missing([underlay])
+
+
+@pytest.mark.ros
+@pytest.mark.slow
+def test_lists_of_one_name_in_two_courses_keep_their_builds(
+    real_ros: RosInstallation, repository: Repository, tmp_path: Path
+) -> None:
+    repository.commit("arm", "leg", tag="1.0.0")
+    arm, leg = (repository.entry("1.0.0", packages=f"[{name}]") for name in ("arm", "leg"))
+    first, second = repos(tmp_path / "first", arm), repos(tmp_path / "second", leg)
+    store = UnderlayStore(tmp_path / "cache", real_ros)
+    for underlay in (first, second):
+        assert store.add(underlay, 20.0) == ["course"]
+    assert store.missing([first, second]) == []
+    # The first course now takes what the second takes, and what it took before goes.
+    changed = repos(tmp_path / "first", leg)
+    assert store.add(changed, 20.0) == []
+    assert store.missing([first, second, changed]) != []
+    assert store.missing([second, changed]) == []
+    # So it stays until none of them wants it.
+    assert store.add(repos(tmp_path / "second", arm), 20.0) == ["course"]
+    assert store.missing([changed]) == []
+    with pytest.raises(UsageError, match=f"remove {changed.place} or {second.place}"):
+        store.remove("course")
+    assert store.remove(changed.place)
+    assert [one.packages for one, _ in store.installed()] == [("arm",)]
 
 
 @pytest.mark.ros
