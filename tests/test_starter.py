@@ -67,7 +67,7 @@ def test_each_assignment_has_a_starter_that_ros_can_read(name: str) -> None:
             ast.parse(text, path)
     first = loaded.assignment.packages[0].name
     assert f"rosgrade show {name}" in files[f"{first}/README.md"]
-    assert f"rosgrade watch {name} ." in files[f"{first}/README.md"]
+    assert f"rosgrade watch {name} ~/ros2_ws" in files[f"{first}/README.md"]
 
 
 def test_a_single_program_lies_in_the_module_that_the_handouts_name() -> None:
