@@ -9,7 +9,7 @@ from string import Template
 
 from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
 from grader.spec.source import Model, read_source
-from grader.submission.record import CPP, PYTHON, PackageRecord, SourceError
+from grader.submission.record import CPP, EMPTY, PYTHON, PackageRecord, SourceError
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,53 @@ class Table(Model):
 
 
 TABLE = read_source(Path(__file__).with_suffix(".yaml")).read(Table)
+
+
+EMPTY_HINT = "Hand in the file with its content: was it saved, and copied whole?"
+_OWN_HEADER = re.compile(r"^'?(\w+)/\S+?'?(?:: No such file or directory| file not found)")
+_COMMAND = re.compile(r'Unknown CMake command "(\w+)"')
+_PACKAGE_OF_COMMAND = {
+    "rosidl_": "rosidl_default_generators",
+    "ament_auto_": "ament_cmake_auto",
+    "ament_python_": "ament_cmake_python",
+    "ament_add_gtest": "ament_cmake_gtest",
+    "rclcpp_components_": "rclcpp_components",
+}
+"""Beginning of a command -> the package that has it."""
+
+
+@explanation(BuildError)
+def empty_file(symptom: BuildError) -> str | None:
+    """A file that the build reads is empty."""
+    return EMPTY_HINT if symptom.error.message == EMPTY else None
+
+
+@explanation(BuildError, only=CPP)
+def own_header(symptom: BuildError) -> str | None:
+    """CMakeLists.txt does not say where the package's own headers lie."""
+    found = _OWN_HEADER.match(symptom.error.message)
+    if found is None or found[1] != symptom.package.name:
+        return None
+    return (
+        f"Headers of your own package lie in include/{found[1]}/. Write "
+        "`target_include_directories(<program> PRIVATE include)` in CMakeLists.txt, below "
+        "add_executable()."
+    )
+
+
+@explanation(BuildError, only=CPP)
+def command_of_another_package(symptom: BuildError) -> str | None:
+    """CMakeLists.txt uses a command of a package without find_package() of it above."""
+    found = _COMMAND.search(symptom.error.message)
+    if found is None:
+        return None
+    for beginning, package in _PACKAGE_OF_COMMAND.items():
+        if found[1].startswith(beginning):
+            return (
+                f"Write `find_package({package} REQUIRED)` above this line, and `{package}` in "
+                f"package.xml. If both are there, `{found[1]}` is misspelt."
+            )
+    return None
 
 
 for _row in TABLE.errors:

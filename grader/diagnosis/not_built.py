@@ -15,7 +15,13 @@ from grader.spec.name import package_name
 from grader.spec.nearest_name import nearest
 from grader.submission.build.build_log import modules_not_found, not_found
 from grader.submission.intake.paths import is_within
-from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
+from grader.submission.record import (
+    EMPTY,
+    BuildRecord,
+    PackageRecord,
+    SourceError,
+    SubmissionRecord,
+)
 from grader.submission.underlay.definition import ways_to_get
 
 _LOG_LINES = 15
@@ -273,10 +279,14 @@ def _needs(submission: SubmissionRecord, name: str) -> list[str]:
 def _failed(submission: SubmissionRecord, build: BuildRecord, name: str) -> Cause:
     ended = _OURS.search(build.log)
     error = build.culprit or SourceError("", None, ended[1] if ended else "")
+    package = existing_package(submission, name)
+    # setuptools names no line of what setup() refuses, and CMake one beyond an empty file.
+    of_file = (one for one in package.syntax_errors if one.file == error.file)
+    error = next((one for one in of_file if not error.line or one.message == EMPTY), error)
     return Cause(
         f"`colcon build` failed: {error if error.file else error.message}".removesuffix(": "),
-        cause_of(BuildError(error, existing_package(submission, name))),
-        _evidence(build, name),
+        cause_of(BuildError(error, package)),
+        replace(_evidence(build, name), places=(error,) if error.file else ()),
     )
 
 

@@ -233,10 +233,16 @@ def find_problem(located: Located, packages: Sequence[Package]) -> str | None:
 def _no_package(located: Located) -> str:
     paths = [file.path for file in located.files]
     archives = [path for path in paths if path.lower().endswith(_ARCHIVES)]
+    submodules = [path for path in paths if path.rpartition("/")[2] == ".gitmodules"]
     problem = (
         "no package.xml was found, so there is no ROS package (hidden folders, build, install, log "
         "and folders with a COLCON_IGNORE do not count)"
     )
+    if submodules:
+        return (
+            f"{problem}; {shown(submodules[0])} names a git submodule, whose files were not handed "
+            "in: run `git submodule update --init`, or clone with --recurse-submodules"
+        )
     if archives:
         return f"{problem}; unpack {shown(archives[0])}, and hand in its content"
     if all(path.endswith(".py") for path in paths):

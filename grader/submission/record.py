@@ -15,6 +15,8 @@ from grader.errors import UsageError
 
 PYTHON, CPP = "Python", "C++"
 """What programs of students are written in."""
+EMPTY = "the file is empty"
+"""What is wrong with a file that must have something in it."""
 _OF_CPP = (".cpp", ".cc", ".cxx", ".c")
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from grader.diagnosis.build_error import TABLE, BuildError, Row
 from grader.diagnosis.explanation import cause_of, explanations
-from grader.submission.record import SourceError
+from grader.submission.record import EMPTY, SourceError
 from tests.checks.builder import package
 
 
@@ -47,3 +47,39 @@ def test_what_is_missing_is_named_with_the_line_to_write(message: str, words: st
 def test_an_exception_of_a_setup_py_is_no_error_of_a_compiler() -> None:
     symptom = error("ValueError: cannot convert float NaN", file="src/bot_publisher/setup.py")
     assert cause_of(symptom).startswith("Run `colcon build --packages-select bot_publisher`")
+
+
+@pytest.mark.parametrize(
+    "message",
+    ["bot_publisher/bot.hpp: No such file or directory", "'bot_publisher/bot.hpp' file not found"],
+)
+def test_a_package_need_not_depend_on_itself_for_its_own_header(message: str) -> None:
+    hint = cause_of(error(message))
+    assert "lie in include/bot_publisher/" in hint and "find_package" not in hint
+    assert explained_by(message) == "own_header"
+
+
+@pytest.mark.parametrize(
+    ("command", "package_of_it"),
+    [
+        ("rosidl_generate_interfaces", "rosidl_default_generators"),
+        ("ament_auto_find_build_dependencies", "ament_cmake_auto"),
+        ("rclcpp_components_register_node", "rclcpp_components"),
+    ],
+)
+def test_the_package_that_has_a_command_is_named(command: str, package_of_it: str) -> None:
+    message = f'Unknown CMake command "{command}".'
+    assert f"`find_package({package_of_it} REQUIRED)`" in cause_of(error(message))
+    assert explained_by(message) == "command_of_another_package"
+
+
+def test_an_empty_file_is_to_be_handed_in_whole() -> None:
+    assert "copied whole" in cause_of(error(EMPTY))
+    assert explained_by(EMPTY) == "empty_file"
+
+
+def explained_by(message: str) -> str:
+    """The name of the explanation that answers."""
+    return next(
+        one.name for one in explanations()[BuildError] if one.apply(error(message)) is not None
+    )

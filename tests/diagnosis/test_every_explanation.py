@@ -18,7 +18,13 @@ from grader.diagnosis.explanation import Symptom, explanations
 from grader.diagnosis.process.exceptions import Row
 from grader.recording.event import Breach
 from grader.recording.model import Ending, Kind, Recording
-from grader.submission.record import BuildRecord, SourceError
+from grader.submission.record import (
+    BuildRecord,
+    SourceClass,
+    SourceError,
+    SourceFile,
+    SourceFunction,
+)
 from tests.checks import builder
 from tests.checks.builder import (
     NODE,
@@ -167,6 +173,29 @@ CASES: list[Group] = [
                 "ModuleNotFoundError: No module named 'tf_transformations'"
             ),
             "Raised.not_imported": crashing("NameError: name 'Twist' is not defined"),
+            "ProcessExit.hides_what_node_has": crashing(
+                "TypeError: 'method' object does not support the context manager protocol",
+                submission=submission(
+                    package(
+                        sources=(
+                            SourceFile(
+                                "src/bot_publisher/bot_publisher/node.py",
+                                "bot_publisher.node",
+                                classes=(SourceClass("Bot", 8, ("Node",)),),
+                                functions=(SourceFunction("Bot.handle", 20),),
+                            ),
+                        )
+                    )
+                ),
+            ),
+            "Raised.imported_from_elsewhere": crashing(
+                "ImportError: cannot import name 'Twist' from 'std_msgs.msg' (/opt/ros/jazzy)"
+            ),
+            "Raised.own_module": crashing("ModuleNotFoundError: No module named 'node'"),
+            "Raised.file_not_installed": crashing(
+                "FileNotFoundError: [Errno 2] No such file or directory: 'config/speed.txt'",
+                submission=submission(files=("src/bot_publisher/config/speed.txt",)),
+            ),
             "NoNode.not_built": nodeless(**NOT_STARTED, submission=submission(build=FAILED_BUILD)),
             "NoNode.no_executable": nodeless(**NOT_STARTED),
             "NoNode.never_appeared": nodeless(

@@ -6,12 +6,12 @@ import re
 
 import pytest
 
-from grader.diagnosis.explanation import Explanation, explanations
+from grader.diagnosis.explanation import Explanation, cause_of, explanations
 from grader.diagnosis.no_messages import FewMessages, NoMessages
 from grader.diagnosis.process.exceptions import CPP_ROWS, TABLE, Raised, Row
 from grader.diagnosis.process.failure import Failure, Frame
 from grader.docs import explanations_markdown
-from tests.checks.builder import recording
+from tests.checks.builder import recording, submission
 
 ALL = [(symptom, entry) for symptom, entries in explanations().items() for entry in entries]
 
@@ -102,3 +102,45 @@ def test_every_row_of_the_tables_answers_for_its_example(entry: Row) -> None:
     raised = Raised(Failure(type_, message, (frame,), compiled=compiled), recording())
     answer = next(one for one in explanations()[Raised] if one.apply(raised) is not None)
     assert answer.sentence == entry.mistake
+
+
+@pytest.mark.parametrize(
+    ("type_", "message", "files", "hint"),
+    [
+        (
+            "ImportError",
+            "cannot import name 'Twist' from 'std_msgs.msg' (/opt/ros/jazzy/std_msgs/msg)",
+            (),
+            "Write `from geometry_msgs.msg import Twist`, and `<depend>geometry_msgs</depend>` in "
+            "package.xml.",
+        ),
+        (
+            "ModuleNotFoundError",
+            "No module named 'node'",
+            (),
+            "`node.py` lies in your package: write `from bot_publisher import node` or "
+            "`from bot_publisher.node import ...`.",
+        ),
+        (
+            "ModuleNotFoundError",
+            "No module named 'helper'",
+            ("src/bot_publisher/helper.py",),
+            "The build did not install `src/bot_publisher/helper.py`. Move it into the folder "
+            "`bot_publisher`, beside `__init__.py`, and write `from bot_publisher import helper`.",
+        ),
+        (
+            "FileNotFoundError",
+            "[Errno 2] No such file or directory: '/home/ada/src/bot_publisher/config/speed.txt'",
+            ("src/bot_publisher/config/speed.txt",),
+            "Programs run in another folder, and on other machines than yours. Install the file, "
+            "`('share/bot_publisher/config', ['config/speed.txt'])` in data_files of setup.py, and "
+            "open `os.path.join(get_package_share_directory('bot_publisher'), "
+            "'config/speed.txt')` (of ament_index_python.packages).",
+        ),
+    ],
+)
+def test_the_hint_names_what_to_write_in_this_submission(
+    type_: str, message: str, files: tuple[str, ...], hint: str
+) -> None:
+    run = recording(submission=submission(files=files))
+    assert cause_of(Raised(Failure(type_, message, ()), run)) == hint

@@ -111,7 +111,7 @@ def test_a_tag_that_is_not_closed_is_blamed_where_it_begins() -> None:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"", "no element found"),
+        (b"", "the file is empty"),
         (b"\0" * 10, "not well-formed"),
         (b"<a/>", 'single "package" root tag'),
         (b"<package/>", 'exactly one "name" tag'),

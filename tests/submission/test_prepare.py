@@ -38,6 +38,7 @@ def test_an_empty_folder_and_an_empty_zip(
     [
         ({"bot.txt": ""}, "no package.xml was found"),
         ({"node.py": NODE}, "hand in the whole package, not only its Python files"),
+        ({".gitmodules": "", "README.md": ""}, "run `git submodule update --init`"),
         ({"bot.rar": ""}, "unpack bot.rar, and hand in its content"),
         ({"install/bot/package.xml": "", "x": ""}, "build, install, log"),
         ({"COLCON_IGNORE": "", "bot/package.xml": ""}, "folders with a COLCON_IGNORE"),

@@ -50,7 +50,6 @@ def test_a_malformed_entry_point_is_none() -> None:
 @pytest.mark.parametrize(
     "source",
     [
-        "",
         "def",
         "x = 1",
         "setup(",
@@ -64,7 +63,7 @@ def test_a_malformed_entry_point_is_none() -> None:
         + "\nsetup(entry_points={'console_scripts': [a59]})",
         "setup(entry_points={'console_scripts': [f'{\"a\":>999999999}']})",
     ],
-    ids=["empty", "def", "none", "open", "stars", "deep", "lists", "texts", "format"],
+    ids=["def", "none", "open", "stars", "deep", "lists", "texts", "format"],
 )
 def test_a_setup_py_that_says_nothing_or_too_much_declares_nothing(source: str) -> None:
     assert setup(source) == Setup()
@@ -85,3 +84,25 @@ def test_no_text_of_an_entry_point_raises(text: str) -> None:
     parse_entry_point(text, "setup.py")
     parse_installed(f"[console_scripts]\n{text}", "setup.py")
     setup(f"setup(entry_points={{'console_scripts': [{text!r}, {text!r} + 'a']}})")
+
+
+def test_a_missing_comma_between_entry_points_is_found_with_its_line() -> None:
+    source = """setup(
+    entry_points={
+        'console_scripts': [
+            'talk = bot.talk:main'
+            'listen = bot.listen:main',
+            'bot.other:main',
+        ],
+    },
+)
+"""
+    comma, form = read_setup(source.encode(), "bot").refused
+    assert (comma.file, comma.line) == ("bot/setup.py", 4)
+    assert comma.message.startswith("a comma is missing between two entries of console_scripts")
+    assert form.line == 6
+
+
+def test_an_empty_setup_py_is_called_empty() -> None:
+    (error,) = read_setup(b"\n", "bot").refused
+    assert str(error) == "bot/setup.py: the file is empty"

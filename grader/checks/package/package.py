@@ -20,6 +20,7 @@ from grader.diagnosis.not_built import (
     why_not_built,
     why_too_new,
 )
+from grader.diagnosis.process.exceptions import import_of
 from grader.findings.finding import Evidence, Finding, Table
 from grader.findings.wording import code, codes
 from grader.spec.name import BuildTypes, PackageName
@@ -217,13 +218,27 @@ _Fault = tuple[str, str, SourceError, tuple[str, str]]
 """What is seen, what to do (nothing: add a tag), where, and what is there and what to write."""
 
 
+def _is_elsewhere(package: PackageRecord, item: Import) -> bool:
+    """Whether all names that an import takes are known to be another package's."""
+    source = next((one for one in package.sources if one.path == item.file), None)
+    taken = [
+        dotted.rpartition(".")[2]
+        for _, dotted in (source.names if source else ())
+        if dotted.startswith(f"{item.module}.")
+    ]
+    right = [import_of(name) or f"from {item.module}." for name in taken]
+    return bool(right) and not any(line.startswith(f"from {item.module}.") for line in right)
+
+
 def _missing(package: PackageRecord) -> Iterator[_Fault]:
     """The first import of each ROS package that is needed and not declared."""
     kinds = {item.name: item.kind for item in package.dependencies if item.kind not in _COUNTING}
     declared = {item.name for item in package.dependencies if item.kind in _COUNTING}
     needed: dict[str, Import] = {}
     for item in package.ros_imports:
-        if not item.optional and item.module not in declared and item.module != package.name:
+        if item.optional or item.module in declared or item.module == package.name:
+            continue
+        if not _is_elsewhere(package, item):
             needed.setdefault(item.module, item)
     for item in needed.values():
         why = _IDLE.get(kinds.get(item.module, "").partition("/")[0], "")

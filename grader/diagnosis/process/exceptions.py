@@ -15,9 +15,12 @@ from grader.diagnosis.process.raised import student_place
 from grader.findings.wording import code
 from grader.recording.model import Recording
 from grader.spec.source import Model, read_source
-from grader.submission.record import CPP, PYTHON
+from grader.submission.record import CPP, PYTHON, PackageRecord, SubmissionRecord
 
 _UNDEFINED = re.compile(r"name '(\w+)' is not defined")
+_NO_MODULE = re.compile(r"No module named '(\w+)'$")
+_NO_NAME = re.compile(r"cannot import name '(\w+)' from '([\w.]+)'")
+_NO_FILE = re.compile(r"No such file or directory: '(.+)'$")
 
 
 @dataclass(frozen=True)
@@ -87,18 +90,81 @@ _GDB = (
 )
 
 
+def import_of(name: str) -> str | None:
+    """The line that imports a well-known name of ROS 2 or Python, if it is one."""
+    known = (line for line, names in TABLE.imports.items() if name in names.split())
+    beginning = next(known, None)
+    return f"{beginning} {name}" if beginning else None
+
+
 @explanation(Raised, only=PYTHON)
 def not_imported(symptom: Raised) -> str | None:
     """A well-known name of ROS 2 or Python, such as Twist or math, is not imported."""
     found = _UNDEFINED.match(symptom.failure.message)
-    for beginning, names in TABLE.imports.items():
-        if found and found[1] in names.split():
-            return (
-                "If you mean the one of ROS or Python, import it at the top of the file: "
-                f"{code(f'{beginning} {found[1]}')}. Otherwise it is misspelt, or used before it "
-                "is defined."
-            )
-    return None
+    line = import_of(found[1]) if found else None
+    return line and (
+        f"If you mean the one of ROS or Python, import it at the top of the file: {code(line)}. "
+        "Otherwise it is misspelt, or used before it is defined."
+    )
+
+
+@explanation(Raised, only=PYTHON)
+def imported_from_elsewhere(symptom: Raised) -> str | None:
+    """A well-known name is imported from the wrong package, such as Twist from std_msgs."""
+    found = _NO_NAME.match(symptom.failure.message)
+    line = import_of(found[1]) if found else None
+    package = line.split()[1].partition(".")[0] if line else ""
+    return line and f"Write {code(line)}, and {code(f'<depend>{package}</depend>')} in package.xml."
+
+
+@explanation(Raised, only=PYTHON)
+def own_module(symptom: Raised) -> str | None:
+    """A module of the package is imported without the name of the package."""
+    found = _NO_MODULE.search(symptom.failure.message)
+    if found is None:
+        return None
+    name, submission = found[1], symptom.recording.submission
+    installed = [path for package in submission.packages for path, _ in package.files]
+    place = next((path for path in installed if path.endswith(f"/{name}.py")), None)
+    if place is not None:
+        package = place.rpartition("/")[0].replace("/", ".")
+        written = code(f"from {package} import {name}")
+        return (
+            f"{code(f'{name}.py')} lies in your package: write {written} or "
+            f"{code(f'from {package}.{name} import ...')}."
+        )
+    file, owner = _own_file(submission, f"{name}.py")
+    if owner is None:
+        return None
+    return (
+        f"The build did not install {code(file)}. Move it into the folder {code(owner.name)}, "
+        f"beside `__init__.py`, and write {code(f'from {owner.name} import {name}')}."
+    )
+
+
+@explanation(Raised, only=PYTHON)
+def file_not_installed(symptom: Raised) -> str | None:
+    """A file of the package is opened by a relative path, or by one that only its author has."""
+    found = _NO_FILE.search(symptom.failure.message)
+    name = found[1].rpartition("/")[2] if found else ""
+    file, owner = _own_file(symptom.recording.submission, name)
+    if not name or owner is None:
+        return None
+    path = file.removeprefix(owner.file(""))
+    share = f"share/{owner.name}/{path.rpartition('/')[0]}".rstrip("/")
+    return (
+        "Programs run in another folder, and on other machines than yours. Install the file, "
+        f"{code(f'({share!r}, [{path!r}])')} in data_files of setup.py, and open "
+        f"{code(f'os.path.join(get_package_share_directory({owner.name!r}), {path!r})')} "
+        "(of ament_index_python.packages)."
+    )
+
+
+def _own_file(submission: SubmissionRecord, name: str) -> tuple[str, PackageRecord | None]:
+    """A file of the submission by its name, with the package that it lies in; None without one."""
+    file = next((path for path in submission.files if f"/{path}".endswith(f"/{name}")), "")
+    owners = [one for one in submission.packages if file.startswith(one.file(""))]
+    return file, max(owners, key=lambda one: len(one.path), default=None)
 
 
 for _row in (*CPP_ROWS, *TABLE.exceptions):

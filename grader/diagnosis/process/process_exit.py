@@ -20,7 +20,7 @@ from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.spec.source import Model, read_source
 from grader.submission.read.rosdistro import PYTHON_MODULES
-from grader.submission.record import SourceError
+from grader.submission.record import PYTHON, SourceError
 from grader.submission.underlay.definition import ways_to_get
 
 _LOG_LINES = 15
@@ -30,6 +30,13 @@ _CRASHES = ("SIGSEGV", "SIGABRT", "SIGFPE", "SIGILL", "SIGBUS")
 _NO_LAUNCH_FILE = re.compile(
     r"file '(?P<file>[^']+)' was not found in the share directory of package '(?P<package>[^']+)'"
 )
+
+# What rclpy.node.Node has and calls, and what no class of a student's may replace.
+_OF_NODE = re.compile(
+    "clients|context|default_callback_group|executor|get_clock|get_logger|get_name|get_namespace|"
+    "get_parameter|guards|handle|publishers|services|subscriptions|timers|waitables"
+)
+_SET = re.compile(r"self\.(\w+) *(?::.*)?=")
 
 
 class Table(Model):
@@ -238,6 +245,35 @@ def service_without_response(symptom: ProcessExit) -> Cause | None:
         f"{symptom.seen} with {failure}: a service's callback did not return a response",
         "End the service's callback with `return response`: return the object that it was given.",
         symptom.evidence,
+    )
+
+
+@explanation(ProcessExit, only=PYTHON)
+def hides_what_node_has(symptom: ProcessExit) -> Cause | None:
+    """A method or an attribute has a name that Node uses itself, such as handle or executor."""
+    failure = symptom.failure
+    if not failure or not failure.frames or "/rclpy/" not in failure.frames[-1].file:
+        return None
+    places = [
+        (function.name.rpartition(".")[2], SourceError(source.path, function.line, str(failure)))
+        for package in symptom.recording.submission.packages
+        for source in package.sources
+        for owner in source.classes
+        for function in source.functions
+        if any(base.endswith("Node") for base in owner.bases)
+        and function.name.rpartition(".")[0] == owner.name
+    ]
+    if symptom.place:
+        assigned = (_SET.match(frame.source) for frame in failure.frames)
+        places += [(match[1], symptom.place) for match in assigned if match]
+    name, place = next((pair for pair in places if _OF_NODE.fullmatch(pair[0])), ("", None))
+    if place is None:
+        return None
+    return Cause(
+        f"{symptom.seen} with {failure}: your class replaces {code(name)} of Node"
+        f"{in_brackets(place)}",
+        f"Node needs its own {code(name)}. Choose another name for yours.",
+        replace(symptom.evidence, places=(place,)),
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from grader.errors import GraderFault
-from grader.submission.record import Dependency, SourceError
+from grader.submission.record import EMPTY, Dependency, SourceError
 
 MANIFEST = "package.xml"
 _KINDS = """
@@ -140,6 +140,9 @@ def _parse(data: bytes) -> _Document:
     parser.EndElementHandler = lambda _: path.pop()
     parser.CharacterDataHandler = text
     parser.StartDoctypeDeclHandler = refuse_doctype
+    if not data.strip():
+        document.error = (None, EMPTY)
+        return document
     if len(data) > _MAX_BYTES:
         document.error = (None, f"larger than {_MAX_BYTES // 1024} KiB; not read")
         return document

@@ -29,7 +29,7 @@ from grader.submission.read.outline import outline
 from grader.submission.read.rosdistro import PACKAGES, PYTHON_MODULES
 from grader.submission.read.setup_py import EntryPoint, Setup, read_setup
 from grader.submission.read.targets import Modules, missing_target
-from grader.submission.record import Definition, Import, Lint, PackageRecord, SourceError
+from grader.submission.record import EMPTY, Definition, Import, Lint, PackageRecord, SourceError
 
 SETUP_PY, CMAKE = "setup.py", "CMakeLists.txt"
 _INTERFACES = (".msg", ".srv", ".action")
@@ -95,6 +95,14 @@ class Package:
     def _in(self, path: str) -> str:
         return path if self.folder == "." else path[len(self.folder) + 1 :]
 
+    @property
+    def _refused(self) -> tuple[SourceError, ...]:
+        """What is wrong with the file that builds it, as far as that is seen without a build."""
+        if self.build_type == "ament_python":
+            return self.setup.refused
+        empty = self.cmake is not None and not self.cmake.strip()
+        return (SourceError(shown(join(self.folder, CMAKE)), None, EMPTY),) if empty else ()
+
     def _module_path(self, path: str) -> str:
         """Path of a file below the folder of the Python modules, which may be ``src``."""
         return self._in(path).removeprefix("src/")
@@ -157,7 +165,10 @@ class Package:
                 *included.packages,
             ),
             own_headers=included.own,
-            syntax_errors=tuple(error for error in errors if error.file not in newer),
+            syntax_errors=(
+                *(error for error in errors if error.file not in newer),
+                *self._refused,
+            ),
             newer_syntax=self.newer_syntax,
             description=shown(self.manifest.description),
             maintainers=tuple(map(shown, self.manifest.maintainers)),

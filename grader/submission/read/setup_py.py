@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Union
 
-from grader.submission.intake.paths import join
+from grader.submission.intake.paths import join, shown
 from grader.submission.read import source
-from grader.submission.record import SourceError
+from grader.submission.record import EMPTY, SourceError
 
 _GROUP = "console_scripts"
 _MAX_TEXT = 10_000
@@ -44,10 +44,17 @@ class EntryPoint:
 
 @dataclass(frozen=True)
 class Setup:
-    """A package's setup.py: the distribution's name, if it is known, and its entry points."""
+    """A package's setup.py.
+
+    Attributes:
+        name: Of the distribution, if it is known.
+        refused: What no build can use: an empty file, entries of console_scripts that ``setup()``
+            refuses.
+    """
 
     name: str | None = None
     entry_points: tuple[EntryPoint, ...] = ()
+    refused: tuple[SourceError, ...] = ()
 
 
 class _Text(str):
@@ -64,6 +71,8 @@ def read_setup(
 ) -> Setup:
     """Read a setup.py; None stands for one that is not there."""
     file = join(folder, "setup.py")
+    if setup_py is not None and not setup_py.strip():
+        return Setup(refused=(SourceError(file, None, EMPTY),))
     tree = source.parse(setup_py or b"", file, allowance)
     keywords: Mapping[str, _Value] = {}
     if not isinstance(tree, SourceError):
@@ -73,13 +82,26 @@ def read_setup(
             keywords = {}
     groups = keywords.get("entry_points")
     scripts = groups.get(_GROUP) if isinstance(groups, dict) else None
-    texts = scripts if isinstance(scripts, list) else []
-    entries = (parse_entry_point(one, file, one.line) for one in texts if isinstance(one, _Text))
+    texts = [one for one in scripts if isinstance(one, _Text)] if isinstance(scripts, list) else []
+    entries = [parse_entry_point(one, file, one.line) for one in texts]
     name = keywords.get("name")
     return Setup(
         str(name) if isinstance(name, _Text) else None,
         tuple(entry for entry in entries if entry is not None),
+        tuple(
+            SourceError(file, text.line, _refusal(text))
+            for text, entry in zip(texts, entries, strict=True)
+            if entry is None
+        ),
     )
+
+
+def _refusal(text: str) -> str:
+    shown_text = shown(text[:_MAX_ENTRY])
+    # Python joins two texts with nothing between them.
+    if text.count("=") > 1:
+        return f"a comma is missing between two entries of console_scripts: {shown_text}"
+    return f"an entry of console_scripts is not 'executable = module:function': {shown_text}"
 
 
 def parse_entry_point(text: str, file: str, line: int | None = None) -> EntryPoint | None:
