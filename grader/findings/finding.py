@@ -45,6 +45,8 @@ class Plot:
         y: Ordinates, as many as abscissas.
         band: Lowest and highest allowed ordinate, or None.
         histogram: Whether to show a histogram of the ordinates as well.
+        judged: Abscissas between which the band holds, or None for all: outside of them nothing
+            was judged, and nothing is marked as wrong.
     """
 
     title: str
@@ -54,6 +56,7 @@ class Plot:
     y: tuple[float, ...]
     band: tuple[float, float] | None = None
     histogram: bool = False
+    judged: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
 """What a handout says is checked, or the handout does not say it.
 
-``promises/<assignment>.yaml`` is the table of one lesson. Every sentence of the handout (each
-sentence of a paragraph or a list item, and each row of a table; no headings, no code blocks)
-stands in it once, with the checks that hold it or the reason why none is needed::
+``promises/<assignment>.yaml`` is the table of one lesson, or of one example of the documentation.
+Every sentence of the handout (each sentence of a paragraph or a list item, and each row of a
+table; no headings, no code blocks) stands in it once, with the checks that hold it or the reason
+why none is needed::
 
     lesson: [sent, once]  # the checks of what the lesson is about: at least 60 % of the points
     promises:
@@ -31,9 +32,14 @@ from annotated_types import Len
 from markdown_it import MarkdownIt
 from pydantic import BaseModel, ConfigDict
 
+from grader import resources
 from grader.assignment.load import LoadedAssignment, list_assignments, load_assignment
 
 TABLES = Path(__file__).with_name("promises")
+EXAMPLES = {
+    file.parent.name: file.parent
+    for file in (resources.root() / "docs" / "examples").glob("*/assignment.yaml")
+}
 SHARE_OF_THE_LESSON = 0.6
 _BETWEEN_SENTENCES = re.compile(r'(?:(?<=[.!?])|(?<=[.!?][)"`*])|(?<=[.!?]\*\*))\s+(?![a-z])')
 
@@ -61,7 +67,7 @@ class Table(BaseModel):
 
 @pytest.fixture(params=sorted(path.stem for path in TABLES.glob("*.yaml")))
 def loaded(request: pytest.FixtureRequest) -> LoadedAssignment:
-    return load_assignment(request.param)
+    return load_assignment(EXAMPLES.get(request.param, request.param))
 
 
 @pytest.fixture
@@ -146,4 +152,5 @@ def test_the_lesson_carries_most_of_the_points(loaded: LoadedAssignment, table: 
 
 
 def test_every_assignment_has_a_table() -> None:
-    assert {path.stem for path in TABLES.glob("*.yaml")} == set(list_assignments())
+    known = {*list_assignments(), *EXAMPLES}
+    assert {path.stem for path in TABLES.glob("*.yaml")} == known

@@ -49,6 +49,7 @@ def preempting(new=None, **old):
         # Declarations of the process are not needed.
         ("result", acting(goal(), declarations=(declared("started"),)), RESULT, "succeeded"),
         ("feedback", acting(goal()), {**FEEDBACK, "last": SEQUENCE}, "3 messages at 10 Hz"),
+        ("feedback", acting(goal()), {**FEEDBACK, "first": {"len(sequence)": 3}}, "3 messages"),
         ("rejects", acting(goal(-1, accepted=False), goal()), WRONG_ONES, "it was rejected"),
         ("cancels", acting(canceled()), FIB, "canceled 100 ms after it was asked"),
         ("preempts", preempting(), FIB, "the old goal ended"),

@@ -112,6 +112,7 @@ PARAMETERS = {
     "motion.two_phases": {"goal": GOAL, "position": "5 cm"},
     "motion.short_way": {"goal": GOAL},
     "motion.proportional": {"goal": GOAL, "phase": "align"},
+    "motion.proportional_speed": {"goal": GOAL},
     "motion.within_limits": {},
     "motion.slows_down": {"share": "100 %"},
     "topic.untouched": {},

@@ -54,6 +54,7 @@ class Student:
         self.near, self.straight = style.pop("near", 0.05), style.pop("straight", 0.05)
         self.turn_first = style.pop("turn_first", None)
         self.constant = style.pop("constant", None)
+        self.speed = style.pop("speed", lambda distance, _: self.linear * distance)
         self.wrap = style.pop("wrap", wrap)
         self.wrap_theta = style.pop("wrap_theta", self.wrap)
         self.law = style.pop("law", lambda error: self.angular * error)
@@ -71,7 +72,7 @@ class Student:
         distance = math.hypot(dx, dy)
         if not self.arrived and distance > self.near:
             error = self.wrap(math.atan2(dy, dx) - self.yaw(pose.yaw_rad))
-            speed = self.constant or clamp(self.linear * distance, self.top)
+            speed = self.constant or clamp(self.speed(distance, error), self.top)
             if self.turn_first is not None and abs(error) > self.turn_first:
                 speed = 0.0
             return speed, clamp(self.law(error), self.spin)
@@ -181,6 +182,82 @@ def test_bang_bang_is_never_proportional(goal, heading, size):
     for phase in ("position", "align"):
         finding = judge("motion.proportional", run, goal=pose, phase=phase)
         assert finding.status is Status.FAILED or "hardly an error" in finding.observed, finding
+
+
+FAR = (-0.2, 0.2, 2.24)
+PUSHED = {"pushes": [{"after": "20 cm", "ahead": "-12 cm", "turn": "-30 deg"}]}
+
+
+def with_speed(speed, **style):
+    """A run as in the assignment: 0.6 m away, with a push."""
+    student = Student(FAR, speed=speed, near=0.03, straight=0.02, **style)
+    robot = {"pose": [-0.1, -0.45, "150 deg"], **PUSHED}
+    return drive(on_odometry(student), seconds=40.0, options={"robot": robot})
+
+
+def of_speed(run):
+    return judge("motion.proportional_speed", run, goal=yaml(FAR))
+
+
+@pytest.mark.parametrize(
+    ("speed", "style"),
+    [
+        (lambda d, e: 0.6 * d, {}),
+        (lambda d, e: 0.2 * d, {"angular": 0.5}),
+        (lambda d, e: 1.2 * d, {"angular": 4.0}),
+        (lambda d, e: 1.0 * d, {"top": 0.05}),
+        (lambda d, e: 0.5 * d, {"top": 0.1}),
+        (lambda d, e: max(0.04, 0.6 * d), {}),
+        (lambda d, e: round(0.3 * d, 2), {}),
+        (lambda d, e: 0.6 * d * max(0.0, math.cos(e)), {}),
+        (lambda d, e: 0.6 * d * (1.0 - abs(e) / math.pi), {}),
+        (lambda d, e: 0.0 if abs(e) > 0.05 else 0.6 * d, {}),
+        (lambda d, e: 0.6 * d / (1.0 + abs(e)), {}),
+        (lambda d, e: 0.22 * math.tanh(4.0 * d), {}),
+    ],
+)
+def test_a_speed_in_proportion_passes_with_any_gain_and_limit(speed, style):
+    finding = of_speed(with_speed(speed, **style))
+    assert finding.status is Status.PASSED, finding
+
+
+@pytest.mark.parametrize(
+    "speed",
+    [
+        lambda d, e: 0.25 * math.sqrt(d),
+        lambda d, e: 0.5 * math.sqrt(d),
+        lambda d, e: 0.03 + 0.4 * d * d,
+        lambda d, e: 0.08 + 0.2 * d,
+        lambda d, e: 0.2 if d > 0.3 else 0.05,
+    ],
+)
+def test_a_speed_that_is_no_gain_times_the_distance_fails(speed):
+    finding = of_speed(with_speed(speed))
+    assert finding.status is Status.FAILED, finding
+    assert "times the distance" in finding.observed
+
+
+@pytest.mark.parametrize("gain", [1.0, 1.5, 2.5])
+@pytest.mark.parametrize("phase", ["position", "align"])
+def test_the_sine_of_a_large_error_is_not_the_error(gain, phase):
+    goal = (-0.6, 0.15, 1.05)
+    kinds = {"sine": lambda error: gain * math.sin(error), "angle": lambda error: gain * error}
+    found = {
+        name: judge(
+            "motion.proportional", run_to(goal, law=law, near=0.03), goal=yaml(goal), phase=phase
+        ).status
+        for name, law in kinds.items()
+    }
+    assert found == {"sine": Status.FAILED, "angle": Status.PASSED}
+
+
+def test_a_robot_that_drives_on_may_be_at_the_goal_where_a_window_ends():
+    run = drive(on_timer(0.1, lambda pose: (0.2, 0.0)), seconds=2.5, rest_s=None)
+    at = [round(run.truth[-1].x_m, 2), 0.0, "0 deg"]
+    assert "not at rest" in failing("motion.reaches", run, goal=at, position="5 cm")
+    finding = judge("motion.reaches", run, goal=at, position="5 cm", at_rest=False)
+    assert finding.status is Status.PASSED
+    assert not finding.expected.startswith("at rest")
 
 
 @pytest.mark.parametrize("huge", [1e160, 1e300])

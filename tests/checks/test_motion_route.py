@@ -44,7 +44,62 @@ def test_a_place_that_it_only_drives_through_is_told_where_a_pause_is_asked_for(
 def test_each_visited_place_gives_its_share():
     finding = judge("motion.visits", route(0.4), places=[*PLACES, [2, 2]])
     assert (finding.status, finding.credit) == (Status.FAILED, pytest.approx(1 / 3))
-    assert "1 of 3 places; it came within 0.38 m of (0.80, 0.00) m" in finding.observed
+    assert "1 of 3 places; it stopped 0.38 m from (0.80, 0.00) m" in finding.observed
+
+
+def legs(*turns_and_ways):
+    """Turns on the spot by an angle, then drives some way, again and again; then rests."""
+    left = [float(number) for number in turns_and_ways]
+    at = [None]
+
+    def law(pose):
+        while left:
+            at[0] = at[0] or pose
+            is_turn = len(left) % 2 == 0
+            done = math.hypot(pose.x_m - at[0].x_m, pose.y_m - at[0].y_m)
+            if is_turn:
+                done = math.copysign(wrapped(pose.yaw_rad - at[0].yaw_rad), left[0])
+                done = math.copysign(done, wrapped(pose.yaw_rad - at[0].yaw_rad) * left[0])
+            rest = abs(left[0]) - done
+            if rest > 0.02:
+                return (0.0, math.copysign(0.8, left[0])) if is_turn else (0.2, 0.0)
+            left.pop(0)
+            at[0] = None
+        return 0.0, 0.0
+
+    return drive(on_timer(0.02, law), seconds=20.0, rest_s=1.0)
+
+
+def wrapped(angle):
+    return math.remainder(angle, math.tau)
+
+
+RIGHT_ANGLE = math.radians(90.0)
+SQUARE = [[0.5, 0], [0.5, 0.5]]
+
+
+@pytest.mark.parametrize(
+    ("way", "said", "when"),
+    [
+        ((0.1, 0.5, -RIGHT_ANGLE, 0.5), "it turned to the wrong side", 1),
+        ((0.1, 0.5, math.radians(140.0), 0.5), "it turned too far", 1),
+        ((0.1, 0.5, math.radians(40.0), 0.5), "it turned too little", 1),
+        ((0.1, 0.5, RIGHT_ANGLE, 0.2), "it stopped 0.2", 1),
+        ((RIGHT_ANGLE, 0.5), "it turned too far", 0),
+        ((RIGHT_ANGLE / 2.0, 0.7), "without (0.50, 0.00) m before", 0),
+    ],
+)
+def test_a_place_is_missed_for_a_cause_of_its_own(way, said, when):
+    finding = judge("motion.visits", legs(*way), places=SQUARE)
+    assert said in finding.observed
+    assert f"{when} of 2 places" in finding.observed
+    assert finding.hint
+
+
+def test_the_cause_is_shown_at_the_turn_and_not_at_the_end():
+    finding = judge("motion.visits", legs(0.1, 0.5, -RIGHT_ANGLE, 0.5), places=SQUARE)
+    at_corner, wrong = finding.evidence.moments
+    assert 0.0 < wrong.time_s - at_corner.time_s < 3.5
 
 
 def test_the_order_counts_unless_the_author_says_otherwise():

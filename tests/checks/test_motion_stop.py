@@ -87,6 +87,25 @@ def test_a_good_controller_passes_every_check(wall, noise, empty, layout):
     passes("motion.keeps_driving", run, distance=f"{wall - 0.3} m")
 
 
+def test_the_picture_of_a_stop_judges_where_the_check_does():
+    finding = passes("motion.stops", drive(by_front(), world=WALL, seconds=12), **STOPS)
+    plot = finding.evidence.plots[0]
+    begin_s, end_s = plot.judged
+    low, high = plot.band
+    shown = [y for x, y in zip(plot.x, plot.y, strict=True) if begin_s <= x <= end_s]
+    assert shown and all(low <= y <= high for y in shown)
+    assert any(not low <= y <= high for y in plot.y)
+
+
+def test_a_stop_is_shown_as_scans_commands_and_true_distances():
+    run = drive(by_front(stop=0.15), world=WALL, seconds=12)
+    (table,) = judge("motion.stops", run, **{**STOPS, "late": "1 cm"}).evidence.tables
+    _, beam, command, true = table.rows[-1]
+    assert command == "0 m/s" and table.rows[0][2] == "0.1 m/s"
+    assert abs(float(beam.split()[0]) - float(true.split()[0])) < 0.01
+    assert float(true.split()[0]) <= 0.15
+
+
 def test_an_obstacle_that_appears_later_counts_from_then_on():
     world = "{moving: [{circle: {radius: 0.1}, path: [{at: 0 s, pose: [0.7, 0]}], appears: 2 s}]}"
     run = drive(by_front(), world=world, seconds=20)

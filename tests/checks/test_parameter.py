@@ -10,13 +10,16 @@ from tests.checks.builder import (
     NODE,
     at,
     declared,
+    died,
     every,
     failing,
     judge,
     message,
+    output,
     recording,
     taken,
     text,
+    traceback,
 )
 from tests.checks.requests import asked, parameter_set, parameters_read, service
 
@@ -234,6 +237,10 @@ class TestLifecycle:
         run = states("inactive", "inactive")
         found = failing("lifecycle.state", run, **self.WANTED)
         assert "it is inactive" in found and "TransitionCallbackReturn" not in found
+
+    def test_a_crash_in_a_transition_is_the_program_s_and_no_fault_of_the_scenario(self):
+        run = states("unconfigured", processes=(died(1),), log=output(traceback("KeyError: 'x'")))
+        assert "KeyError" in failing("lifecycle.state", run, **self.WANTED)
 
     def test_a_node_without_states_is_reported(self):
         run = states("unconfigured", services=())

@@ -288,6 +288,26 @@ class TestBroadcast:
 
 
 class TestFollows:
+    def test_a_stamp_that_is_promised_to_be_that_of_the_message_is_compared(self) -> None:
+        promised = {**OF_ODOMETRY, "same_stamp": True}
+
+        def with_stamps(stamp: Callable[[float], float]) -> Recording:
+            subject = broadcasting(stamp=stamp)
+            odometry = tuple(
+                replace(one, value={**one.value, "header": transform(stamp_s=time_s)["header"]})
+                for one, time_s in zip(subject.on("/odom"), TIMES, strict=True)
+            )
+            return replace(subject, messages={**subject.messages, "/odom": odometry})
+
+        same, later = with_stamps(lambda one: one), with_stamps(lambda one: one + 0.004)
+        for subject, parameters in ((same, promised), (later, OF_ODOMETRY)):
+            assert judge("tf.follows", subject, **parameters).status is Status.PASSED
+        found = failing("tf.follows", later, **promised)
+        assert "59 of 59 transforms have another stamp than the message" in found
+        assert "the first one is 4 ms later" in found and "copy header.stamp" in found
+        first = failing("tf.follows", with_stamps(lambda _: TIMES[0]), **promised)
+        assert "have another stamp" in first
+
     def test_one_that_follows_its_source_passes(self) -> None:
         finding = judge("tf.follows", broadcasting(), **OF_ODOMETRY)
         assert finding.status is Status.PASSED, finding

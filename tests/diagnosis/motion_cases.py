@@ -21,6 +21,7 @@ from tests.checks.builder import (
     taken,
 )
 from tests.checks.test_motion_goal import BEHIND, GOAL, REACHES, Student, run_to, wrap, yaml
+from tests.checks.test_motion_route import RIGHT_ANGLE, SQUARE, legs
 from tests.checks.test_motion_stop import WALL, by_front
 
 IN_A_CALLBACK = (
@@ -132,6 +133,24 @@ CASES: list[Group] = [
             "GoalMissed.too_slow": lambda: run_to(GOAL, linear=0.02, seconds=20),
             "HeadingMissed.stopped_turning": lambda: run_to(GOAL, straight=0.3),
         },
+    ),
+    (
+        "motion.visits",
+        {"places": SQUARE},
+        {
+            "PlaceMissed.off_course": lambda: replace(
+                legs(0.1, 0.3, RIGHT_ANGLE, 0.5), processes=(died(1, 3.0),)
+            ),
+            "PlaceMissed.skipped": lambda: legs(RIGHT_ANGLE / 2.0, 0.7),
+            "PlaceMissed.turned_to_the_wrong_side": lambda: legs(0.1, 0.5, -RIGHT_ANGLE, 0.5),
+            "PlaceMissed.turned_too_far": lambda: legs(0.1, 0.5, 2.4, 0.5),
+            "PlaceMissed.stopped_short": lambda: legs(0.1, 0.5, RIGHT_ANGLE, 0.2),
+        },
+    ),
+    (
+        "motion.visits",
+        {"places": [[1.0, 0.0]]},
+        {"PlaceMissed.not_near": lambda: legs(0.2, 1.2)},
     ),
     (
         "motion.path_length",

@@ -117,6 +117,13 @@ class TestFirstToFix:
         )
         assert first_to_fix(result) == "node"
 
+    def test_of_equals_in_one_run_it_is_what_went_wrong_first(self):
+        late, early = (
+            Finding.failed("", f"at {time_s} s", evidence=Evidence(moments=(Moment("", time_s),)))
+            for time_s in (22.0, 9.0)
+        )
+        assert first_to_fix(judge(Told("turns", late), Told("visits", early))) == "visits"
+
     def test_what_ended_in_another_run_may_have_another_reason(self):
         ended = Evidence(moments=(Moment("bot ended", 0.4),))
         crashed = Finding.failed("", "ended", evidence=ended)

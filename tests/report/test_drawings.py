@@ -1,6 +1,7 @@
 """Plots and time lines: what is drawn, and that nothing breaks them."""
 
 import math
+from dataclasses import replace
 from itertools import combinations
 
 import pytest
@@ -49,6 +50,12 @@ class TestPlot:
         figure = draw_plot(make_plot([0.05, 0.3], band), "p")
         assert said in figure.caption
         assert marks(figure.wide, "out") == 1
+
+    def test_nothing_is_marked_where_nothing_was_judged(self):
+        plot = replace(make_plot([900.0, 612.0, 310.0, 284.9]), judged=(2.0, 3.0))
+        figure = draw_plot(plot, "p")
+        assert (marks(figure.wide, "dots"), marks(figure.wide, "out")) == (3, 1)
+        assert "(shaded, where it is judged), 1 of 2 outside (marked ×)" in figure.caption
 
     def test_values_that_cannot_be_drawn_are_reported(self):
         figure = draw_plot(make_plot([300.0, math.nan, math.inf], None), "p")

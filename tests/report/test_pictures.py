@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from grader.assignment.model import CheckSpec
 from grader.findings.finding import Case, Cases, Comparison, Plot, Span
 from grader.recording.event import Breach, Intervention
 from grader.recording.model import Qos
@@ -23,6 +25,7 @@ from grader.report.drawing.timeline import draw_timeline
 from grader.report.html.comparison import SIGNS, align
 from grader.report.html.qos_table import pairs
 from grader.report.html.report import Gallery, build_lines
+from grader.report.model.target import targets
 from grader.submission.record import BuildRecord, SourceError
 from sim.motion import Pose
 from tests.checks.builder import drive, endpoint, node, on_odometry, reader, recording
@@ -71,6 +74,24 @@ class TestPath:
         told = figure.caption.partition("It ended ")[2].partition(" from the goal")[0]
         assert told == (f"{away_m:.3g} m" if away_m >= 0.1 else f"{away_m * 100:.3g} cm")
         assert "the dashed circle is the tolerance, 8 cm." in figure.caption
+
+    def test_the_places_of_a_route_have_their_numbers(self, stopped):
+        checks = [
+            {
+                "id": "round",
+                "uses": "motion.visits",
+                "points": 1,
+                "with": {"places": [[0.3, 0.0], [0.2, 0.1, 0.4, 0.3]], "position": "5 cm"},
+            }
+        ]
+        lesson = SimpleNamespace(checks=[CheckSpec.model_validate(one) for one in checks])
+        point, zone = targets(lesson, "run", {})
+        assert (point.radius_m, zone.corners[0], zone.corners[2]) == (0.05, (0.2, 0.1), (0.4, 0.3))
+        figure = draw_path(stopped, (point, zone), "p")
+        assert len(of_class(figure.wide, "target")) == 2
+        assert {"1", "2"} <= set(words(figure.wide).split())
+        assert "goal" not in words(figure.wide).split()
+        assert figure.caption.count("The numbers are the places to visit") == 1
 
     def test_a_robot_that_stands(self):
         run = drive(lambda _: None, world="{segments: [[1, -1, 1, 1]]}", seconds=1.0)

@@ -76,8 +76,8 @@ def examine(samples: Sequence[Sample], limit_rad_s: float, least_r2: float) -> L
         limit_rad_s: What the robot can do; larger commands say little of the law.
     """
     turning = [item for item in samples if _is_turning(item)]
-    largest_rad = max((abs(item.error_rad) for item in samples), default=math.inf)
-    fastest_rad_s = max((abs(item.command_rad_s) for item in samples), default=0.0)
+    largest_rad = max((abs(item.error) for item in samples), default=math.inf)
+    fastest_rad_s = max((abs(item.command) for item in samples), default=0.0)
     if (largest_rad <= _SMALL_RAD and len(turning) < _FEW_TURNS) or (
         largest_rad <= _TINY_RAD and fastest_rad_s <= _SLOW_RAD_S
     ):
@@ -92,17 +92,17 @@ def examine(samples: Sequence[Sample], limit_rad_s: float, least_r2: float) -> L
     # Near half a turn the error may be read with either sign: take that of the command.
     judged = [
         _full_turn_off(item)
-        if abs(item.error_rad) > math.pi - _EITHER_WAY_RAD and _is_away(item)
+        if abs(item.error) > math.pi - _EITHER_WAY_RAD and _is_away(item)
         else item
         for item in samples
-        if _is_turning(item) or abs(item.error_rad) > _PAUSE_RAD
+        if _is_turning(item) or abs(item.error) > _PAUSE_RAD
     ]
     wrong = sum(_is_wrong(item) for item in judged) / len(judged)
     best = fit(judged, limit_rad_s)
     if wrong <= FEW_STRAYS:
         return LawVerdict(Law.PROPORTIONAL, best.gain, best.r2, best.used)
     turned = fit([_full_turn_off(one) if _is_wrong(one) else one for one in judged], limit_rad_s)
-    mirrored = fit([Sample(-one.error_rad, one.command_rad_s) for one in judged], limit_rad_s)
+    mirrored = fit([Sample(-one.error, one.command) for one in judged], limit_rad_s)
     if turned.gain > 0.0 and turned.r2 >= max(0.8 * least_r2, mirrored.r2):
         return LawVerdict(Law.NOT_NORMALISED, turned.gain, turned.r2, turned.used, share=wrong)
     if mirrored.gain > 0.0 and wrong > 0.5:
@@ -112,22 +112,22 @@ def examine(samples: Sequence[Sample], limit_rad_s: float, least_r2: float) -> L
 
 
 def _is_turning(item: Sample) -> bool:
-    return abs(item.command_rad_s) > ZERO_RAD_S
+    return abs(item.command) > ZERO_RAD_S
 
 
 def _is_away(item: Sample) -> bool:
-    return item.error_rad * item.command_rad_s < 0.0
+    return item.error * item.command < 0.0
 
 
 def _is_wrong(item: Sample) -> bool:
     """Whether it clearly turns away from the error."""
-    size = abs(item.error_rad)
+    size = abs(item.error)
     return _PAUSE_RAD < size < math.pi - _EITHER_WAY_RAD and _is_turning(item) and _is_away(item)
 
 
 def _full_turn_off(item: Sample) -> Sample:
     """The same command for the error with the other sign, a full turn off."""
-    return Sample(item.error_rad - math.copysign(math.tau, item.error_rad), item.command_rad_s)
+    return Sample(item.error - math.copysign(math.tau, item.error), item.command)
 
 
 def _steps(turning: Sequence[Sample]) -> tuple[float, ...]:
@@ -135,7 +135,7 @@ def _steps(turning: Sequence[Sample]) -> tuple[float, ...]:
 
     A clamp gives the largest size again and again; below it a line has every size once.
     """
-    sizes = [float(f"{abs(item.command_rad_s):.3g}") for item in turning]
+    sizes = [float(f"{abs(item.command):.3g}") for item in turning]
     distinct = tuple(sorted(set(sizes)))
     below = sum(size < distinct[-1] for size in sizes)
     few = len(distinct) <= _MOST_SIZES and len(sizes) > 2 * len(distinct)
@@ -182,11 +182,11 @@ def _of_the_way(
     law = examine(way, limit_rad_s, _GOOD_R2)
     if law.law is not Law.PROPORTIONAL or law.r2 < _GOOD_R2:
         return 0
-    fastest = max(abs(sample.command_rad_s) for sample in way)
+    fastest = max(abs(sample.command) for sample in way)
     for index, item in enumerate(still):
         sample = _to_goal(run, item)
-        wanted = max(-fastest, min(fastest, law.gain * sample.error_rad))
-        if abs(sample.command_rad_s - wanted) > _SAME * abs(wanted):
+        wanted = max(-fastest, min(fastest, law.gain * sample.error))
+        if abs(sample.command - wanted) > _SAME * abs(wanted):
             return index
     return 0
 

@@ -1,4 +1,4 @@
-"""The check that the turn is commanded in proportion to the heading error."""
+"""The checks that turn and speed are commanded in proportion to their errors."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check
 from grader.findings.finding import Evidence, Finding, Moment, Plot
-from grader.measure.motion.steering import MOST_BEHIND, Sample, answers
-from grader.measure.motion.approach import Approach
+from grader.measure.motion.steering import MOST_BEHIND, Sample, answers, fit, LEAST_FIT
+from grader.measure.motion.approach import NO_SPEED_M_S, Approach
 from grader.diagnosis.motion.no_motion import approach
 from grader.measure.motion.command import command_topic
-from grader.measure.motion.quantities import metres
+from grader.measure.motion.quantities import metres, speed
 from grader.checks.motion.robot_check import GoalParameters
+from grader.measure.motion.track import evidence_at
 from grader.findings.wording import counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.misread_yaw import misread_yaw
@@ -29,6 +30,10 @@ from grader.spec.quantity import Frequency, PositiveLength, Ratio
 from .control_law import LEAST_SAMPLES, Law, LawVerdict, at_the_goal, examine, on_the_way
 
 _MOST_POINTS = 400
+# A robot that looks at the goal need not be slower because it turns.
+_FACING_RAD = 0.1
+# Of distances that are more alike a root looks like a line.
+_LEAST_SPREAD = 1.5
 _WHAT = {"position": "the direction of the goal", "align": "the goal's heading"}
 _FORMULA = {"position": "atan2(dy, dx) - yaw", "align": "goal_theta - yaw"}
 
@@ -107,6 +112,68 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
             expected, f"the commands do not follow the error: {misread}", misread.hint, evidence
         )
     return Finding.failed(expected, observed, hint, evidence)
+
+
+class ProportionalSpeed(GoalParameters):
+    """Parameters of motion.proportional_speed."""
+
+    r2: Ratio = Field(0.9, description="Least coefficient of determination R² of the line.")
+
+    def _asked(self) -> str:
+        return f"linear.x in proportion to the distance from the goal (R² at least {self.r2:.2g})"
+
+
+@check("motion.proportional_speed", Subject.RECORDING, ProportionalSpeed)
+def proportional_speed(recording: Recording, parameters: ProportionalSpeed) -> Finding | Cause:
+    """linear.x is proportional to the distance.
+
+    Judged by the published commands with which the robot drives while it looks at the goal, since
+    the last one of the largest speed: before that a limit, or a gentle start, may hold it back. A
+    line through the origin is fitted to them and the distances at the newest odometry before each.
+    A limit, a least speed, and less speed while it turns do not count.
+    """
+    run = parameters.approach(recording)
+    limit_m_s = math.inf if recording.scene is None else recording.scene.max_linear_m_s
+    tried = [_speeds(run, behind) for behind in range(MOST_BEHIND + 1)]
+    if min(map(len, tried)) < LEAST_FIT:
+        return Finding.passed(parameters.asked_for, "too few speeds to tell")
+    lines = [fit(samples, limit_m_s) for samples in tried]
+    best = max(range(len(lines)), key=lambda index: lines[index].r2)
+    line, samples = lines[best], tried[best]
+    far, near = max(samples), min(samples)
+    plot = Plot(
+        "Speed over distance",
+        "distance from the goal (m)",
+        "linear.x (m/s)",
+        tuple(item.error for item in samples),
+        tuple(item.command for item in samples),
+    )
+    if far.error < _LEAST_SPREAD * near.error:
+        return Finding.passed(parameters.asked_for, "the distances hardly differ")
+    if line.r2 >= parameters.r2:
+        seen = f"gain {line.gain:.3g} 1/s, R² {line.r2:.3f}, {counted(line.used, 'command')}"
+        return Finding.passed(parameters.asked_for, seen, Evidence(plots=(plot,)))
+    return why_off_course(recording) or Cause(
+        f"linear.x is {speed(far.command)} at {metres(far.error)}, but {speed(near.command)} at "
+        f"{metres(near.error)}: {far.command / far.error:.2g} and "
+        f"{near.command / near.error:.2g} times the distance",
+        "linear.x = gain * distance, with the same gain all the way, and without a root or a "
+        "square: at half the distance half the speed.",
+        evidence_at(recording, "the way begins", run.truth[0].time_ns, plot),
+    )
+
+
+def _speeds(run: Approach, behind: int) -> list[Sample]:
+    """Speeds with the distances that they answer, since the last one of the largest speed."""
+    found = [
+        Sample(run.distance_m(item.pose), item.command.twist.linear_m_s)
+        for item in answers(run.recording, behind)
+        if item.command.twist.linear_m_s > NO_SPEED_M_S
+        and abs(run.bearing_error_rad(item.pose)) <= _FACING_RAD
+    ]
+    most = max((item.command for item in found), default=0.0)
+    last = max((index for index, item in enumerate(found) if item.command >= most), default=0)
+    return found[last:]
 
 
 def _range_words(parameters: Proportional) -> str:
@@ -190,6 +257,6 @@ def _plot(samples: Sequence[Sample], phase: str) -> Plot:
         "Command over error",
         f"heading error to {_WHAT[phase]} (rad)",
         "angular.z (rad/s)",
-        tuple(item.error_rad for item in shown),
-        tuple(item.command_rad_s for item in shown),
+        tuple(item.error for item in shown),
+        tuple(item.command for item in shown),
     )

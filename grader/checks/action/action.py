@@ -154,6 +154,9 @@ class FeedbackOf(OfGoals):
         None, description="Expected rate of the feedback; by default any."
     )
     tolerance: Ratio = Field(0.1, description="How far the mean rate may be from `rate`.")
+    first: dict[str, Any] = Field(
+        default_factory=dict, description="Expected fields of the first feedback of a goal."
+    )
     last: dict[str, Any] = Field(
         default_factory=dict, description="Expected fields of the last feedback of a goal."
     )
@@ -161,6 +164,7 @@ class FeedbackOf(OfGoals):
     def named_fields(self) -> Iterator[NamedFields]:
         """The fields of the goal and of the feedback."""
         yield from super().named_fields()
+        yield NamedFields(("first",), self.action, self.first, part=2)
         yield NamedFields(("last",), self.action, self.last, part=2)
 
     @model_validator(mode="after")
@@ -173,8 +177,8 @@ class FeedbackOf(OfGoals):
         parts = [f"at least {counted(self.at_least, 'message')} of feedback"]
         if self.rate is not None:
             parts.append(f" at {self.rate:g} Hz (within {percent(self.tolerance)})")
-        if self.last:
-            parts.append(f", the last with {words(self.last)}")
+        parts += [f", the first with {words(self.first)}"] if self.first else []
+        parts += [f", the last with {words(self.last)}"] if self.last else []
         return f"{''.join(parts)}, for {self.words}"
 
 
@@ -183,7 +187,7 @@ def feedback(recording: Recording, parameters: FeedbackOf) -> Finding:
     """The action gives feedback while it works.
 
     Judged by the feedback that the probe received for each accepted goal that was not canceled or
-    preempted: number, mean rate, and fields of the last feedback.
+    preempted: number, mean rate, and fields of the first and the last feedback.
     """
     goals = answered_goals(recording, parameters, is_undisturbed)
     for goal in goals:
@@ -232,10 +236,14 @@ def _why_other_rate(recording: Recording, goal: Goal, parameters: FeedbackOf) ->
 
 
 def _why_other_feedback(recording: Recording, goal: Goal, parameters: FeedbackOf) -> Cause | None:
-    seen, shown = f"the last feedback of {the_goal(goal)} has", evidence(recording, goal)
+    shown = evidence(recording, goal)
     hint = "Set the fields of the feedback before each publish_feedback(feedback)."
-    value, wanted = goal.feedback[-1].value, parameters.last
-    return why_other_fields(seen, "last feedback", value, wanted, EXACT, shown, hint)
+    for which, index, wanted in (("first", 0, parameters.first), ("last", -1, parameters.last)):
+        seen, value = f"the {which} feedback of {the_goal(goal)} has", goal.feedback[index].value
+        cause = why_other_fields(seen, f"{which} feedback", value, wanted, EXACT, shown, hint)
+        if cause is not None:
+            return cause
+    return None
 
 
 class Result(OfGoals):

@@ -14,6 +14,7 @@ from grader.checks.service.service import judged_calls, why_slow
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_endpoint import SERVICE, offered
 from grader.diagnosis.no_node import why_not_node
+from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import nodes_seen
 from grader.findings.wording import code, counted, listing
@@ -58,6 +59,7 @@ def state(recording: Recording, parameters: State) -> Finding | Cause:
     stop_if(why_slow(recording, calls, _ANSWER_S))
     seen = [_state(call) for call in calls]
     if len(seen) < len(parameters.states):
+        stop_if(why_ended(recording))
         text = f"the scenario asks for the state only {counted(len(seen), 'time')}"
         return Cause(text, ours=True)
     changes = [call for call in recording.calls if call.service == f"{node}/change_state"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import groupby
 from statistics import median
 
@@ -88,6 +89,8 @@ def drives(recording: Recording, parameters: Drives) -> Finding | Cause:
             "Drive on as long as nothing is near ahead. One command holds until the next.",
             _since_departure(recording),
         )
+    judged = [recording.since_launch_s(step.time_ns) for step in (steps[0], steps[-1])]
+    plot = replace(plot, judged=(judged[0], judged[1]))
     middle = median(step.linear_m_s for step in steps)
     good = sum(low <= step.linear_m_s <= high for step in steps) / len(steps)
     seen = f"median {speed(middle)}; the speed is right for {percent(round(good, 3))} of the time"

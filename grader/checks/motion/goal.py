@@ -37,29 +37,33 @@ class Reaches(GoalParameters):
     heading: Angle | None = Field(
         None, description="Largest heading error; by default the heading does not count."
     )
+    at_rest: bool = Field(
+        True,
+        description="Whether the robot must be at rest there. Say `false` in a window (`before`, "
+        "`while`, `to`) in which it may drive on.",
+    )
 
     def _asked(self) -> str:
-        return f"at rest within {metres(self.position)} of the goal"
+        return f"{'at rest ' if self.at_rest else ''}within {metres(self.position)} of the goal"
 
 
 @check("motion.reaches", Subject.RECORDING, Reaches)
 def reaches(recording: Recording, parameters: Reaches) -> Finding:
     """The robot reaches the goal and stays there.
 
-    Judged by the true pose at the end of the run: at rest, near the position, and with the
-    heading (a full turn more or less is the same heading).
+    Judged by the true pose at the end of the run, or of each window of `after`, `before`, `while`
+    and `to`: at rest, near the position, and with the heading (a full turn more or less is the
+    same heading).
     """
     run, heading = parameters.approach(recording), parameters.heading
-    expected = (
-        f"at rest within {metres(parameters.position)} of {point(run.goal.x_m, run.goal.y_m)}"
-    )
+    expected = parameters.asked_for.removesuffix("the goal") + point(run.goal.x_m, run.goal.y_m)
     if heading is not None:
         expected += f" and {degrees(heading)} of the heading {degrees(run.goal.yaw_rad)}"
     last = run.truth[-1]
     cause = why_not_there(run, parameters.position)
     if cause is None and heading is not None:
         cause = why_not_aligned(run, parameters.position, heading)
-    if cause is None and not is_at_rest(last):
+    if cause is None and parameters.at_rest and not is_at_rest(last):
         cause = why_off_course(recording) or _restless(recording, last, "is at the goal, but")
     if cause is not None:
         return cause.finding(expected)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
@@ -11,6 +12,8 @@ from pydantic import AfterValidator, Field
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters, moved_in
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.explanation import cause_of
+from grader.diagnosis.motion.missed_place import PlaceMissed
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.findings.finding import Evidence, Finding, Moment
@@ -92,24 +95,44 @@ def visits(recording: Recording, parameters: Visits) -> Finding:
         return Finding.passed(
             parameters.asked_for, f"all of them on {metres(way_m(recording.truth))}", evidence
         )
-    seen = f"{len(moments)} of {counted(len(parameters.places), 'place')}"
-    nearest_m, step = _nearest(recording.truth, missed[0], parameters)
-    moment = Moment(f"nearest to {_words(missed[0])}", recording.since_launch_s(step.time_ns))
-    near = f"; it came within {metres(nearest_m)} of {_words(missed[0])}"
-    if parameters.is_at(missed[0], step):
-        short = f"at rest for less than {format_duration(parameters.pause or 0.0)}"
-        how = short if parameters.pause else "only before the places before it"
-        near = f"; it was at {_words(missed[0])}, {how}"
-    cause = why_off_course(recording) or Cause(
-        f"{seen}{near}",
-        "Go on to the next place once the distance to this one is below your tolerance"
-        + (", and publish zeros for the time of the pause." if parameters.pause else "."),
-        Evidence((*evidence.moments, moment), plots=plots),
-    )
+    cause = _why_missed(recording, parameters, moments, evidence.moments)
     credit = len(moments) / len(parameters.places)
     return Finding.failed(
         parameters.asked_for, cause.observed, cause.hint, cause.evidence, credit=credit
     )
+
+
+def _why_missed(
+    recording: Recording,
+    parameters: Visits,
+    visited: dict[int, int],
+    moments: tuple[Moment, ...],
+) -> Cause:
+    """Why the first place that is missing was not visited."""
+    truth, places = recording.truth, parameters.places
+    number = next(index for index in range(len(places)) if index not in visited)
+    # Without an order it may have been on its way to any of the others.
+    since_ns = max(visited.values(), default=0) if parameters.ordered else 0
+    way = tuple(step for step in truth if step.time_ns >= since_ns)
+    place, name = places[number], _words(places[number])
+    x_m, y_m, reach_m = _middle(place, parameters.position)
+    seen = f"{len(visited)} of {counted(len(places), 'place')}"
+    there = next((step for step in truth if parameters.is_at(place, step)), None)
+    later = {
+        index: next((step for step in way if parameters.is_at(places[index], step)), None)
+        for index in range(number + 1, len(places) if parameters.ordered else 0)
+    }
+    skipped = next((_words(places[index]) for index, step in later.items() if step), "")
+    symptom = PlaceMissed(recording, seen, name, x_m, y_m, reach_m, way, moments, skipped)
+    if there is None:
+        return cause_of(symptom)
+    short = f"at rest for less than {format_duration(parameters.pause or 0.0)}"
+    how = short if parameters.pause else "only before the places before it"
+    hint = "Publish zeros at each place, for the time of the pause."
+    if not parameters.pause:
+        hint = "Take the places in their order: choose the next one when the robot is at this one."
+    told = symptom.cause(f"it was at {name}, {how}", hint, f"at {name}", there)
+    return why_off_course(recording) or told
 
 
 def _visits(truth: Sequence[Truth], parameters: Visits) -> dict[int, int]:
@@ -131,18 +154,13 @@ def _visits(truth: Sequence[Truth], parameters: Visits) -> dict[int, int]:
     return found
 
 
-def _nearest(
-    truth: Sequence[Truth], place: Sequence[float], parameters: Visits
-) -> tuple[float, Truth]:
-    """How near the robot came to a place, and when."""
-    middle = place if len(place) == 2 else ((place[0] + place[2]) / 2, (place[1] + place[3]) / 2)
-
-    def distance_m(step: Truth) -> float:
-        return math.hypot(step.x_m - middle[0], step.y_m - middle[1])
-
-    inside = [step for step in truth if parameters.is_at(place, step)]
-    step = min(inside or truth, key=distance_m)
-    return distance_m(step), step
+def _middle(place: Sequence[float], position_m: float) -> tuple[float, float, float]:
+    """The middle of a place, and how near it the robot has to come."""
+    if len(place) == 2:
+        return place[0], place[1], position_m
+    x_min, y_min, x_max, y_max = place
+    reach_m = min(x_max - x_min, y_max - y_min) / 2.0
+    return (x_min + x_max) / 2.0, (y_min + y_max) / 2.0, reach_m
 
 
 class KeepsDistance(RobotParameters):
@@ -192,6 +210,8 @@ def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding |
             "Look at the plot of the distance: which range does the node compare?",
             evidence_at(recording, "the run began", truth[0].time_ns, plot),
         )
+    end_s = recording.since_launch_s(truth[-1].time_ns)
+    plot = replace(plot, judged=(recording.since_launch_s(truth[begin].time_ns), end_s))
     steps = list(zip(truth[begin:], truth[begin + 1 :], kept[begin + 1 :], strict=False))
     whole_m = sum(way_m((a, b)) for a, b, _ in steps)
     right_m = sum(way_m((a, b)) for a, b, is_right in steps if is_right)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import takewhile
 from typing import Literal
 
 from pydantic import Field
@@ -14,17 +18,19 @@ from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why
 from grader.diagnosis.motion.off_course import why_interrupted
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_it_exited
-from grader.findings.finding import Evidence, Finding
+from grader.findings.finding import Evidence, Finding, Table
 from grader.findings.first_seen import until_the_end
 from grader.findings.wording import counted
-from grader.measure.motion.command import scans, stolen_s
+from grader.measure.motion.command import commands, scans, stolen_s
 from grader.measure.motion.ground import Sight, ahead
 from grader.measure.motion.quantities import metres, speed
-from grader.measure.motion.scan import misreading
+from grader.measure.motion.scan import front, misreading
 from grader.measure.motion.track import (
     REST_M_S,
     evidence_at,
     first_rest,
+    index_at,
+    is_at_rest,
     over_time,
     speed_plot,
     way_m,
@@ -33,6 +39,8 @@ from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
 from grader.spec.quantity import Length, PositiveLength, Speed
 from grader.spec.unit import format_duration
+
+_SCANS = 6
 
 
 class Stops(RobotParameters):
@@ -143,8 +151,39 @@ def _evidence(recording: Recording, scene: Scene, rest: int, parameters: Stops) 
 
     title = "Distance to what is straight ahead"
     distance_plot = over_time(recording, title, "distance (m)", distance_m, band)
+    still = takewhile(is_at_rest, recording.truth[rest:])
+    judged = [recording.since_launch_s(step.time_ns) for step in still]
+    distance_plot = replace(distance_plot, judged=(judged[0], judged[-1]))
     plots = distance_plot, speed_plot(recording)
-    return evidence_at(recording, "the robot came to rest", rest_ns, *plots)
+    found = evidence_at(recording, "the robot came to rest", rest_ns, *plots)
+    return replace(found, tables=tuple(_table(recording, scene, rest)))
+
+
+def _table(recording: Recording, scene: Scene, rest: int) -> Iterator[Table]:
+    """The last scans before the robot came to rest, with the commands that followed."""
+    truth, rest_ns = recording.truth, recording.truth[rest].time_ns
+    heard = scans(recording)
+    # The command that stopped it answers the scan before, and it may have waited for some more.
+    last = bisect_right(heard, rest_ns, key=lambda one: one.stamp_ns)
+    rows = []
+    for number in range(max(0, last - _SCANS), last):
+        scan, until_ns = heard[number], rest_ns
+        if number + 1 < len(heard):
+            until_ns = heard[number + 1].stamp_ns
+        sent = [one for one in commands(recording) if scan.stamp_ns <= one.time_ns < until_ns]
+        sight = ahead(scene, truth[index_at(truth, scan.stamp_ns)])
+        measured = front(recording, scan)
+        rows.append(
+            (
+                f"{recording.since_launch_s(scan.stamp_ns):.2f} s",
+                "none" if measured is None else f"{measured:.3f} m",
+                ", ".join(dict.fromkeys(speed(one.twist.linear_m_s) for one in sent)) or "none",
+                "nothing ahead" if sight is None else f"{sight.distance_m:.3f} m",
+            )
+        )
+    header = ("time", "beam ahead", "linear.x sent then", "true distance")
+    if rows:
+        yield Table("The last scans before it came to rest", header, tuple(rows))
 
 
 class StaysAtRest(RobotParameters):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, ClassVar, Literal
 
 from pydantic import Field
@@ -21,19 +22,22 @@ from grader.diagnosis.wrong_transform import (
     BadTransform,
     NoTransform,
     edge,
+    moment,
     overwritten,
     refused_by_tf2,
     why_gone,
 )
 from grader.findings.finding import Finding
 from grader.findings.value import FieldPath
-from grader.findings.wording import code, listing
+from grader.findings.wording import code, counted, listing
 from grader.measure.motion.quantities import degrees, metres
+from grader.measure.numbering import lost
 from grader.measure.transforms import quaternion, stamp_of
-from grader.recording.model import Message, Recording
+from grader.recording.model import NS, Message, Recording
 from grader.recording.simulated import Truth
 from grader.spec.name import FrameName, TopicName
 from grader.spec.quantity import Angle, Duration, Frequency, PositiveLength
+from grader.spec.unit import format_duration
 from sim.coordinates import Position, RollPitchYaw
 
 _RATE_TOLERANCE = 0.2
@@ -163,13 +167,17 @@ class Follows(EdgeParameters):
     tolerance: PositiveLength = Field(0.01, description="Largest error of x, y and z.")
     angle: Angle = Field(0.02, description="Largest error of each angle.")
     within: Duration = Field(0.2, description="Largest age of the pose.", validate_default=False)
+    same_stamp: bool = Field(
+        False, description="Whether each stamp must be that of a message of the source."
+    )
 
     def _asked(self) -> str:
         source = (
             f"of the pose on {code(self.source)}" if self.source else "of the robot's true pose"
         )
         limits = f"within {metres(self.tolerance)} and {degrees(self.angle)}"
-        return f"{self.words} has {listing(self.fields)} {source} ({limits})"
+        stamp = ", and its stamp" if self.same_stamp else ""
+        return f"{self.words} has {listing(self.fields)} {source} ({limits}){stamp}"
 
     def named_fields(self) -> Iterator[NamedFields]:
         """Those of the source."""
@@ -205,11 +213,45 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         within=parameters.within,
     )
     found = following.follows.judge(alone, wanted)
+    if found.credit and parameters.same_stamp:
+        stop_if(_why_other_stamp(recording, parameters))
     hint = found.hint and (
         "Copy the newest pose into translation and rotation of the transform, in the callback "
         "that gets it."
     )
     return replace(found, expected=parameters.asked_for, hint=hint)
+
+
+def _why_other_stamp(recording: Recording, parameters: Follows) -> Cause | None:
+    """Why the stamps are not those of the source; None if they are."""
+    symptom = NoTransform(recording, parameters.topic, parameters.parent, parameters.child)
+    sources = recording.on(parameters.source or "")
+    stamps = {stamp_of(one.value): one for one in sources}
+    # Of a message that was lost, or came after the last one, no stamp is known.
+    unknown = sum(lost(a, b) for a, b in pairwise(sources))
+    judged = [one for one in symptom.wanted if one.message.stamp_ns < sources[-1].stamp_ns]
+    wrong = []
+    for one in judged:
+        source, sent_ns = stamps.get(one.stamp_ns), one.message.stamp_ns
+        made_ns = sent_ns if source is None else source.stamp_ns
+        old_s = (sent_ns - made_ns) / NS - recording.stolen_s(made_ns, sent_ns)
+        if source is None or old_s > parameters.within:
+            wrong.append(one)
+    if len(wrong) <= unknown:
+        return None
+    one, source = wrong[0], sources[0]
+    for message in sources:
+        if message.stamp_ns <= one.message.stamp_ns:
+            source = message
+    off_s = (one.stamp_ns - (stamp_of(source.value) or 0)) / NS
+    return Cause(
+        f"{len(wrong)} of {counted(len(judged), 'transform')} have another stamp than the message "
+        f"on {code(source.topic)}; the first one is {format_duration(abs(off_s))} "
+        f"{'later' if off_s > 0.0 else 'earlier'}",
+        "A transform says where the robot was when it was measured: copy header.stamp of the "
+        "message into header.stamp of the transform.",
+        moment(recording, one, "has another stamp"),
+    )
 
 
 def _odometry(one: Truth) -> dict[str, Any]:

@@ -32,7 +32,7 @@ class Approach:
         """Every step."""
         return self.recording.truth
 
-    def distance_m(self, step: Truth) -> float:
+    def distance_m(self, step: Truth | Pose) -> float:
         """Distance from the goal."""
         return math.hypot(self.goal.x_m - step.x_m, self.goal.y_m - step.y_m)
 

@@ -41,9 +41,9 @@ def misreading(recording: Recording, step: Truth) -> Misreading | None:
     if scan is None:
         return None
     # Before the nearest of all: where a beam is 0.0, so is min(ranges).
-    seen = _front(recording, scan)
+    seen = front(recording, scan)
     if seen == 0.0 and not _drove_on(
-        recording, step, lambda one: _front(recording, newest(recording, one.time_ns)) == 0.0
+        recording, step, lambda one: front(recording, newest(recording, one.time_ns)) == 0.0
     ):
         return Misreading(
             "the beam straight ahead reported 0.0 then, which means that nothing came back",
@@ -60,7 +60,7 @@ def misreading(recording: Recording, step: Truth) -> Misreading | None:
     return beside
 
 
-def _front(recording: Recording, scan: Message | None) -> float | None:
+def front(recording: Recording, scan: Message | None) -> float | None:
     """What the beam straight ahead reports, in metres; may be inf, NaN or 0.0."""
     if scan is None:
         return None

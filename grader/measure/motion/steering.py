@@ -73,17 +73,17 @@ def before_arrival(run: Approach, known: Sequence[Answer], position_m: float) ->
     return [item for item in known if item.seen_ns < arrival_ns]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, order=True)
 class Sample:
-    """A command and the error that it answers."""
+    """A command and the error that it answers, such as rad/s and rad, or m/s and m."""
 
-    error_rad: float
-    command_rad_s: float
+    error: float
+    command: float
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line through the origin: its slope in rad/s for each rad, and how well it fits.
+    """A line through the origin: its slope in 1/s, and how well it fits.
 
     Attributes:
         r2: Coefficient of determination, at most 1.
@@ -95,7 +95,7 @@ class Line:
     used: int
 
 
-def fit(samples: Sequence[Sample], limit_rad_s: float) -> Line:
+def fit(samples: Sequence[Sample], limit: float) -> Line:
     """Lay a line through the origin and the commands that are at no limit.
 
     A command at a limit is left out only if the line asks for at least that much there, so that
@@ -103,14 +103,14 @@ def fit(samples: Sequence[Sample], limit_rad_s: float) -> Line:
     """
     import numpy as np
 
-    errors = np.array([item.error_rad for item in samples])
-    commands = np.array([item.command_rad_s for item in samples])
+    errors = np.array([item.error for item in samples])
+    commands = np.array([item.command for item in samples])
     sizes, wanted = np.abs(commands), np.abs(errors)
     highest = sizes.max()
     lowest = sizes[sizes > ZERO_RAD_S].min(initial=highest)
     clamp = highest if _count(sizes, highest) >= _PLATEAU else math.inf
     floor = lowest if _count(sizes, lowest) >= _PLATEAU and lowest < highest else 0.0
-    clamp = min(clamp, limit_rad_s * 0.999)
+    clamp = min(clamp, limit * 0.999)
     high, low = clamp * (1.0 - _SAME), floor * (1.0 + _SAME)
     inside = (low < sizes) & (sizes < high)
     if inside.sum() < LEAST_FIT:

@@ -32,10 +32,37 @@ LONGEST_SIGHT_M = 0.6
 
 @dataclass(frozen=True)
 class Target:
-    """Where a check wants the robot to end; ``pose`` in the world's frame."""
+    """Where a check wants the robot to be; ``pose`` in the world's frame.
+
+    Attributes:
+        label: ``goal``, where it must end, or the number of a place on its way.
+        zone: Of a place that is a rectangle: x_min, y_min, x_max, y_max.
+    """
 
     pose: Pose
     radius_m: float
+    label: str = "goal"
+    zone: tuple[float, ...] = ()
+
+    @property
+    def is_goal(self) -> bool:
+        """Whether the robot must end there."""
+        return self.label == "goal"
+
+    @property
+    def corners(self) -> list[svg.Point]:
+        """Those of a zone, or the middle."""
+        if not self.zone:
+            return [(self.pose.x_m, self.pose.y_m)]
+        x1, y1, x2, y2 = self.zone
+        return [(x1, y1), (x2, y1), (x2, y2), (x1, y2)]
+
+    @property
+    def outline(self) -> Markup:
+        """Its tolerance or its zone, in metres."""
+        if self.zone:
+            return track([*self.corners, self.corners[0]], "target")
+        return disc(self.pose.x_m, self.pose.y_m, self.radius_m, "target")
 
 
 def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> svg.Figure | None:
@@ -50,15 +77,16 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> svg
     gone_m = [*accumulate(map(_step_m, truth, truth[1:]), initial=0.0)]
     touched = [b for a, b in pairwise([None, *truth]) if b and b.contact and not (a and a.contact)]
     stopped = _stopped(truth, scene)
-    shown = [*outline, *((one.pose.x_m, one.pose.y_m) for one in targets)]
+    shown = [*outline, *(corner for one in targets for corner in one.corners)]
+    goals = [one for one in targets if one.is_goal]
 
     def draw(width: float) -> tuple[float, list[Markup]]:
         view = ground_plan.fit(shown, scene, width, 150.0, 340.0 if width > svg.NARROW else 300.0)
         in_world = [
             *ground_plan.world(scene, view),
             *ground_plan.moving(scene, (truth[-1].time_ns - scene.began_ns) / NS),
-            *(disc(one.pose.x_m, one.pose.y_m, one.radius_m, "target") for one in targets),
-            *(_needle(one.pose, 2.0 * scene.radius_m, "target-heading") for one in targets),
+            *(one.outline for one in targets),
+            *(_needle(one.pose, 2.0 * scene.radius_m, "target-heading") for one in goals),
             track(outline, "way"),
             *_robot(truth[0], scene, "robot at-start"),
             *_robot(truth[-1], scene, "robot"),
@@ -74,8 +102,8 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> svg
         for one in targets:
             # Above its circle: below it stands the name of the robot that has come there.
             x, y = view.pixel(one.pose.x_m, one.pose.y_m)
-            y = max(12.0, y - one.radius_m * view.scale - 6.0)
-            content.append(svg.label("goal", x, y, "lane", "middle"))
+            above = one.radius_m * view.scale + 6.0 if one.is_goal else -4.0
+            content.append(svg.label(one.label, x, max(12.0, y - above), "lane", "middle"))
         for step, text in ((truth[0], "start"), (truth[-1], "end"))[not has_moved(truth) :]:
             x, y = view.pixel(step.x_m, step.y_m)
             radius = scene.radius_m * view.scale
@@ -83,7 +111,9 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> svg
             content.append(svg.label(text, x, y, "lane", "middle"))
         return view.height, content
 
-    goal = "".join(_from_goal(truth[-1], target) for target in targets)
+    goal = "".join(_from_goal(truth[-1], target) for target in goals)
+    if len(goals) < len(targets):
+        goal += " The numbers are the places to visit, in the order of the assignment."
     if has_moved(truth):
         caption = f"{_went(gone_m[-1], stopped, touched)}.{goal} Arrow heads show where it looked, "
         caption += "the dashed outline where it started."

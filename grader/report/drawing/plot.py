@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from operator import itemgetter
 
 from markupsafe import Markup
@@ -46,6 +46,10 @@ def draw_plot(plot: Plot, name: str) -> svg.Figure:
     edges = [edge for edge in band or () if abs(edge) < DRAWABLE]
     ordinates = [y for _, y in points]
     y = Scale(*_span(ordinates + edges, 0.1), HEIGHT - BOTTOM, TOP)
+    first, last = plot.judged or (-math.inf, math.inf)
+
+    def is_wrong(point: svg.Point) -> bool:
+        return first <= point[0] <= last and not low <= point[1] <= high
 
     def draw(width: float) -> tuple[float, list[Markup]]:
         end = width - RIGHT
@@ -58,38 +62,45 @@ def draw_plot(plot: Plot, name: str) -> svg.Figure:
         if band:
             top, bottom = y.clipped(high), y.clipped(low)
             height = max(1.0, bottom - top)
+            begin, until = (LEFT, end) if plot.judged is None else x.all_clipped(plot.judged)
+            width = max(2.0, until - begin)
             content.append(
-                svg.element("rect", x=LEFT, y=top, width=end - LEFT, height=height, class_="band")
+                svg.element("rect", x=begin, y=top, width=width, height=height, class_="band")
             )
-            content += [svg.line(LEFT, y(edge), end, y(edge), "band-edge") for edge in edges]
+            content += [svg.line(begin, y(edge), until, y(edge), "band-edge") for edge in edges]
         content += value_axis(y, LEFT, end)
         content.append(svg.line(LEFT, y.begin, end, y.begin, "axis"))
         for value, text in ticks(x.low, x.high, 8 if width > svg.NARROW else 3):
             content.append(svg.line(x(value), y.begin, x(value), y.begin + 5, "axis"))
             content.append(svg.label(text, x(value), y.begin + 18, anchor="middle"))
-        content += _series(points, (low, high), x, y)
+        content += _series(points, is_wrong, x, y)
         if aside:
             content += _bars(ordinates, y, x.end + GAP, end)
             content.append(svg.label("how many", end, HEIGHT - 4, anchor="end"))
         return HEIGHT, content
 
     lost = max(len(plot.x), len(plot.y)) - len(points)
-    return svg.figure(name, plot.title, _caption(plot, ordinates, band, lost), draw)
+    judged = [point for point in points if first <= point[0] <= last]
+    wrong = sum(map(is_wrong, judged))
+    caption = _caption(plot, (len(points), len(judged), wrong), band, lost)
+    return svg.figure(name, plot.title, caption, draw)
 
 
-def _series(points: Sequence[svg.Point], band: svg.Point, x: Scale, y: Scale) -> list[Markup]:
+def _series(
+    points: Sequence[svg.Point], is_wrong: Callable[[svg.Point], bool], x: Scale, y: Scale
+) -> list[Markup]:
     shown = _thinned(points, x) if len(points) > MANY else points
     across, down = x.all_clipped([a for a, _ in shown]), y.all_clipped([b for _, b in shown])
     placed = list(zip(across, down, strict=True))
-    good = [point for point, (_, v) in zip(placed, shown, strict=True) if band[0] <= v <= band[1]]
+    bad = [pixel for pixel, point in zip(placed, shown, strict=True) if is_wrong(point)]
+    good = [pixel for pixel, point in zip(placed, shown, strict=True) if not is_wrong(point)]
     dense = len(placed) > DOTS
     drawn = []
     if len(placed) > 1:
         drawn.append(svg.curve(placed, "series dense" if dense else "series"))
     if good and not dense:
         drawn.append(svg.dots(good, "dots"))
-    if len(good) < len(placed):
-        bad = [p for p, (_, v) in zip(placed, shown, strict=True) if not band[0] <= v <= band[1]]
+    if bad:
         drawn.append(svg.crosses(_apart(bad), "out"))
     return drawn
 
@@ -142,16 +153,18 @@ def _span(values: Sequence[float], margin: float) -> tuple[float, float]:
     return low - room, high + room
 
 
-def _caption(plot: Plot, values: Sequence[float], band: svg.Point | None, lost: int) -> str:
-    parts = [counted(len(values), "value") if values else "no values"]
-    if values and band:
+def _caption(plot: Plot, numbers: tuple[int, int, int], band: svg.Point | None, lost: int) -> str:
+    """Say what is allowed; the numbers are of all points, of the judged, and of the wrong ones."""
+    shown, count, outside = numbers
+    parts = [counted(shown, "value") if shown else "no values"]
+    if count and band:
         low, high = band
         allowed = f"{low:.6g} to {high:.6g}"
         if math.isinf(low) or math.isinf(high):
             allowed = f"up to {high:.6g}" if math.isinf(low) else f"from {low:.6g}"
-        outside, count = sum(not low <= value <= high for value in values), len(values)
         inside = f"{outside} of {count} outside (marked ×)" if outside else f"all {count} inside"
-        parts = [f"allowed {allowed}{unit_of(plot.y_label)} (shaded)", inside]
+        where = "shaded, where it is judged" if count < shown else "shaded"
+        parts = [f"allowed {allowed}{unit_of(plot.y_label)} ({where})", inside]
     if lost:
         parts.append(f"{lost} not finite and not drawn")
     return f"{one_line(plot.title)}: {', '.join(parts)}."

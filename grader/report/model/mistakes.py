@@ -41,7 +41,9 @@ def only_shown(checks: Sequence[CheckPart]) -> frozenset[str]:
 
 
 def first_to_fix(checks: Sequence[CheckPart]) -> str | None:
-    """Find the failed check on which most others depend; of equals, the author's first.
+    """Find the failed check on which most others depend.
+
+    Of equals it is the author's first, or in the run of that one what went wrong first in time.
 
     A node that crashed does not stay alive, and has no publisher either: of checks that failed
     for the same reason the first stands for all, with the checks that wait for any of them. A
@@ -49,4 +51,9 @@ def first_to_fix(checks: Sequence[CheckPart]) -> str | None:
     """
     shown = only_shown(checks)
     found = [check for check in reasons(checks) if check not in shown]
-    return max(found, key=lambda check: sum(others(check, checks)), default=None)
+    most = max((sum(others(check, checks)) for check in found), default=0)
+    equals = [one for one in checks if one.id in found and sum(others(one.id, checks)) == most]
+    ends = [one for one in equals if one.scenario == equals[0].scenario and one.evidence.moments]
+    if equals and equals[0] in ends:
+        return min(ends, key=lambda one: one.evidence.moments[-1].time_s).id
+    return equals[0].id if equals else None

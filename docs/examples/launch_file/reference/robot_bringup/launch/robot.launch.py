@@ -1,7 +1,7 @@
-"""Starts the driver of a robot, and on demand the monitor three seconds later."""
+"""Starts the driver of a robot, and on demand the monitor."""
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, TimerAction
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
 from launch.conditions import IfCondition
 from launch.launch_description_sources import AnyLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
@@ -27,16 +27,11 @@ def generate_launch_description() -> LaunchDescription:
             ],
             remappings=[('cmd_vel', 'base/cmd_vel')],
         ),
-        TimerAction(
-            period=3.0,
-            actions=[
-                IncludeLaunchDescription(
-                    AnyLaunchDescriptionSource(
-                        PathJoinSubstitution([share, 'launch', 'monitor.launch.xml'])
-                    ),
-                    launch_arguments={'robot': LaunchConfiguration('robot')}.items(),
-                ),
-            ],
+        IncludeLaunchDescription(
+            AnyLaunchDescriptionSource(
+                PathJoinSubstitution([share, 'launch', 'monitor.launch.xml'])
+            ),
+            launch_arguments={'robot': LaunchConfiguration('robot')}.items(),
             condition=IfCondition(LaunchConfiguration('monitor')),
         ),
     ])

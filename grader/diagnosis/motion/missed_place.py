@@ -1,0 +1,169 @@
+"""Why a robot did not come to a place on its route."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.explanation import Symptom, explanation
+from grader.diagnosis.motion.off_course import why_off_course
+from grader.findings.finding import Evidence, Moment
+from grader.measure.motion.quantities import degrees, metres
+from grader.measure.motion.track import final_rest, speed_plot, turned_rad
+from grader.recording.model import Recording
+from grader.recording.simulated import Truth
+from sim.motion import wrap_angle
+
+_ON_THE_SPOT_M = 0.03
+_TURN_RAD = math.radians(15.0)
+
+
+@dataclass(frozen=True)
+class PlaceMissed(Symptom[Cause]):
+    """The robot did not come to a place on its route.
+
+    Attributes:
+        seen: How many places it has visited, in words.
+        name: The place in words; ``x_m`` and ``y_m`` are its middle.
+        reach_m: How near its middle the robot had to come.
+        way: From the place before, or the start, to the end.
+        visited: When it was at the places before.
+        skipped_to: The place after this one at which it was first, in words, or nothing.
+    """
+
+    recording: Recording
+    seen: str
+    name: str
+    x_m: float
+    y_m: float
+    reach_m: float
+    way: tuple[Truth, ...]
+    visited: tuple[Moment, ...]
+    skipped_to: str = ""
+
+    def distance_m(self, step: Truth) -> float:
+        """How far the robot is from the place."""
+        return math.hypot(self.x_m - step.x_m, self.y_m - step.y_m)
+
+    @cached_property
+    def gone_m(self) -> list[float]:
+        """How far each step is from the beginning of the way."""
+        first = self.way[0]
+        return [math.hypot(step.x_m - first.x_m, step.y_m - first.y_m) for step in self.way]
+
+    @cached_property
+    def needed_rad(self) -> float:
+        """How far it has to turn to the place, counter-clockwise."""
+        first = self.way[0]
+        return wrap_angle(math.atan2(self.y_m - first.y_m, self.x_m - first.x_m) - first.yaw_rad)
+
+    @cached_property
+    def turned_rad(self) -> float:
+        """How far it turned to where it drove then, counter-clockwise, full turns counted."""
+        first, far_m = self.way[0], min(max(self.gone_m), self.distance_m(self.way[0]))
+        there = self.way[next(i for i, gone_m in enumerate(self.gone_m) if gone_m >= far_m)]
+        went_rad = math.atan2(there.y_m - first.y_m, there.x_m - first.x_m) - first.yaw_rad
+        on_spot = next((i for i, one in enumerate(self.gone_m) if one > _ON_THE_SPOT_M), 0)
+        spun_rad = turned_rad(self.way[: on_spot + 1])
+        return spun_rad + wrap_angle(went_rad - spun_rad)
+
+    @property
+    def is_turned_wrongly(self) -> bool:
+        """Whether it drove away from the place before in another direction than to this one."""
+        off_rad = abs(wrap_angle(self.turned_rad - self.needed_rad))
+        room_rad = math.atan2(self.reach_m, self.distance_m(self.way[0]))
+        return max(self.gone_m) > _ON_THE_SPOT_M and off_rad > max(_TURN_RAD, room_rad)
+
+    def cause(self, words: str, hint: str, label: str, step: Truth) -> Cause:
+        """What it did instead, and when."""
+        moment = Moment(label, self.recording.since_launch_s(step.time_ns))
+        evidence = Evidence((*self.visited, moment), plots=(speed_plot(self.recording),))
+        return Cause(f"{self.seen}; {words}", hint, evidence)
+
+    def turn_cause(self, words: str, hint: str) -> Cause:
+        """What is wrong with its turn to the place."""
+        on_spot = next(i for i, one in enumerate(self.gone_m) if one > _ON_THE_SPOT_M)
+        return self.cause(words, hint, "drives off in another direction", self.way[on_spot])
+
+
+def _to(angle_rad: float) -> str:
+    return f"{degrees(abs(angle_rad))} to the {'left' if angle_rad > 0.0 else 'right'}"
+
+
+@explanation(PlaceMissed)
+def off_course(symptom: PlaceMissed) -> Cause | None:
+    """The process ended, the robot touched something, or no command came for a long time."""
+    return why_off_course(symptom.recording)
+
+
+@explanation(PlaceMissed)
+def skipped(symptom: PlaceMissed) -> Cause | None:
+    """It went to a later place without this one."""
+    if not symptom.skipped_to:
+        return None
+    return symptom.cause(
+        f"it went to {symptom.skipped_to} without {symptom.name} before",
+        "Take the places one after another: choose the next one only when the robot is at this "
+        "one.",
+        f"nearest to {symptom.name}",
+        min(symptom.way, key=symptom.distance_m),
+    )
+
+
+@explanation(PlaceMissed, concept="angles")
+def turned_to_the_wrong_side(symptom: PlaceMissed) -> Cause | None:
+    """It turned left where it had to turn right, or the other way round."""
+    turned, needed = symptom.turned_rad, symptom.needed_rad
+    if not symptom.is_turned_wrongly or min(abs(turned), abs(needed)) < _TURN_RAD:
+        return None
+    if turned * needed > 0.0:
+        return None
+    return symptom.turn_cause(
+        f"on its way to {symptom.name} it turned to the wrong side: {_to(turned)} instead of "
+        f"{_to(needed)}",
+        "A positive angular.z turns to the left (REP-103). Look at the sign of the turn.",
+    )
+
+
+@explanation(PlaceMissed, concept="angles")
+def turned_too_far(symptom: PlaceMissed) -> Cause | None:
+    """It turned too far, or not far enough, and drove on past the place."""
+    if not symptom.is_turned_wrongly:
+        return None
+    turned, needed = symptom.turned_rad, symptom.needed_rad
+    how = "too far" if abs(turned) > abs(needed) else "too little"
+    instead = _to(needed) if abs(needed) >= _TURN_RAD else "straight ahead"
+    return symptom.turn_cause(
+        f"on its way to {symptom.name} it turned {how}: {_to(turned)} instead of {instead}",
+        "End the turn by the yaw of odometry, not by the time, and stop before you drive on.",
+    )
+
+
+@explanation(PlaceMissed)
+def stopped_short(symptom: PlaceMissed) -> Cause | None:
+    """It came to rest on its way to the place."""
+    rest = final_rest(symptom.way)
+    left_m = symptom.distance_m(symptom.way[-1])
+    if rest is None or max(symptom.gone_m) > symptom.distance_m(symptom.way[0]):
+        return None
+    return symptom.cause(
+        f"it stopped {metres(left_m)} from {symptom.name}",
+        "Drive until the distance to the place is below your tolerance. Measure it by odometry, "
+        "not by the time.",
+        f"stopped before {symptom.name}",
+        symptom.way[rest],
+    )
+
+
+@explanation(PlaceMissed, general=True)
+def not_near(symptom: PlaceMissed) -> Cause:
+    """It came near the place, but not near enough."""
+    step = min(symptom.way, key=symptom.distance_m)
+    return symptom.cause(
+        f"it came within {metres(symptom.distance_m(step))} of {symptom.name}",
+        "Go on to the next place once the distance to this one is below your tolerance.",
+        f"nearest to {symptom.name}",
+        step,
+    )
