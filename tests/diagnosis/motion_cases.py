@@ -142,15 +142,14 @@ CASES: list[Group] = [
                 legs(0.1, 0.3, RIGHT_ANGLE, 0.5), processes=(died(1, 3.0),)
             ),
             "PlaceMissed.skipped": lambda: legs(RIGHT_ANGLE / 2.0, 0.7),
-            "PlaceMissed.turned_to_the_wrong_side": lambda: legs(0.1, 0.5, -RIGHT_ANGLE, 0.5),
-            "PlaceMissed.turned_too_far": lambda: legs(0.1, 0.5, 2.4, 0.5),
+            "PlaceMissed.turned_wrongly": lambda: legs(0.1, 0.5, -RIGHT_ANGLE, 0.5),
             "PlaceMissed.stopped_short": lambda: legs(0.1, 0.5, RIGHT_ANGLE, 0.2),
         },
     ),
     (
         "motion.visits",
         {"places": [[1.0, 0.0]]},
-        {"PlaceMissed.not_near": lambda: legs(0.2, 1.2)},
+        {"PlaceMissed.not_near": lambda: legs(0.14, 1.2)},
     ),
     (
         "motion.path_length",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import takewhile
@@ -162,15 +161,11 @@ def _evidence(recording: Recording, scene: Scene, rest: int, parameters: Stops) 
 def _table(recording: Recording, scene: Scene, rest: int) -> Iterator[Table]:
     """The last scans before the robot came to rest, with the commands that followed."""
     truth, rest_ns = recording.truth, recording.truth[rest].time_ns
-    heard = scans(recording)
-    # The command that stopped it answers the scan before, and it may have waited for some more.
-    last = bisect_right(heard, rest_ns, key=lambda one: one.stamp_ns)
+    heard = [scan for scan in scans(recording) if scan.stamp_ns <= rest_ns][-_SCANS:]
+    ends_ns = [*(scan.stamp_ns for scan in heard[1:]), rest_ns]
     rows = []
-    for number in range(max(0, last - _SCANS), last):
-        scan, until_ns = heard[number], rest_ns
-        if number + 1 < len(heard):
-            until_ns = heard[number + 1].stamp_ns
-        sent = [one for one in commands(recording) if scan.stamp_ns <= one.time_ns < until_ns]
+    for scan, end_ns in zip(heard, ends_ns, strict=bool(heard)):
+        sent = [one for one in commands(recording) if scan.stamp_ns <= one.time_ns < end_ns]
         sight = ahead(scene, truth[index_at(truth, scan.stamp_ns)])
         measured = front(recording, scan)
         rows.append(

@@ -11,13 +11,16 @@ from grader.diagnosis.explanation import Symptom, explanation
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.findings.finding import Evidence, Moment
 from grader.measure.motion.quantities import degrees, metres
-from grader.measure.motion.track import final_rest, speed_plot, turned_rad
+from grader.measure.motion.track import final_rest, speed_plot
 from grader.recording.model import Recording
 from grader.recording.simulated import Truth
 from sim.motion import wrap_angle
 
-_ON_THE_SPOT_M = 0.03
+# A shorter way has no direction.
+_WAY_M = 0.1
 _TURN_RAD = math.radians(15.0)
+_SIDE_HINT = "A positive angular.z turns to the left (REP-103). Look at the sign of the turn."
+_END_HINT = "End the turn by the yaw of odometry, not by the time, and stop before you drive on."
 
 
 @dataclass(frozen=True)
@@ -53,39 +56,16 @@ class PlaceMissed(Symptom[Cause]):
         first = self.way[0]
         return [math.hypot(step.x_m - first.x_m, step.y_m - first.y_m) for step in self.way]
 
-    @cached_property
-    def needed_rad(self) -> float:
-        """How far it has to turn to the place, counter-clockwise."""
+    def bearing_rad(self, x_m: float, y_m: float) -> float:
+        """The direction of a point as the robot looks at the beginning, counter-clockwise."""
         first = self.way[0]
-        return wrap_angle(math.atan2(self.y_m - first.y_m, self.x_m - first.x_m) - first.yaw_rad)
-
-    @cached_property
-    def turned_rad(self) -> float:
-        """How far it turned to where it drove then, counter-clockwise, full turns counted."""
-        first, far_m = self.way[0], min(max(self.gone_m), self.distance_m(self.way[0]))
-        there = self.way[next(i for i, gone_m in enumerate(self.gone_m) if gone_m >= far_m)]
-        went_rad = math.atan2(there.y_m - first.y_m, there.x_m - first.x_m) - first.yaw_rad
-        on_spot = next((i for i, one in enumerate(self.gone_m) if one > _ON_THE_SPOT_M), 0)
-        spun_rad = turned_rad(self.way[: on_spot + 1])
-        return spun_rad + wrap_angle(went_rad - spun_rad)
-
-    @property
-    def is_turned_wrongly(self) -> bool:
-        """Whether it drove away from the place before in another direction than to this one."""
-        off_rad = abs(wrap_angle(self.turned_rad - self.needed_rad))
-        room_rad = math.atan2(self.reach_m, self.distance_m(self.way[0]))
-        return max(self.gone_m) > _ON_THE_SPOT_M and off_rad > max(_TURN_RAD, room_rad)
+        return wrap_angle(math.atan2(y_m - first.y_m, x_m - first.x_m) - first.yaw_rad)
 
     def cause(self, words: str, hint: str, label: str, step: Truth) -> Cause:
         """What it did instead, and when."""
         moment = Moment(label, self.recording.since_launch_s(step.time_ns))
         evidence = Evidence((*self.visited, moment), plots=(speed_plot(self.recording),))
         return Cause(f"{self.seen}; {words}", hint, evidence)
-
-    def turn_cause(self, words: str, hint: str) -> Cause:
-        """What is wrong with its turn to the place."""
-        on_spot = next(i for i, one in enumerate(self.gone_m) if one > _ON_THE_SPOT_M)
-        return self.cause(words, hint, "drives off in another direction", self.way[on_spot])
 
 
 def _to(angle_rad: float) -> str:
@@ -113,31 +93,25 @@ def skipped(symptom: PlaceMissed) -> Cause | None:
 
 
 @explanation(PlaceMissed, concept="angles")
-def turned_to_the_wrong_side(symptom: PlaceMissed) -> Cause | None:
-    """It turned left where it had to turn right, or the other way round."""
-    turned, needed = symptom.turned_rad, symptom.needed_rad
-    if not symptom.is_turned_wrongly or min(abs(turned), abs(needed)) < _TURN_RAD:
+def turned_wrongly(symptom: PlaceMissed) -> Cause | None:
+    """It turned to the wrong side, too far or too little, and drove off."""
+    distance_m = symptom.distance_m(symptom.way[0])
+    far_m = min(max(symptom.gone_m), distance_m)
+    there = symptom.way[next(i for i, one in enumerate(symptom.gone_m) if one >= far_m)]
+    turned = symptom.bearing_rad(there.x_m, there.y_m)
+    needed = symptom.bearing_rad(symptom.x_m, symptom.y_m)
+    room_rad = max(_TURN_RAD, math.atan2(symptom.reach_m, distance_m))
+    if far_m < _WAY_M or abs(wrap_angle(turned - needed)) <= room_rad:
         return None
-    if turned * needed > 0.0:
-        return None
-    return symptom.turn_cause(
-        f"on its way to {symptom.name} it turned to the wrong side: {_to(turned)} instead of "
-        f"{_to(needed)}",
-        "A positive angular.z turns to the left (REP-103). Look at the sign of the turn.",
-    )
-
-
-@explanation(PlaceMissed, concept="angles")
-def turned_too_far(symptom: PlaceMissed) -> Cause | None:
-    """It turned too far, or not far enough, and drove on past the place."""
-    if not symptom.is_turned_wrongly:
-        return None
-    turned, needed = symptom.turned_rad, symptom.needed_rad
-    how = "too far" if abs(turned) > abs(needed) else "too little"
-    instead = _to(needed) if abs(needed) >= _TURN_RAD else "straight ahead"
-    return symptom.turn_cause(
+    how, hint = "too far" if abs(turned) > abs(needed) else "too little", _END_HINT
+    if min(abs(turned), abs(needed)) > _TURN_RAD and turned * needed < 0.0:
+        how, hint = "to the wrong side", _SIDE_HINT
+    instead = _to(needed) if abs(needed) > _TURN_RAD else "straight ahead"
+    return symptom.cause(
         f"on its way to {symptom.name} it turned {how}: {_to(turned)} instead of {instead}",
-        "End the turn by the yaw of odometry, not by the time, and stop before you drive on.",
+        hint,
+        "drives off in another direction",
+        next(step for step, one in zip(symptom.way, symptom.gone_m, strict=True) if one >= _WAY_M),
     )
 
 
