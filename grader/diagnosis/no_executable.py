@@ -88,6 +88,8 @@ def not_installed_by_cmake(symptom: NoExecutable) -> Cause | None:
     seen = f"the build installed {codes(package.executables) or 'no executable'}"
     if name in package.misplaced_executables:
         seen = f"{code(name)} was installed in bin/, where `ros2 run` does not look"
+    elif package.cmake is not None and not package.cmake.strip():
+        seen = "CMakeLists.txt is empty"
     elif name in package.executables:
         seen = f"ROS does not find the package, so `ros2 run {package.name}` does not either"
     line = f"install(TARGETS {name} DESTINATION lib/${{PROJECT_NAME}})"

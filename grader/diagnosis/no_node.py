@@ -104,6 +104,17 @@ def not_built(symptom: NoNode) -> Cause | None:
     )
 
 
+_NAMED = "The executable's name is the left side of an entry of console_scripts in setup.py."
+_NOT_STARTED = {
+    "Exec format error": "A script begins with the line `#!/usr/bin/env python3`, and nothing "
+    "stands above it.",
+    "Permission denied": "Install a script with install(PROGRAMS ...), not install(FILES ...).",
+    "No such file": "The first line of the script names a program that is not here: write "
+    "`#!/usr/bin/env python3`, and save the file with the line ends of Linux.",
+}
+"""What the system says of a program that it cannot start -> what to do."""
+
+
 @explanation(NoNode)
 def no_executable(symptom: NoNode) -> Cause | None:
     """The executable does not exist, or cannot be started."""
@@ -117,7 +128,7 @@ def no_executable(symptom: NoNode) -> Cause | None:
         f"{code(what)} could not be started: {why}{there}"
         if why
         else f"nothing was launched, because the executable does not exist{there}",
-        "The executable's name is the left side of an entry of console_scripts in setup.py.",
+        next((hint for words, hint in _NOT_STARTED.items() if words in why), _NAMED),
     )
 
 

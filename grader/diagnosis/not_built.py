@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, replace
 
 from grader.bootstrap import COMPILERS
-from grader.diagnosis.build_error import BuildError
+from grader.diagnosis.build_error import EMPTY_HINT, BuildError
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.findings.finding import Evidence
@@ -131,9 +131,10 @@ def why_no_manifest(submission: SubmissionRecord, name: str) -> Cause | None:
 
 
 def _unusable(seen: str, errors: list[SourceError]) -> Cause:
-    return Cause(
-        seen, "Correct package.xml at the line that is named here.", Evidence(places=tuple(errors))
-    )
+    hint = "Correct package.xml at the line that is named here."
+    if any(error.message == EMPTY for error in errors):
+        hint = EMPTY_HINT
+    return Cause(seen, hint, Evidence(places=tuple(errors)))
 
 
 def existing_package(submission: SubmissionRecord, name: str) -> PackageRecord:

@@ -63,11 +63,20 @@ class TestExists:
         run = recording(endpoints=(endpoint(topic), reader()))
         assert judge("node.exists", run, name=NODE, publishes="/cmd_vel").status is Status.PASSED
 
-    def test_what_could_not_be_started_is_named(self):
-        wait = Wait("start of bot_publisher/bot_pub: Permission denied", 0.0, at(0))
+    @pytest.mark.parametrize(
+        ("why", "hint"),
+        [
+            ("Permission denied", "install(PROGRAMS ...)"),
+            ("Exec format error", "begins with the line `#!/usr/bin/env python3`"),
+            ("No such file or directory", "the line ends of Linux"),
+        ],
+    )
+    def test_what_could_not_be_started_is_named(self, why, hint):
+        wait = Wait(f"start of bot_publisher/bot_pub: {why}", 0.0, at(0))
         run = nodeless(ending=Ending.NOT_STARTED, processes=(), waits=(wait,))
         found = failing("node.exists", run, name=NODE)
-        assert "`bot_publisher/bot_pub` could not be started: Permission denied" in found
+        assert f"`bot_publisher/bot_pub` could not be started: {why}" in found
+        assert hint in found
 
     def test_nothing_launched_because_the_build_failed(self):
         culprit = SourceError("src/bot_publisher/setup.py", 7, "SyntaxError: invalid syntax")

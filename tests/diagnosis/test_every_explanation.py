@@ -188,6 +188,10 @@ CASES: list[Group] = [
                     )
                 ),
             ),
+            "Raised.no_such_field": crashing(
+                "AttributeError: 'Vector3' object has no attribute 'w'",
+                declarations=(declared("started"), declared("exiting", 2.0, fields="x y")),
+            ),
             "Raised.imported_from_elsewhere": crashing(
                 "ImportError: cannot import name 'Twist' from 'std_msgs.msg' (/opt/ros/jazzy)"
             ),

@@ -11,7 +11,7 @@ from grader.diagnosis.no_messages import FewMessages, NoMessages
 from grader.diagnosis.process.exceptions import CPP_ROWS, TABLE, Raised, Row
 from grader.diagnosis.process.failure import Failure, Frame
 from grader.docs import explanations_markdown
-from tests.checks.builder import recording, submission
+from tests.checks.builder import declared, recording, submission
 
 ALL = [(symptom, entry) for symptom, entries in explanations().items() for entry in entries]
 
@@ -144,3 +144,9 @@ def test_the_hint_names_what_to_write_in_this_submission(
 ) -> None:
     run = recording(submission=submission(files=files))
     assert cause_of(Raised(Failure(type_, message, ()), run)) == hint
+
+
+def test_the_fields_that_a_message_has_are_listed() -> None:
+    run = recording(declarations=(declared("exiting", 2.0, fields="x y z"),))
+    raised = Raised(Failure("AttributeError", "'Vector3' object has no attribute 'w'", ()), run)
+    assert cause_of(raised) == "`Vector3` has the fields `x`, `y` and `z`."

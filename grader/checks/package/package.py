@@ -11,6 +11,7 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Need, Submitted
+from grader.diagnosis.build_error import EMPTY_HINT
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_executable import why_no_executable, why_nothing_to_run
 from grader.diagnosis.not_built import (
@@ -28,7 +29,7 @@ from grader.spec.nearest_name import nearest
 from grader.submission.read.dependencies import meant
 from grader.submission.read.includes import CODE
 from grader.submission.read.reachable import only_for
-from grader.submission.record import Import, PackageRecord, SourceError, SubmissionRecord
+from grader.submission.record import EMPTY, Import, PackageRecord, SourceError, SubmissionRecord
 
 
 class OfPackage(Parameters):
@@ -210,7 +211,8 @@ def _why_unknown_imports(package: PackageRecord) -> Cause | None:
     for error in package.syntax_errors:
         if error.file not in read:
             seen = f"the imports cannot be read: {error}"
-            return Cause(seen, "Correct the syntax error first.", Evidence(places=(error,)))
+            hint = EMPTY_HINT if error.message == EMPTY else "Correct the syntax error first."
+            return Cause(seen, hint, Evidence(places=(error,)))
     return None
 
 

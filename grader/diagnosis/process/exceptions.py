@@ -12,14 +12,16 @@ from pydantic import Field
 from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
 from grader.diagnosis.process.failure import Failure, Frame
 from grader.diagnosis.process.raised import student_place
-from grader.findings.wording import code
+from grader.findings.wording import code, listing
 from grader.recording.model import Recording
 from grader.spec.source import Model, read_source
 from grader.submission.record import CPP, PYTHON, PackageRecord, SubmissionRecord
 
 _UNDEFINED = re.compile(r"name '(\w+)' is not defined")
+_NO_ATTRIBUTE = re.compile(r"'(\w+)' object has no attribute '\w+'")
 _NO_MODULE = re.compile(r"No module named '(\w+)'$")
 _NO_NAME = re.compile(r"cannot import name '(\w+)' from '([\w.]+)'")
+_MOST_FIELDS = 20
 _NO_FILE = re.compile(r"No such file or directory: '(.+)'$")
 
 
@@ -115,6 +117,18 @@ def imported_from_elsewhere(symptom: Raised) -> str | None:
     line = import_of(found[1]) if found else None
     package = line.split()[1].partition(".")[0] if line else ""
     return line and f"Write {code(line)}, and {code(f'<depend>{package}</depend>')} in package.xml."
+
+
+@explanation(Raised, only=PYTHON)
+def no_such_field(symptom: Raised) -> str | None:
+    """A field is read or set that the message does not have."""
+    found = _NO_ATTRIBUTE.match(symptom.failure.message)
+    ends = symptom.recording.declared("exiting")
+    fields = next((str(one.data["fields"]) for one in ends if "fields" in one.data), "")
+    named = [code(one) for one in fields.split() if one.isidentifier()]
+    if found is None or not named:
+        return None
+    return f"{code(found[1])} has the fields {listing(named[:_MOST_FIELDS])}."
 
 
 @explanation(Raised, only=PYTHON)

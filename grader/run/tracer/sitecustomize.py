@@ -41,10 +41,26 @@ _IMPORTED = 100_000
 
 
 def _exit() -> None:
-    """Report that Python ends in its usual way: by the program's end or an exception, no signal."""
-    report("exiting")
+    """Report that Python ends in its usual way: by the program's end or an exception, no signal.
+
+    Where it ends by a field that a message does not have, the fields that it has.
+    """
+    fields = quietly(_fields)
+    report("exiting", **({"fields": fields} if fields else {}))
     if "rosgrade_rclpy" in sys.modules:
         quietly(sys.modules["rosgrade_rclpy"].flush)
+
+
+def _fields() -> str | None:
+    """Fields of the message whose attribute was missing; None where no such error ended it."""
+    error = getattr(sys, "last_value", None)
+    if not isinstance(error, AttributeError):
+        return None
+    # "'Vector3' object has no attribute 'w'": an error of an assignment does not have the object.
+    name = str(error).split("'")[1]
+    modules = [module for path, module in sys.modules.items() if path.endswith(".msg")]
+    kind = next(getattr(module, name) for module in modules if hasattr(module, name))
+    return " ".join(kind.get_fields_and_field_types())
 
 
 def _count_more_cpus() -> None:
