@@ -17,11 +17,15 @@ from grader.measure.compatibility import compatibility_table, refusals, sides
 from grader.measure.declarations import was_held_up
 from grader.recording.model import NS, Endpoint, Kind, Owner, Qos, Recording
 from grader.spec.unit import format_duration
+from grader.submission.record import CPP
 
 ENDED_HINT = (
     "Publish in every call of the callback. Look for a counter or a condition that ends it, for "
     "timer.cancel() and timer.reset(), and for a callback that does not return."
 )
+
+# As rclcpp_lifecycle logs it, with the topic in quotes.
+_INACTIVE = "but the publisher is not activated"
 
 
 @dataclass(frozen=True)
@@ -171,6 +175,21 @@ def why_unreadable(recording: Recording, topic: str) -> Cause | None:
         Evidence(
             moments=endpoints_seen(recording, recording.student_endpoints(Kind.PUBLISHER, topic))
         ),
+    )
+
+
+@explanation(NoMessages, only=CPP)
+def not_activated(symptom: NoMessages) -> Cause | None:
+    """The publisher of a lifecycle node was never activated, as the log says."""
+    lines = [line.text for line in symptom.recording.log if _INACTIVE in line.text]
+    said = tuple(line for line in lines if f"'{symptom.topic}'" in line)
+    if not said:
+        return None
+    return Cause(
+        f"{symptom.seen}: the log says that its publisher is not activated",
+        "In on_activate() of the node call LifecycleNode::on_activate(state), which activates all "
+        "of its publishers, or publisher_->on_activate().",
+        Evidence(moments=symptom.moments, log=said[:1]),
     )
 
 

@@ -148,3 +148,11 @@ class TestNotAnswered:
     def test_a_slow_timer_is_not_blamed_for_an_answer(self):
         run = asked(listener(), times_s=every(0.3, 5), declarations=declarations(timer_s=300.0))
         assert "timer" not in why(run)
+
+
+def test_a_publisher_that_was_not_activated_is_not_called_destroyed():
+    said = "Trying to publish message on the topic '/cmd_vel', but the publisher is not activated"
+    gone = replace(endpoint(), vanished_ns=recording().launched_ns + 900_000_000)
+    found = why(recording(messages={}, endpoints=(gone, reader()), log=output(said)))
+    assert "the log says that its publisher is not activated" in found
+    assert "LifecycleNode::on_activate(state)" in found

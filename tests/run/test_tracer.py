@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from grader.run.environment import TRACER
 
 _PROGRAM = """
@@ -51,6 +53,13 @@ def test_a_program_that_closes_all_descriptors_and_its_child_are_still_heard() -
     kinds = [line["kind"] for line in lines]
     assert kinds == ["started", "started", "exiting", "exiting"]
     assert lines[0]["pid"] == lines[3]["pid"] != lines[1]["pid"] == lines[2]["pid"]
+
+
+@pytest.mark.ros
+def test_a_program_that_ends_by_a_missing_field_tells_those_that_are_there() -> None:
+    program = "from geometry_msgs.msg import Vector3; Vector3().w = 1.0"
+    told = run_traced(program, status=1).splitlines()
+    assert json.loads(told[-1])["fields"] == "x y z"
 
 
 _IMPORTS = """
@@ -105,8 +114,8 @@ def test_what_the_code_itself_imports_is_declared_where_it_needs_it(tmp_path: Pa
     assert found == [("other", 3), ("one", 4), ("two", 5), ("three", 6), ("four", 7)]
 
 
-def run_traced(program: str, *paths: Path) -> str:
-    """The declarations of a traced program, a file or its text, which must end well."""
+def run_traced(program: str, *paths: Path, status: int = 0) -> str:
+    """The declarations of a traced program, a file or its text, which ends with a status."""
     read, write = os.pipe()
     environment = {
         **os.environ,
@@ -123,6 +132,6 @@ def run_traced(program: str, *paths: Path) -> str:
         check=False,
     )
     os.close(write)
-    assert not done.returncode, done.stderr
+    assert done.returncode == status, done.stderr
     with os.fdopen(read, encoding="utf-8") as told:
         return told.read()
