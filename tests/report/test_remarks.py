@@ -59,7 +59,7 @@ def test_an_ordinary_run_is_not_worth_a_word() -> None:
         ),
         (
             {"environment": {"unlisted": "scipy", "sandbox": "bwrap (userns)"}},
-            "the code imports `scipy`, and a sourced ROS finds more",
+            "the code imports `scipy`, found in the system's Python, as ROS is sourced",
             "what the assignment allows",
         ),
         (

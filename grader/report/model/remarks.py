@@ -73,8 +73,8 @@ def _tricks(recording: Recording) -> Iterator[str]:
     modules = recording.environment.get("unlisted", "").split()
     if modules:
         has_none = recording.environment.get("sandbox", "none") == "none"
-        why = "this run had no sandbox" if has_none else "a sourced ROS finds more"
+        here = "without a sandbox" if has_none else "in the system's Python, as ROS is sourced"
         yield (
-            f"the code imports {codes(modules)}, and {why}: elsewhere, Python has only "
+            f"the code imports {codes(modules)}, found {here}: elsewhere, Python has only "
             "the standard library, ROS 2, `numpy`, and what the assignment allows"
         )
