@@ -285,7 +285,7 @@ def _install_lock(venv: Path, lock_text: str) -> None:
             if seen % _TOLD_EACH == 0:
                 _say(f"{seen} of {count} packages are here")
         elif seen > _TOLD_EACH and line.startswith("Installing collected packages"):
-            _say(f"{seen} of {count} packages are here and being unpacked (a minute or less)")
+            _say(f"{seen} of {count} packages are here and being unpacked")
 
     _say(f"fetching {count} packages")
     for stage, tools in enumerate((True, False)):
