@@ -8,7 +8,7 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -39,9 +39,13 @@ from grader.cli.options import (
     file_option,
 )
 from grader.cli.screen.console import open_page, output_console, say
-from grader.cli.screen.progress import Progress
+from grader.cli.screen.progress import Progress, syntax_errors
 from grader.resources import cache_folder
 from grader.sandbox.choice import Choice
+
+if TYPE_CHECKING:
+    from grader.recording.model import Recording
+    from grader.submission.record import SubmissionRecord
 
 FULL_POINTS, POINTS_LOST, NOT_GRADED = 0, 1, 3
 
@@ -118,7 +122,12 @@ def check(
             check_path(submission)
             check_folder(report)
             claim(report, keep=keep)
-            grading = Grading(loaded, runner, cache_folder(), seed=seed)
+
+            def tell(record: SubmissionRecord, _: Mapping[str, Recording]) -> None:
+                for text in syntax_errors(record, submission):
+                    progress.tell(text)
+
+            grading = Grading(loaded, runner, cache_folder(), seed=seed, on_recorded=tell)
             with progress.shown():
                 graded = grading.grade(
                     submission,

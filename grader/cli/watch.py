@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -28,9 +28,8 @@ from grader.cli.options import (
     chosen_sandbox,
 )
 from grader.cli.screen.console import open_page, output_console, print_error, say
-from grader.cli.screen.progress import Progress
+from grader.cli.screen.progress import Progress, syntax_errors
 from grader.resources import cache_folder
-from grader.safe_text import one_line
 from grader.sandbox.choice import Choice
 
 if TYPE_CHECKING:
@@ -45,7 +44,7 @@ if TYPE_CHECKING:
     from grader.report.model.result_model import Result
     from grader.run.runner import Runner
     from grader.server.watch import ReportPage
-    from grader.submission.record import SourceError, SubmissionRecord
+    from grader.submission.record import SubmissionRecord
 
 
 def watch(
@@ -173,11 +172,12 @@ class _Work:
         from grader.grade.early import judge_early
         from grader.report.text.last_save import early_line
 
-        known: list[str] = []
-        if record.build is None:
-            errors = (error for package in record.packages for error in package.syntax_errors)
-            known += (f"{error}{self._line(error)}" for error in errors)
-        elif self.before is not None and len(recordings) < len(self.loaded.assignment.scenarios):
+        known = syntax_errors(record, self.submission)
+        if (
+            record.build
+            and self.before is not None
+            and len(recordings) < len(self.loaded.assignment.scenarios)
+        ):
             failed = {check.id for check in self.before.of(Status.FAILED)}
             judged = judge_early(self.loaded, record, recordings, failed)
             known += map(early_line, judged)
@@ -185,13 +185,6 @@ class _Work:
             if text not in self.page.state.early:
                 self.progress.tell(text)
                 self.page.show(early=(*self.page.state.early, text))
-
-    def _line(self, error: SourceError) -> str:
-        """The line of a file that an error is in, where it is there to be read."""
-        with suppress(OSError, IndexError):
-            lines = (self.submission / error.file).read_text("utf-8", "replace").splitlines()
-            return f": {one_line(lines[error.line - 1])}" if error.line else ""
-        return ""
 
     def amended(self, result: Result) -> Result:
         """A result with earlier attempts, and hints that are counted if the author wants it."""

@@ -8,20 +8,15 @@ from dataclasses import dataclass, replace
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_endpoint import Word, offered
-from grader.diagnosis.process.blocked_executor import HINT, why_never_spun
+from grader.diagnosis.process.blocked_executor import HINT, at_its_place, why_never_spun
 from grader.diagnosis.process.process_exit import ended_early, exited, why_it_exited
-from grader.diagnosis.process.raised import (
-    in_brackets,
-    interrupted_place,
-    parse_failures,
-    student_place,
-)
+from grader.diagnosis.process.raised import in_brackets, own_frames, parse_failures, raised_at
+from grader.diagnosis.process.standing import Stand, where_it_stands
 from grader.findings.finding import Evidence, Moment
 from grader.measure import declarations
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
 from grader.spec.unit import format_duration
-from grader.submission.record import SourceError
 
 _LOG_LINES = 10
 _ROUNDING_S = 1e-6
@@ -69,17 +64,17 @@ class NoAnswer(Symptom[Cause], concept="executors"):
         return answered if calls else None
 
     @property
-    def place(self) -> SourceError | None:
-        """Where the process was when it was interrupted."""
+    def stand(self) -> Stand | None:
+        """Where the process did not go on."""
         process = self.process
-        return interrupted_place(self.recording, process.name) if process else None
+        return where_it_stands(self.recording, process.name) if process else None
 
-    @property
-    def evidence(self) -> Evidence:
-        """When it was asked, and the place."""
+    def placed(self, cause: Cause) -> Cause:
+        """A cause with the time of the call, and with where the process did not go on."""
         when_s = self.recording.since_launch_s(self.asked_ns)
-        moment = Moment("call, not answered in time", when_s)
-        return Evidence(moments=(moment,), places=(self.place,) if self.place else ())
+        evidence = Evidence(moments=(Moment("call, not answered in time", when_s),))
+        cause, stand = replace(cause, evidence=evidence), self.stand
+        return cause if stand is None else at_its_place(cause, self.what, stand)
 
 
 def why_late(
@@ -160,20 +155,19 @@ def blocked_executor(symptom: NoAnswer) -> Cause | None:
             f"{HINT} A call() to another service waits for an answer that the same executor must "
             "receive: use call_async().",
         )
-    observed = f"{blocked.observed if blocked else ''}{in_brackets(symptom.place)}"
-    return blocked and replace(blocked, observed=observed, evidence=symptom.evidence)
+    return blocked and symptom.placed(blocked)
 
 
 @explanation(NoAnswer, general=True)
 def callback_does_not_answer(symptom: NoAnswer) -> Cause:
     """The callback does not finish, or waits for another callback of its group."""
     spins = ", although the node's executor spins" if symptom.spins else ""
-    return Cause(
-        f"{symptom.what}{in_brackets(symptom.place)}{spins}",
-        "Does the callback reach its end and return the response? A callback that waits for "
-        "another callback of the same callback group waits for ever. Keep the server as long as "
-        "the program runs.",
-        symptom.evidence,
+    return symptom.placed(
+        Cause(
+            f"{symptom.what}{spins}",
+            "Does the callback reach its end and return the response? A callback that waits for "
+            "another callback of the same callback group waits for ever.",
+        )
     )
 
 
@@ -223,7 +217,7 @@ def why_raised(
         raised = next((item for item in reversed(failures) if not item.ignored), None)
         if raised is None:
             continue
-        place = student_place(raised, recording.submission)
+        place = raised_at(raised, recording)
         return Cause(
             f"{what}: an exception was raised meanwhile, {raised}{in_brackets(place)}",
             "Correct the line that is named here."
@@ -232,7 +226,9 @@ def why_raised(
             Evidence(
                 moments=(Moment("the exception", recording.since_launch_s(lines[-1].time_ns)),),
                 places=(place,) if place else (),
-                log=tuple(line.text for line in lines[-_LOG_LINES:]),
+                log=tuple(
+                    own_frames([line.text for line in lines], recording.submission)[-_LOG_LINES:]
+                ),
             ),
         )
     return None

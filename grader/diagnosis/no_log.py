@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
@@ -11,6 +13,8 @@ from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_messages import why_not_delivered
 from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spun, why_slow
 from grader.diagnosis.process.process_exit import why_ended
+from grader.diagnosis.process.raised import defined_at
+from grader.diagnosis.wrong_value import factor_words
 from grader.findings.finding import Evidence, Moment
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.wording import code, counted, listing
@@ -28,8 +32,11 @@ from grader.measure.printed import (
 )
 from grader.recording.model import NS, Endpoint, Kind, LogLine, Recording
 from grader.spec.unit import format_duration
+from grader.submission.record import SourceError
 
 _LOG_LINES = 5
+# Messages that show the same: a single number may be like another by chance.
+_ALIKE = 2
 # Share of the time that the host may take before a missing line proves nothing.
 _STARVED = 0.5
 # What a subscription must request for the messages from before it was there.
@@ -82,11 +89,22 @@ class NotLogged(Symptom[Cause]):
         lines = output_lines(self.recording)
         return [line for line in lines if begin_ns <= line.time_ns <= end_ns]
 
+    @property
+    def places(self) -> tuple[SourceError, ...]:
+        """The callbacks that get the messages."""
+        declared = self.recording.declared("subscription")
+        names = {
+            str(one.data.get("callback")) for one in declared if one.data.get("topic") == self.topic
+        }
+        message = f"messages on {code(self.topic)} come here"
+        found = (defined_at(name, message, self.recording.submission) for name in sorted(names))
+        return tuple(filter(None, found))
+
     def evidence(self, line: LogLine) -> Evidence:
         """A line with other values, and others near the messages."""
         moment = Moment("other values logged", self.recording.since_launch_s(line.time_ns))
         log = [one.text for one in self.near if one != line][: _LOG_LINES - 1]
-        return Evidence(moments=(moment,), log=(*log, line.text))
+        return Evidence(moments=(moment,), places=self.places, log=(*log, line.text))
 
 
 def why_not_logged(
@@ -250,6 +268,30 @@ def no_f_string(symptom: NotLogged) -> Cause | None:
 
 
 @explanation(NotLogged)
+def wrong_sign_or_unit(symptom: NotLogged) -> Cause | None:
+    """The lines show a value 10, 100 or 1000 times too large, in degrees, or with a wrong sign."""
+    found: list[tuple[str, str, LogLine]] = []
+    for item in symptom.wanted:
+        end_ns = item.due_ns + symptom.within_ns
+        lines = [one for one in symptom.near if item.message.stamp_ns <= one.time_ns <= end_ns]
+        for line, path in product(lines[:_LOG_LINES], item.values):
+            factors = (factor_words(n, item.values[path]) for n in numbers(line.text))
+            found += [(path, one, line) for one in factors if one]
+    counts = Counter((path, words) for path, words, _ in found)
+    (path, words), number = max(counts.items(), key=lambda one: one[1], default=(("", ""), 0))
+    if number < max(_ALIKE, symptom.needed):
+        return None
+    line = next(one[2] for one in found if one[:2] == (path, words))
+    return Cause(
+        f"log lines follow messages on {code(symptom.topic)}, but {code(path)} in them {words}: "
+        f"{quote(line.text)}",
+        f"Log the value as it is in the message: {code(f'msg.{path}')} is in metres, radians and "
+        "seconds (REP-103).",
+        symptom.evidence(line),
+    )
+
+
+@explanation(NotLogged)
 def other_values(symptom: NotLogged) -> Cause | None:
     """The lines show other values: another field, exchanged names, an older message."""
     line, item, decimals = _meant(symptom), symptom.wanted[-1], symptom.decimals
@@ -266,8 +308,7 @@ def other_values(symptom: NotLogged) -> Cause | None:
     return Cause(
         f"log lines follow messages on {code(symptom.topic)}, but none shows {values}: "
         f"{quote(line.text)}{how}",
-        f"Log the fields of the message that the callback is given: {fields}. A callback must "
-        "return at once: after time.sleep() or a loop it gets old messages.",
+        f"Log the fields of the message that the callback is given: {fields}.",
         symptom.evidence(line),
     )
 
@@ -285,6 +326,7 @@ def nothing_logged(symptom: NotLogged) -> Cause:
         "messages out.",
         Evidence(
             moments=first_seen(recording, recording.carried(topic)),
+            places=symptom.places,
             log=tuple(line.text for line in lines[:_LOG_LINES]),
         ),
     )

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.not_built import why_not_built
+from grader.diagnosis.process.blocked_executor import at_its_place
 from grader.diagnosis.process.process_exit import why_crashed, why_ended
-from grader.diagnosis.process.raised import in_brackets, interrupted_place
+from grader.diagnosis.process.standing import where_it_stands
 from grader.diagnosis.undeclared import why_never_appeared
 from grader.findings.finding import Evidence
 from grader.findings.first_seen import nodes_seen, until_the_end
@@ -150,24 +151,24 @@ def never_appeared(symptom: NoNode) -> Cause | None:
 def main_does_not_come_to_it(symptom: NoNode) -> Cause:
     """main() creates no node: a loop, time.sleep() or input() comes before it."""
     recording, name = symptom.recording, symptom.process.name
-    place = interrupted_place(recording, name)
+    stand = where_it_stands(recording, name)
     done = "created no node"
     if symptom.declares("init"):
         done = "called rclpy.init() but created no node"
     elif declarations.traced(recording, name):
         done = "never called rclpy.init()"
     lines = tuple(line.text for line in recording.log if line.process == name)
-    return Cause(
-        f"the process {code(name)} ran until the end, but {done}{in_brackets(place)}",
+    cause = Cause(
+        f"the process {code(name)} ran until the end, but {done}",
         "main() must call rclpy.init() and create the node right after it. Look for a loop, "
         "time.sleep() or input() before that, also at the top level of a module: a launched node "
         "has no keyboard.",
         Evidence(
             moments=(until_the_end(recording, "still no node when the observation ended"),),
-            places=(place,) if place else (),
             log=lines[-_LOG_LINES:],
         ),
     )
+    return cause if stand is None else at_its_place(cause, cause.observed, stand)
 
 
 @explanation(OtherNode)

@@ -15,15 +15,21 @@ from grader.diagnosis.no_messages import (
     seconds_hint,
     why_not_delivered,
 )
-from grader.diagnosis.process.blocked_executor import left_s, why_blocked, why_never_spun
-from grader.diagnosis.process.raised import interrupted_place
+from grader.diagnosis.process.blocked_executor import (
+    at_its_place,
+    left_s,
+    why_blocked,
+    why_never_spun,
+)
+from grader.diagnosis.process.raised import defined_at
+from grader.diagnosis.process.standing import where_it_stands
 from grader.findings.finding import Evidence, Moment
 from grader.findings.first_seen import until_the_end
 from grader.findings.wording import code, counted, listing
 from grader.measure import declarations
+from grader.measure.declarations import is_compiled
 from grader.recording.model import NS, Kind, Recording
 from grader.spec.unit import format_duration
-from grader.submission.record import SourceError
 
 _LOG_LINES = 5
 # Share of the observation that the host may take before a missing message proves nothing.
@@ -69,6 +75,29 @@ def no_cpu_time(symptom: NoMessages) -> Cause | None:
     return Cause.held_up(symptom.seen, symptom.stolen_s)
 
 
+@explanation(NoMessages)
+def publish_never_called(symptom: NoMessages) -> Cause | None:
+    """No line of the program calls publish()."""
+    sources = [file for one in symptom.recording.submission.packages for file in one.sources]
+    of_python = not any(
+        is_compiled(symptom.recording, one.name) for one in symptom.recording.processes
+    )
+    if not sources or not of_python or any("publish" in file.uses for file in sources):
+        return None
+    # Older records do not tell what a file uses.
+    if not any(file.uses for file in sources):
+        return None
+    names = [timer.callback for timer in declarations.timers(symptom.recording)][:1]
+    message = "this is called, and should publish"
+    places = (defined_at(name, message, symptom.recording.submission) for name in names)
+    return Cause(
+        f"{symptom.seen}: no line of the program calls publish()",
+        "A message is sent only by publish(msg) of the publisher: call it after the message is "
+        "filled. Logging a message does not send it.",
+        Evidence(moments=symptom.moments, places=tuple(filter(None, places))),
+    )
+
+
 @explanation(NoMessages, FewMessages, concept="executors")
 def never_spun(symptom: OnTopic) -> Cause | None:
     """rclpy.spin() is never called, or the node is not given to the executor that spins."""
@@ -98,14 +127,16 @@ def no_answer(symptom: NoMessages) -> Cause | None:
     seen = (
         f"{symptom.seen}, although {counted(len(sent), 'message')} on {code(name)} reached the node"
     )
-    return why_raised(recording, seen, sent[0].stamp_ns) or Cause(
-        seen,
-        "Is publish(msg) reached in the subscription's callback? An `except: pass` hides errors. A "
-        "lock or a loop that never ends stops the callback before publish(msg). A callback that "
-        "begins with `async def` must await the coroutines that it calls.",
-        Evidence(
-            moments=(Moment(f"sent on {name}", recording.since_launch_s(sent[0].stamp_ns)),),
-            places=_interrupted(recording),
+    return why_raised(recording, seen, sent[0].stamp_ns) or _where_it_stands(
+        recording,
+        Cause(
+            seen,
+            "Is publish(msg) reached in the subscription's callback? Look for an `if` or a "
+            "`return` before it. An `except: pass` hides errors. Log a line right before "
+            "publish(msg) to see.",
+            Evidence(
+                moments=(Moment(f"sent on {name}", recording.since_launch_s(sent[0].stamp_ns)),)
+            ),
         ),
     )
 
@@ -117,12 +148,14 @@ def no_timer(symptom: NoMessages) -> Cause | None:
     traced, timer = declarations.traced(recording), declarations.declares(recording, "timer")
     if not traced or timer or _heard(recording, symptom.topic):
         return None
-    return Cause(
-        f"{_idle(symptom)}, and the process declared no timer that would call publish()",
-        "Is publish(msg) reached? Look for a condition before it, and for a loop that waits "
-        "for something that never comes, such as a subscription. A callback is called only by a "
-        "timer or a subscription: self.create_timer(period_in_seconds, self.callback).",
-        _idle_evidence(symptom),
+    return _where_it_stands(
+        recording,
+        Cause(
+            f"{_idle(symptom)}, and the process declared no timer that would call publish()",
+            "Is publish(msg) reached? Look for a condition before it, and whether anything calls "
+            "the function that it stands in: a method runs only if it is called.",
+            _idle_evidence(symptom),
+        ),
     )
 
 
@@ -137,14 +170,15 @@ def publish_not_reached(symptom: NoMessages) -> Cause:
         although = f", although {heard} reached the node"
     elif periods and declarations.declares(recording, "spin"):
         although = f", although the process declared a timer of {listing(periods)}"
-    return Cause(
-        _idle(symptom) + although,
-        "Is publish(msg) reached in the callback? Look for a condition or a `return` before it, "
-        "for an `except: pass` that hides an error, for timer.cancel() and timer.reset(), for a "
-        "timer that is destroyed, and for "
-        "a lambda without brackets after the method's name. Printing or logging a message does "
-        "not send it. With use_sim_time a timer waits for a simulator that publishes /clock.",
-        _idle_evidence(symptom),
+    return _where_it_stands(
+        recording,
+        Cause(
+            _idle(symptom) + although,
+            "Is publish(msg) reached in the callback? Look for an `if` or a `return` before it. An "
+            "`except: pass` hides errors. Log a line at the beginning of the callback, and one "
+            "right before publish(msg): what is not logged is not reached.",
+            _idle_evidence(symptom),
+        ),
     )
 
 
@@ -185,7 +219,6 @@ def _idle_evidence(symptom: NoMessages) -> Evidence:
             *symptom.moments,
             until_the_end(recording, "still no message when the observation ended"),
         ),
-        places=_interrupted(recording),
         log=tuple(complaints[-_LOG_LINES:]),
     )
 
@@ -211,6 +244,8 @@ def _heard(recording: Recording, topic: str) -> str:
     )
 
 
-def _interrupted(recording: Recording) -> tuple[SourceError, ...]:
-    places = (interrupted_place(recording, process.name) for process in recording.processes)
-    return tuple(place for place in places if place)
+def _where_it_stands(recording: Recording, cause: Cause) -> Cause:
+    """A cause with the line at which a process did not go on, if one did not."""
+    stands = (where_it_stands(recording, process.name) for process in recording.processes)
+    stand = next(filter(None, stands), None)
+    return cause if stand is None else at_its_place(cause, cause.observed, stand)

@@ -12,14 +12,19 @@ from grader.diagnosis.explanation import Symptom, explanation
 from grader.diagnosis.no_messages import seconds_hint
 from grader.diagnosis.process.blocked_executor import left_s
 from grader.diagnosis.process.process_exit import why_ended
+from grader.diagnosis.process.standing import slow_callback
 from grader.findings.finding import Evidence, Moment
-from grader.findings.wording import counted
+from grader.findings.wording import counted, listing
 from grader.measure import declarations
 from grader.measure.period import Interval, PeriodLimits, PeriodVerdict
 from grader.recording.model import NS, Kind, Recording
 from grader.spec.unit import format_duration
 
 _SAME = 0.05
+# Share of the period from which on a call of a callback is what makes the next one late.
+_LONG = 0.5
+# How far intervals may be off a multiple of a timer's period, as a share of that.
+_OFF = 0.2
 _POWERS = (1e-6, 1e-3, 0.01, 0.1, 10.0, 100.0, 1e3, 1e6)
 _TIMES = range(2, 6)
 _TIMES_TOLERANCE = 0.08
@@ -73,6 +78,37 @@ def several_in_each_period(symptom: WrongRhythm) -> Cause | None:
         return Cause(words, seconds_hint(symptom.limits.period_s))
     several = f", and the process declared {len(symptom.timers_s)} timers"
     return Cause(words + (several if len(symptom.timers_s) > 1 else ""), _ONCE)
+
+
+@explanation(WrongRhythm, concept="executors")
+def slow_call(symptom: WrongRhythm) -> Cause | None:
+    """A callback sleeps or works for long, so the timer has to wait for it."""
+    stand, period_s = slow_callback(symptom.recording), symptom.limits.period_s
+    is_late = symptom.verdict.median_s > period_s or not symptom.verdict.regular
+    if stand is None or not is_late or (stand.lasted_s or 0.0) < _LONG * period_s:
+        return None
+    return Cause(stand.words, stand.hint, Evidence(places=(stand.place,)))
+
+
+@explanation(WrongRhythm)
+def condition_in_a_faster_timer(symptom: WrongRhythm) -> Cause | None:
+    """A timer is faster, and a condition in its callback lets only every n-th call publish."""
+    wanted_s = symptom.limits.period_s
+    for timer_s in symptom.timers_s:
+        calls = [round(one.seconds / timer_s) for one in symptom.measured]
+        off_s = max(
+            abs(one.seconds - n * timer_s) for one, n in zip(symptom.measured, calls, strict=True)
+        )
+        if 2.0 * timer_s <= wanted_s and min(calls) > 1 and off_s <= _OFF * timer_s:
+            some = listing(map(str, sorted(set(calls))), "or")
+            return Cause(
+                f"the process declared a timer of {format_duration(timer_s)}, and publishes in "
+                f"one of {some} calls",
+                f"Give the timer the period itself, self.create_timer({wanted_s:g}, ...), and "
+                "publish in every call. A condition on the time is true only when the timer calls "
+                "next, so it comes late.",
+            )
+    return None
 
 
 @explanation(WrongRhythm)

@@ -109,10 +109,18 @@ def in_another_field(symptom: WrongValue) -> str | None:
 @explanation(WrongValue)
 def wrong_sign_or_unit(symptom: WrongValue) -> str | None:
     """The sign is wrong, the value is 10, 100 or 1000 times too large, or it is in degrees."""
-    for one, (factor, words) in product(symptom.wanted, _FACTORS.items()):
-        if math.isclose(one.observed, factor * one.expected, rel_tol=_FACTOR_TOLERANCE):
+    for one in symptom.wanted:
+        if words := factor_words(one.observed, one.expected):
             return f"{one.field} {words}"
     return None
+
+
+def factor_words(observed: float, expected: float) -> str:
+    """How a number differs from another, such as ``is 100 times too large``; or nothing."""
+    for factor, words in _FACTORS.items():
+        if expected and math.isclose(observed, factor * expected, rel_tol=_FACTOR_TOLERANCE):
+            return words
+    return ""
 
 
 def was_integer(number: Any) -> bool:

@@ -12,7 +12,7 @@ from itertools import islice
 from grader.checks.check import Parameters
 from grader.diagnosis.process.raised import submission_path
 from grader.findings.finding import Finding
-from grader.recording.model import Recording
+from grader.recording.model import Declaration, Recording
 from grader.submission.record import SourceError
 
 _MOST = 3
@@ -29,7 +29,9 @@ def with_origins(finding: Finding, parameters: Parameters, recording: Recording)
     """
     if finding.evidence.places:
         return finding
-    places = dict.fromkeys(_places(finding.observed, parameters, recording))
+    seen = finding.observed
+    set_here = _fields_set(seen, recording) if "published" in parameters.about else ()
+    places = dict.fromkeys((*set_here, *_places(seen, parameters, recording)))
     evidence = replace(finding.evidence, origins=tuple(islice(places, _MOST)))
     return replace(finding, evidence=evidence)
 
@@ -48,14 +50,32 @@ def _places(seen: str, parameters: Parameters, recording: Recording) -> Iterator
     timers = declared.pop("timer", ())
     found = [
         one
-        for kind, items in declared.items()
+        for items in declared.values()
         for one in items
-        if (name := str(one.data.get(_NAMES.get(kind, "topic")))) in named or f"`{name}`" in seen
+        if (name := _name(one)) in named or f"`{name}`" in seen
     ]
+    # What was observed, and only without that what was asked for.
+    found = [one for one in found if f"`{_name(one)}`" in seen] or found
     nodes = {one.data.get("node") for one in found}
     for one in [*(one for one in timers if not nodes or one.data.get("node") in nodes), *found]:
         path = submission_path(str(one.data.get("file")), recording.submission)
         if path and isinstance(line := one.data.get("line"), int):
-            name = str(one.data.get(_NAMES.get(one.kind, "topic")))[:_LONGEST_NAME]
             words = _WORDS.get(one.kind, f"the {one.kind} {{}} is created here")
-            yield SourceError(path, line, words.format(name))
+            yield SourceError(path, line, words.format(_name(one)[:_LONGEST_NAME]))
+
+
+def _name(one: Declaration) -> str:
+    return str(one.data.get(_NAMES.get(one.kind, "topic")))
+
+
+def _fields_set(seen: str, recording: Recording) -> Iterator[SourceError]:
+    """Where the program assigns to a field that the finding says has another value."""
+    for package in recording.submission.packages:
+        for file in package.sources:
+            for target, line in file.sets:
+                # `msg.linear.x` sets `linear.x`, and `self.msg.linear.x` too.
+                parts = target.split(".")
+                ends = (".".join(parts[n:]) for n in range(1, len(parts)))
+                field = next((one for one in ends if f" {one} = " in f" {seen}"), None)
+                if field:
+                    yield SourceError(file.path, line, f"{field} is set here")

@@ -119,6 +119,8 @@ class SourceFile:
         names: What imports and plain assignments name: local name -> dotted name.
         stars: Modules of ``from module import *``.
         prints: Lines with ``print`` to the console.
+        uses: Attributes that it reads, such as ``publish``, and strings that could name one.
+        sets: Attributes that it assigns to, as written: ``msg.linear.x``, each with its line.
     """
 
     path: str
@@ -129,6 +131,8 @@ class SourceFile:
     names: tuple[tuple[str, str], ...] = ()
     stars: tuple[str, ...] = ()
     prints: tuple[int, ...] = ()
+    uses: tuple[str, ...] = ()
+    sets: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from grader.diagnosis.process.raised import (
     fatal_failure,
-    interrupted_place,
+    interrupted_call,
     parse_failures,
     student_place,
     submission_path,
@@ -101,9 +101,9 @@ def test_a_traceback_that_was_cut_off_is_none():
 def test_where_it_was_interrupted():
     text = PLAIN.replace("ZeroDivisionError: division by zero", "KeyboardInterrupt")
     text = text.replace("return 1 / 0", "time.sleep(1)")
-    place = interrupted_place(recording(log=output(text)), BOT)
-    assert (place.file, place.line) == (SOURCE, 14)
-    assert place.message.endswith("time.sleep(1)")
+    call = interrupted_call(recording(log=output(text)), BOT)
+    assert (call.place.file, call.place.line) == (SOURCE, 14)
+    assert call.text == "time.sleep(1)"
 
 
 class TestSubmissionPath:

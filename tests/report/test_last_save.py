@@ -17,19 +17,22 @@ def result(**says):
 def test_points_won_and_lost_are_named_with_their_checks():
     before, after = result(period=FAIL, timer=PASS), result(period=PASS, timer=FAIL)
     assert what_changed(before, after) == (
-        "period: failed → passed, +1.5; timer: passed → failed, −1.5"
+        "“Title of timer”: passed → failed, −1.5; “Title of period”: failed → passed, +1.5"
     )
     assert what_changed(after, after) == "no check changed"
 
 
 def test_partial_credit_alone_is_a_change():
     before = result(period=replace(FAIL, credit=0.2))
-    assert what_changed(before, result(period=replace(FAIL, credit=0.4))) == "period: failed, +0.3"
+    assert (
+        what_changed(before, result(period=replace(FAIL, credit=0.4)))
+        == "“Title of period”: failed, +0.3"
+    )
 
 
 def test_what_could_not_be_judged_wins_and_loses_nothing():
     fault = result(period=Finding.error("a run", "the machine"))
-    assert what_changed(fault, result(period=PASS)) == "period: error → passed"
+    assert what_changed(fault, result(period=PASS)) == "“Title of period”: error → passed"
 
 
 def test_of_many_changes_the_largest_are_named():
@@ -48,6 +51,6 @@ def test_every_score_of_the_evening_has_a_bar():
 def test_what_failed_before_is_told_with_its_reason():
     grade = judged([Told("period", FAIL), Told("timer", PASS)])
     lines = [early_line(one) for one in grade.grade.results]
-    assert lines == ["period still fails: no node at all", "timer passes now"]
+    assert lines == ["“Title of period” still fails: no node at all", "“Title of timer” passes now"]
     assert failed_scenarios(grade.result) == {"listen"}
     assert failed_scenarios(result(timer=PASS)) == frozenset()

@@ -212,6 +212,10 @@ def test_a_blocked_executor_does_not_answer(run_node: RunNode) -> None:
     assert len(recording.on("/cmd_vel")) >= 20
     assert recording.calls and recording.calls[0].answered_ns is None
     assert not recording.declared("spin")
+    # The program tells where it stands.
+    stands = recording.declared("stands")[-1].data
+    assert (stands["function"], stands["loop_text"]) == ("__init__", "while True:")
+    assert not stands["in_callback"]
 
 
 def test_a_publisher_that_does_not_match_the_probe_is_recorded_all_the_same(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from statistics import median
 
 from pydantic import Field
@@ -13,9 +13,14 @@ from grader.checks.node.node import target_nodes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
-from grader.diagnosis.process.blocked_executor import left_s, why_never_spun
+from grader.diagnosis.process.blocked_executor import (
+    HINT,
+    at_its_place,
+    left_s,
+    why_never_spun,
+)
 from grader.diagnosis.process.process_exit import ended_early, why_ended, why_it_exited
-from grader.diagnosis.process.raised import interrupted_place
+from grader.diagnosis.process.standing import slow_callback, where_it_stands
 from grader.diagnosis.undeclared import why_undeclared
 from grader.findings.finding import Evidence, Finding, Moment, Plot
 from grader.findings.first_seen import first_seen, nodes_seen
@@ -179,12 +184,13 @@ def _why_mostly_late(
         if median(_own_s(recording, call) for call in group.judged) <= allowed_s:
             return Cause.to_repeat(f"{observed}, but the machine took the time from the process")
         late = [call for call in group.judged if _wait_s(recording, call) > allowed_s]
-        return Cause(
+        cause = Cause(
             f"{observed}: callbacks keep the executor busy most of the time",
-            "A callback does its work and returns at once: no time.sleep() in it. The timer calls "
-            "it again when its period is over.",
+            "A callback does its work and returns at once: no time.sleep() in it.",
             _evidence(recording, [_Answers(group.node, group.judged, late)]),
         )
+        stand = slow_callback(recording)
+        return cause if stand is None else at_its_place(cause, observed, stand)
     return None
 
 
@@ -202,16 +208,10 @@ def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> 
     never_spun = why_never_spun(recording, seen, (group.node,), processes)
     if never_spun is not None:
         return never_spun
-    place = interrupted_place(recording, process.name) if process is not None else None
-    where = f" ({place.file}:{place.line})" if place else ""
-    evidence = replace(evidence, places=(place,) if place else ())
-    return Cause(
-        f"{seen}: something blocks the executor{where}",
-        "A callback must return soon. Look for `while True`, time.sleep() or input() in a "
-        "callback, in the constructor or in a loop around spin_once(), and let a timer call again "
-        "instead.",
-        evidence,
-    )
+    name = process.name if process else None
+    stand = (name and where_it_stands(recording, name)) or slow_callback(recording, name)
+    cause = Cause(f"{seen}: something blocks the executor", HINT, evidence)
+    return cause if stand is None else at_its_place(cause, seen, stand)
 
 
 def _unasked(recording: Recording, names: list[str], parameters: Responsive) -> Finding | Cause:

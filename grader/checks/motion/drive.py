@@ -14,6 +14,7 @@ from grader.checks.motion.robot_check import RobotParameters, moved_in
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
+from grader.diagnosis.wrong_value import factor_words
 from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import until_the_end
 from grader.findings.wording import counted, percent
@@ -143,8 +144,9 @@ def _wrong_speed(
     if number:
         return f"the robot paused in between, {counted(number, 'time')}", _IN_BETWEEN_HINT
     if abs(command) > limit * 1.001 and abs(middle) > limit * 0.98:
+        times = factor_words(command, wanted)
         words = f"{speed(command)} was commanded, and the robot can do no more than {speed(limit)}"
-        return words, _FIELDS_HINT
+        return words + (f": the command {times}" if times else ""), _FIELDS_HINT
     pace = "slowly" if abs(middle) < abs(wanted) else "fast"
     words = f"it drives too {pace}" if middle * wanted >= 0.0 else "it drives the wrong way"
     slowest, fastest = min(s.linear_m_s for s in steps), max(s.linear_m_s for s in steps)

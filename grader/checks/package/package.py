@@ -236,6 +236,7 @@ def _missing(package: PackageRecord) -> Iterator[_Fault]:
     """The first import of each ROS package that is needed and not declared."""
     kinds = {item.name: item.kind for item in package.dependencies if item.kind not in _COUNTING}
     declared = {item.name for item in package.dependencies if item.kind in _COUNTING}
+    line = max((item.line or 0 for item in package.dependencies), default=0) or None
     needed: dict[str, Import] = {}
     for item in package.ros_imports:
         if item.optional or item.module in declared or item.module == package.name:
@@ -253,7 +254,7 @@ def _missing(package: PackageRecord) -> Iterator[_Fault]:
         yield (
             f"{item.file}:{item.line} {verb} {code(item.module)}{why}",
             "",
-            SourceError(item.file, item.line, f"{verb} {item.module}"),
+            SourceError(package.file("package.xml"), line, f"add {code(tag)} here"),
             (f"{participle} in {item.file}:{item.line}", tag),
         )
 

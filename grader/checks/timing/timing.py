@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from statistics import median
 
@@ -145,7 +146,7 @@ def period(recording: Recording, parameters: Period) -> Finding | Cause:
         )
     cause = cause_of(WrongRhythm(recording, parameters.topic, measured, verdict, limits))
     observed += f": {cause.observed}" if cause.observed else ""
-    return Cause(observed, cause.hint, evidence)
+    return Cause(observed, cause.hint, replace(evidence, places=cause.evidence.places))
 
 
 def _is_declared(recording: Recording, verdict: PeriodVerdict, limits: PeriodLimits) -> bool:

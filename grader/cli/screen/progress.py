@@ -6,7 +6,8 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from grader.findings.wording import counted
@@ -15,6 +16,8 @@ from grader.safe_text import one_line
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
     from rich.progress import TaskID
+
+    from grader.submission.record import SourceError, SubmissionRecord
 
 _LEAST_FOR_RATE = 3
 _DOING = {
@@ -162,6 +165,21 @@ class Progress:
             return ""
         each_s = (time.monotonic() - self._began_s) / self._fresh
         return f"{60 / each_s:.0f} a minute, {_span((self._total - self._count) * each_s)} left"
+
+
+def syntax_errors(record: SubmissionRecord, folder: Path) -> list[str]:
+    """The lines that Python cannot read, of a submission that is not built yet."""
+    packages = () if record.build else record.packages
+    errors = (error for package in packages for error in package.syntax_errors)
+    return [f"{error}{_line_of(error, folder)}" for error in errors]
+
+
+def _line_of(error: SourceError, folder: Path) -> str:
+    """The line of a file that an error is in, where it is there to be read."""
+    with suppress(OSError, IndexError):
+        lines = (folder / error.file).read_text("utf-8", "replace").splitlines()
+        return f": {one_line(lines[error.line - 1])}" if error.line else ""
+    return ""
 
 
 def _make_bars() -> Bars:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.process.blocked_executor import stuck_callback
+from grader.diagnosis.process.standing import stuck
+from grader.findings.finding import Evidence
 from grader.measure.motion.command import VelocityCommand, commands
 from grader.measure.motion.quantities import speed, turn
 from grader.measure.motion.scan import newest
@@ -59,10 +60,11 @@ def why_touched(recording: Recording) -> Cause | None:
     else:
         command = "although the last command was to stop: it came too late"
     reason = cause_of(Contact(recording, step, before))
+    evidence = evidence_at(recording, f"contact with {name}", step.time_ns, speed_plot(recording))
     return Cause(
         f"drove into {name} {motion}, {when_s:.2f} s after launch, {command}{reason.observed}",
         reason.hint,
-        evidence_at(recording, f"contact with {name}", step.time_ns, speed_plot(recording)),
+        replace(evidence, places=reason.evidence.places),
     )
 
 
@@ -97,14 +99,10 @@ def old_command(symptom: Contact) -> Cause | None:
 @explanation(Contact)
 def callback_in_a_loop(symptom: Contact) -> Cause | None:
     """A callback looped or slept and never saw a newer scan."""
-    place = stuck_callback(symptom.recording)
-    if place is None:
+    stand = stuck(symptom.recording)
+    if stand is None:
         return None
-    return Cause(
-        f"; a callback was at {place.file}:{place.line} when it was interrupted",
-        "A callback with a loop or a time.sleep() never sees a newer scan: the next scan waits "
-        "until it returns. Decide once for each scan, publish once and return.",
-    )
+    return Cause(f"; {stand.words}", stand.hint, Evidence(places=(stand.place,)))
 
 
 @explanation(Contact, general=True)

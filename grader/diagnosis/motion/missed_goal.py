@@ -9,7 +9,8 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.off_course import why_off_course
-from grader.diagnosis.process.blocked_executor import stuck_callback
+from grader.diagnosis.process.blocked_executor import at_its_place
+from grader.diagnosis.process.standing import stuck
 from grader.measure.motion.approach import WRAP_HINT, Approach, long_turns
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.quantities import metres, point, speed, turn
@@ -122,14 +123,8 @@ def wrong_place(symptom: GoalMissed) -> Cause | None:
 @explanation(GoalMissed, concept="executors")
 def loop_in_a_callback(symptom: GoalMissed) -> Cause | None:
     """A callback does not return: its loop never sees newer odometry."""
-    stuck = None if symptom.is_at_rest else stuck_callback(symptom.run.recording)
-    if stuck is None:
-        return None
-    return symptom.cause(
-        f": a callback was at {stuck.file}:{stuck.line} when it was interrupted",
-        "A loop in a callback never sees newer odometry: the next message waits until the "
-        "callback returns. Compute one command for each message, publish it and return.",
-    )
+    stand = None if symptom.is_at_rest else stuck(symptom.run.recording)
+    return None if stand is None else at_its_place(symptom.cause("", ""), symptom.seen, stand)
 
 
 @explanation(GoalMissed, concept="angles")

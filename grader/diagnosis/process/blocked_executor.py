@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.process.raised import in_brackets, interrupted_place
+from grader.diagnosis.process.standing import Stand, slow_callback, where_it_stands
 from grader.findings.finding import Evidence, Moment
 from grader.findings.first_seen import until_the_end
 from grader.findings.wording import codes
 from grader.measure import declarations
 from grader.recording.model import NS, Call, Process, Recording
 from grader.spec.unit import format_duration
-from grader.submission.record import SourceError
 
 # A call with less time for an answer than this may be unanswered for that reason.
 _ANSWER_S = 1.0
@@ -20,21 +20,14 @@ _ANSWER_S = 1.0
 _SLOW_S = 0.5
 
 HINT = (
-    "A callback must return soon. Look for `while True`, time.sleep() or input() in a callback, in "
-    "the constructor or in main(), for rclpy.spin() or rate.sleep() in a callback, for a client's "
-    "call() in a callback, and for a node that is not passed to rclpy.spin()."
+    "A callback must return soon, and main() must come to rclpy.spin(node). Look for a loop, a "
+    "sleep or a call that waits."
 )
 
 
 def left_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
     """Time without what the machine took of it."""
     return (end_ns - begin_ns) / NS - recording.stolen_s(begin_ns, end_ns)
-
-
-def stuck_callback(recording: Recording) -> SourceError | None:
-    """Where a callback was that did not return until it was interrupted; None without one."""
-    places = (interrupted_place(recording, it.name, in_callback=True) for it in recording.processes)
-    return next((place for place in places if place is not None), None)
 
 
 def why_not_called(recording: Recording, seen: str, nodes: Collection[str]) -> Cause | None:
@@ -63,18 +56,22 @@ def why_blocked(
     if call is None or any((one.answered_ns or 0) >= since_ns for one in calls):
         return None
     process = declarations.process_of(recording, min(nodes))
-    place = interrupted_place(recording, process.name) if process is not None else None
+    stand = where_it_stands(recording, process.name) if process is not None else None
     since_s = recording.since_launch_s(call.requested_ns)
-    return Cause(
-        f"{seen}: something blocks the executor{in_brackets(place)}; from {since_s:.2f} s "
-        "after launch on the node's parameter service does not answer either",
+    cause = Cause(
+        f"{seen}: something blocks the executor; from {since_s:.2f} s after launch on the node's "
+        "parameter service does not answer either",
         HINT,
-        Evidence(
-            moments=(Moment("first call that was not answered", since_s),),
-            places=(place,) if place else (),
-        ),
+        Evidence(moments=(Moment("first call that was not answered", since_s),)),
         concept="executors",
     )
+    return cause if stand is None else at_its_place(cause, seen, stand)
+
+
+def at_its_place(cause: Cause, seen: str, stand: Stand) -> Cause:
+    """A cause that names the line which keeps the program."""
+    evidence = replace(cause.evidence, places=(stand.place,))
+    return replace(cause, observed=f"{seen}: {stand.words}", hint=stand.hint, evidence=evidence)
 
 
 def why_slow(recording: Recording, seen: str, nodes: Collection[str]) -> Cause | None:
@@ -88,13 +85,15 @@ def why_slow(recording: Recording, seen: str, nodes: Collection[str]) -> Cause |
     if call is None or wait_s <= _SLOW_S:
         return None
     moment = Moment("call that waited", recording.since_launch_s(call.requested_ns))
-    return Cause(
+    stand = slow_callback(recording)
+    cause = Cause(
         f"{seen}: the callbacks keep each other waiting, and calls to the node's parameter "
         f"service waited {format_duration(wait_s)} or more",
         HINT,
         Evidence(moments=(moment,)),
         concept="executors",
     )
+    return cause if stand is None else at_its_place(cause, seen, stand)
 
 
 def why_never_spun(
@@ -124,17 +123,14 @@ def why_never_spun(
             Evidence(moments=(until_the_end(recording, "no executor had the node"),)),
             concept="executors",
         )
-    place = interrupted_place(recording, process.name)
-    where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
-    return Cause(
-        f"{seen}: rclpy.spin() was never called, so no callback runs{where}",
+    stand = where_it_stands(recording, process.name)
+    cause = Cause(
+        f"{seen}: rclpy.spin() was never called, so no callback runs",
         "Call rclpy.spin(node) in main(). Nothing before it may wait or loop for ever.",
-        Evidence(
-            moments=(until_the_end(recording, "rclpy.spin() was still not called"),),
-            places=(place,) if place else (),
-        ),
+        Evidence(moments=(until_the_end(recording, "rclpy.spin() was still not called"),)),
         concept="executors",
     )
+    return cause if stand is None else at_its_place(cause, seen, stand)
 
 
 def _calls(recording: Recording, nodes: Collection[str]) -> list[Call]:

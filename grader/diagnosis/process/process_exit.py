@@ -13,7 +13,7 @@ from grader.diagnosis.process.exceptions import Raised
 from grader.diagnosis.process.failure import Failure
 from grader.diagnosis.process.missing_library import lacking_package
 from grader.diagnosis.process.newer_names import newer_name
-from grader.diagnosis.process.raised import fatal_failure, in_brackets, student_place
+from grader.diagnosis.process.raised import fatal_failure, in_brackets, own_frames, raised_at
 from grader.findings.finding import Evidence, Moment
 from grader.findings.wording import code
 from grader.measure import declarations
@@ -161,7 +161,7 @@ class ProcessExit(Symptom[Cause], concept="nodes"):
     def place(self) -> SourceError | None:
         """The student's line that raised it."""
         failure = self.failure
-        return student_place(failure, self.recording.submission) if failure else None
+        return raised_at(failure, self.recording) if failure else None
 
     @property
     def returned(self) -> bool:
@@ -334,4 +334,4 @@ def _last_lines(recording: Recording, process: Process) -> tuple[str, ...]:
         # Where colcon's script loads the entry point, Python does not leave its own frames out.
         and '"<frozen importlib' not in line.text
     ]
-    return tuple(lines[-_LOG_LINES:])
+    return tuple(own_frames(lines, recording.submission)[-_LOG_LINES:])

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from grader.diagnosis.process.crash import parse_crashes
 from grader.diagnosis.process.failure import Failure, Frame
+from grader.findings.wording import code
 from grader.measure import declarations
 from grader.recording.model import Recording
 from grader.submission.record import SourceError, SubmissionRecord
@@ -19,6 +21,8 @@ _LINKS = (
 _IGNORED = "Exception ignored in"
 _FRAME = re.compile(r'\s+File "(?P<file>[^"]+)", line (?P<line>\d{1,7})(?:, in (?P<where>.+))?')
 _RAISED = re.compile(r"(?P<type>[A-Za-z_][A-Za-z0-9_.]{0,200})(?:: (?P<message>.*))?")
+_CALLED = re.compile(r"(\w+)\(\)")
+_NOT_CALLABLE = re.compile(r"'(\w+)' object is not callable")
 _INSTALL_FOLDERS = ("site-packages", "dist-packages")
 _OF_CPP = (".cpp", ".cc", ".cxx", ".c", ".hpp", ".hh", ".hxx", ".h")
 
@@ -89,16 +93,21 @@ def fatal_failure(recording: Recording, process: str) -> Failure | None:
     return found[first] if found else None
 
 
-def interrupted_place(
-    recording: Recording, process: str, *, in_callback: bool = False
-) -> SourceError | None:
-    """Where in the student's files a process was when SIGINT came, as its traceback tells.
+@dataclass(frozen=True)
+class Interrupted:
+    """A call of the student's that SIGINT interrupted, as its traceback tells."""
+
+    place: SourceError
+    function: str
+    text: str
+    in_callback: bool
+
+
+def interrupted_call(recording: Recording, process: str) -> Interrupted | None:
+    """Where in the student's files a process was when SIGINT came.
 
     A process that was in ``rclpy.spin`` was where it should be: that place is not returned,
     unless a callback spins.
-
-    Args:
-        in_callback: Only if rclpy had called it: a loop in main() is no callback.
     """
     found = [item for item in failures(recording, process) if item.type == "KeyboardInterrupt"]
     frame = _student_frame(found[-1], recording.submission) if found else None
@@ -106,11 +115,11 @@ def interrupted_place(
         return None
     callers = found[-1].frames[: found[-1].frames.index(frame)]
     is_called = any("/rclpy/" in caller.file for caller in callers)
-    if not is_called and (in_callback or "spin" in frame.source):
+    if not is_called and "spin" in frame.source:
         return None
     path = submission_path(frame.file, recording.submission) or frame.file
-    source = f": {frame.source}" if frame.source else ""
-    return SourceError(path, frame.line, f"the program was here when it was interrupted{source}")
+    message = f"{code(frame.where)} was here when it was stopped"
+    return Interrupted(SourceError(path, frame.line, message), frame.where, frame.source, is_called)
 
 
 def student_place(failure: Failure, submission: SubmissionRecord) -> SourceError | None:
@@ -120,6 +129,58 @@ def student_place(failure: Failure, submission: SubmissionRecord) -> SourceError
         return None
     path = submission_path(frame.file, submission) or frame.file
     return SourceError(path, frame.line, str(failure))
+
+
+def raised_at(failure: Failure, recording: Recording) -> SourceError | None:
+    """The student's line to correct: of what rclpy raised in spin(), that of the callback."""
+    submission, place = recording.submission, student_place(failure, recording.submission)
+    frame = _student_frame(failure, submission)
+    if frame is None or "spin" not in frame.source or frame is failure.frames[-1]:
+        return place
+    called = (
+        defined_at(name, str(failure), submission) for name in _CALLED.findall(failure.message)
+    )
+    if found := next(filter(None, called), None):
+        return found
+    # What is no function was given to a timer in place of one.
+    given = _NOT_CALLABLE.match(failure.message)
+    for timer in recording.declared("timer") if given else ():
+        path = submission_path(str(timer.data.get("file")), submission)
+        line = timer.data.get("line")
+        if given and timer.data.get("callback") == given[1] and path and isinstance(line, int):
+            return SourceError(path, line, str(failure))
+    return place
+
+
+def defined_at(name: str, message: str, submission: SubmissionRecord) -> SourceError | None:
+    """The line where the student's program defines a function or a method."""
+    last = name.rpartition(".")[2]
+    return next(
+        (
+            SourceError(file.path, one.line, message)
+            for package in submission.packages
+            for file in package.sources
+            for one in file.functions
+            if one.name.rpartition(".")[2] == last
+        ),
+        None,
+    )
+
+
+def own_frames(lines: Sequence[str], submission: SubmissionRecord) -> list[str]:
+    """Printed lines, of a traceback only the frames in the student's files, if it has any."""
+    kept: list[str] = []
+    in_foreign = has_own = False
+    for line in lines:
+        frame = _FRAME.fullmatch(line)
+        if frame:
+            own = submission_path(frame["file"], submission) is not None
+            in_foreign, has_own = not own, has_own or own
+        elif not line[:1].isspace():
+            in_foreign = False
+        if not in_foreign:
+            kept.append(line)
+    return kept if has_own else list(lines)
 
 
 def in_brackets(place: SourceError | None) -> str:

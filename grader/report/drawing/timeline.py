@@ -180,7 +180,9 @@ def _of_requests(recording: Recording) -> Iterator[Lane]:
 def _of_what_went_wrong(recording: Recording, moments_s: Sequence[float]) -> Iterator[Lane]:
     """Output with its errors, limits that were reached, and what findings point at."""
     lines = printed(recording)
-    bad = [entry.time_ns for entry in lines if _complains(entry)]
+    # How a right node words its end after Ctrl+C is up to it.
+    running = (entry for entry in lines if entry.time_ns <= recording.stop_ns)
+    bad = [entry.time_ns for entry in running if _complains(entry)]
     note = counted(len(lines), "line") + (f", {counted(len(bad), 'error')}" if bad else "")
     times_s = _since(recording, [entry.time_ns for entry in lines])
     yield Lane("output", note, ticks=times_s, crosses=_since(recording, bad))

@@ -16,7 +16,7 @@ from grader.report.model.excerpt import places
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
 from grader.report.text import additions, explanation
-from grader.report.text.words import STATUS, cut
+from grader.report.text.words import cut
 from grader.safe_text import clean, one_line
 
 # Within a word an underscore is no markup; names would be hard to read with it escaped.
@@ -114,7 +114,7 @@ def first_to_fix(result: Result) -> list[str]:
 def _table(result: Result) -> str:
     lines = ["| | check | points |", "| --- | --- | ---: |"]
     for check in result.checks:
-        words = STATUS[check.status]
+        words = explanation.status_words(check)
         title = prose(check.title, cell=True)
         lines.append(f"| {words.symbol} {words.word} | {title} | {explanation.points(check)} |")
     return "\n".join([*lines, ""])
@@ -138,5 +138,5 @@ def notes(result: Result) -> Iterator[str]:
 
 def _explanations(result: Result) -> Iterator[str]:
     for check in (*result.of(Status.FAILED), *result.of(Status.ERROR)):
-        yield f"### {STATUS[check.status].symbol} {prose(check.title)}\n"
+        yield f"### {explanation.status_words(check).symbol} {prose(explanation.heading(check))}\n"
         yield f"{explained(check, result)}\n"

@@ -12,7 +12,16 @@ from grader.report.model.excerpt import places as places_of
 from grader.report.model.mistakes import others, reasons
 from grader.report.model.result_model import CheckPart, FindingPart, Result
 from grader.report.text import additions
-from grader.report.text.words import ADVICE, counted_points, cut, number
+from grader.report.text.words import (
+    ADVICE,
+    NO_POINTS,
+    NOT_SO,
+    STATUS,
+    StatusWords,
+    counted_points,
+    cut,
+    number,
+)
 from grader.safe_text import clean, one_line
 from grader.submission.record import SourceError
 
@@ -110,6 +119,17 @@ def _lines(found: Sequence[tuple[str, str]]) -> tuple[str, ...]:
     return (*lines, f"{left_out} more: see the report") if left_out else tuple(lines)
 
 
+def heading(check: CheckPart) -> str:
+    """The title of a check, with what says that it is not so: ``Not yet: Messages arrive``."""
+    return f"{NOT_SO.get(check.status, '')}{check.title}"
+
+
+def status_words(check: CheckPart) -> StatusWords:
+    """The status of a check for people."""
+    mild = check.status is Status.FAILED and not check.max_points
+    return NO_POINTS if mild else STATUS[check.status]
+
+
 def points(check: CheckPart) -> str:
     """``1.02 / 3``; what could not be judged has a question mark."""
     earned = "?" if check.status is Status.ERROR else number(check.points)
@@ -117,8 +137,11 @@ def points(check: CheckPart) -> str:
 
 
 def points_waiting(check: CheckPart, result: Result) -> str:
-    """``4.25 points wait for this``: what is skipped because a check failed; or nothing."""
-    lost = total(one.max_points for one in result.checks if check.id in one.waits_for)
+    """``4.25 points wait for this``: what is skipped because a check failed; or nothing.
+
+    What waits for several checks is counted at the first of them.
+    """
+    lost = total(one.max_points for one in result.checks if check.id in one.waits_for[:1])
     return f"{counted_points(lost)} {'waits' if lost == 1 else 'wait'} for this" if lost else ""
 
 
@@ -189,7 +212,7 @@ def summary(result: Result) -> str:
     if result.submission.problem:
         blocks.append(f"It could not be read: {one_line(result.submission.problem)}")
     for check in (*result.of(Status.FAILED), *result.of(Status.ERROR)):
-        lines = [f"{one_line(check.title)} ({points(check)} points)"]
+        lines = [f"{one_line(heading(check))} ({points(check)} points)"]
         rows = explain(check, result)
         lines += [f"  {row.name}: {row.text}" for row in rows if row.name != "printed"]
         blocks.append("\n".join(lines))

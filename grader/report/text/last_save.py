@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from grader.findings.finding import Status
+from grader.findings.wording import counted
 from grader.grade.model import CheckResult, total
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.text.words import STATUS, cut, number
@@ -16,14 +17,31 @@ _LONGEST = 120
 
 
 def what_changed(before: Result, after: Result) -> str:
-    """``period: failed → passed, +1.5``; of many checks those with the most points."""
-    changed = sorted(changed_checks(before, after), key=lambda pair: -abs(_gain(*pair)))
-    lines = [f"{new.id}: {change(old, new)}" for old, new in changed[:_MOST]]
+    """``“Every 300 ms”: failed → passed, +1.5``: the cause first, then what gave the most points.
+
+    Checks that only wait for another one now, or no longer wait, are counted.
+    """
+    changed = changed_checks(before, after)
+    waits = [pair for pair in changed if pair[1].status is Status.SKIPPED]
+    waited = [pair for pair in changed if pair[0].status is Status.SKIPPED]
+    waited = [pair for pair in waited if pair[1].status is Status.PASSED]
+    shown = [pair for pair in changed if pair not in (*waits, *waited)]
+    shown.sort(key=lambda pair: (pair[1].id != after.first_to_fix, -abs(_gain(*pair))))
+    lines = [f"“{one_line(new.title)}”: {change(old, new)}" for old, new in shown[:_MOST]]
+    lines += _together(waits, "now wait", "now waits")
+    lines += _together(waited, "no longer wait", "no longer waits")
     known = {check.id for check in before.checks}
     new = sum(check.id not in known for check in after.checks)
-    counts = {"more": len(changed) - len(lines), "new": new}
+    counts = {"more": len(shown[_MOST:]), "new": new}
     lines += [f"{count} {what}" for what, count in counts.items() if count]
     return "; ".join(lines) or "no check changed"
+
+
+def _together(pairs: Sequence[tuple[CheckPart, CheckPart]], many: str, one: str) -> list[str]:
+    """``15 checks now wait, −9.7``."""
+    gain = total(_gain(*pair) for pair in pairs)
+    words = f"{counted(len(pairs), 'check')} {one if len(pairs) == 1 else many}"
+    return [words + _signed(gain)] if pairs else []
 
 
 def changed_checks(before: Result, after: Result) -> list[tuple[CheckPart, CheckPart]]:
@@ -40,15 +58,19 @@ def change(old: CheckPart, new: CheckPart) -> str:
     words = STATUS[new.status].word
     if old.status is not new.status:
         words = f"{STATUS[old.status].word} → {words}"
-    gain = _gain(old, new)
-    return words + (f", {'+' if gain > 0 else '−'}{number(abs(gain))}" if gain else "")
+    return words + _signed(_gain(old, new))
+
+
+def _signed(gain: float) -> str:
+    return f", {'+' if gain > 0 else '−'}{number(abs(gain))}" if gain else ""
 
 
 def early_line(check: CheckResult) -> str:
     """How a check that failed before ends now, while others still run."""
     if check.status is Status.PASSED:
-        return f"{check.id} passes now"
-    return f"{check.id} still fails: {cut(one_line(check.decisive.finding.observed), _LONGEST)}"
+        return f"“{one_line(check.title)}” passes now"
+    seen = cut(one_line(check.decisive.finding.observed), _LONGEST)
+    return f"“{one_line(check.title)}” still fails: {seen}"
 
 
 def failed_scenarios(result: Result) -> frozenset[str]:

@@ -19,7 +19,7 @@ from grader.findings.wording import counted
 from grader.report.model.excerpt import excerpt, places
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.text import additions, explanation, last_save
-from grader.report.text.words import STATUS, number
+from grader.report.text.words import NO_POINTS, number
 from grader.safe_text import clean, one_line, visible
 from grader.submission.record import SourceError
 
@@ -38,7 +38,8 @@ _READABLE = 100
 _INDENT = 12
 _LOG_LINES = 8
 _COLORS = {"theme": "ansi_dark", "background_color": "default"}
-_LOOK: dict[str, Any] = {**_COLORS, "line_numbers": True}
+# A long line goes on below: its end may be what is wrong.
+_LOOK: dict[str, Any] = {**_COLORS, "line_numbers": True, "word_wrap": True}
 
 
 def print_grade(
@@ -105,7 +106,7 @@ def _table(console: Console, result: Result) -> Table:
     told: set[tuple[str, ...]] = set()
     for check in result.checks:
         row = [
-            _status(console, check.status),
+            _status(console, check),
             Text(_line(console, check.title)),
             Text(explanation.points(check), "" if check.status is Status.PASSED else "bold"),
         ]
@@ -120,17 +121,18 @@ def _table(console: Console, result: Result) -> Table:
     return table
 
 
-def _status(console: Console, status: Status) -> Text:
-    words = STATUS[status]
+def _status(console: Console, check: CheckPart) -> Text:
+    words = explanation.status_words(check)
     symbol = words.ascii if console.options.ascii_only else words.symbol
-    return Text(f"{symbol} {words.word}", _STYLE[status])
+    style = "yellow" if words is NO_POINTS else _STYLE[check.status]
+    return Text(f"{symbol} {words.word}", style)
 
 
 def _explain(console: Console, result: Result, check: CheckPart, source: Mapping[str, str]) -> None:
     """Say why points were lost, or why there is no verdict."""
     console.print()
-    title = (_line(console, check.title), "bold")
-    console.print(Text.assemble(_status(console, check.status), "  ", title))
+    title = (_line(console, explanation.heading(check)), "bold")
+    console.print(Text.assemble(_status(console, check), "  ", title))
     if same := explanation.same_as(result).get(check.id):
         console.print(_hanging(console, "observed", f"the same as “{same.title}”"))
         return
@@ -183,7 +185,7 @@ def _conclude(console: Console, result: Result, before: Result | None = None) ->
     for first in result.checks:
         if first.id == result.first_to_fix:
             where = "".join(f" ({explanation.spot(one)})" for one in places(first)[:1])
-            text = f"{first.title}{where}. {explanation.waiting(result, first)}".rstrip()
+            text = f"“{first.title}”{where}. {explanation.waiting(result, first)}".rstrip()
             console.print(Text.assemble(("Fix this first: ", "bold"), _line(console, text)))
     if not result.graded:
         text = f"Not graded. {explanation.headline(result)}"

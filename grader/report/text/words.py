@@ -21,6 +21,10 @@ STATUS = {
     Status.SKIPPED: StatusWords("skipped", "–", "-"),
     Status.ERROR: StatusWords("error", "!", "!"),
 }
+NO_POINTS = StatusWords("no points", "○", "o")
+"""Of a check that failed and gives no points: nothing is lost, so it is not red."""
+NOT_SO = {Status.FAILED: "Not yet: ", Status.ERROR: "Not judged: "}
+"""What stands before the title of a check, which says what is so once it passes."""
 ADVICE = ("try next", "also")
 """What stands before the first piece of advice, and before every other."""
 

@@ -20,6 +20,7 @@ from rosgrade_report import (  # type: ignore[import-not-found]
     quietly,
     report,
 )
+from rosgrade_standing import watch  # type: ignore[import-not-found]
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -223,8 +224,10 @@ def _patch_node(module: Any) -> None:
         )
 
     def subscribed(node: Any, subscription: Any) -> None:
-        group = _group(subscription.callback_group, node)
-        _endpoint("subscription", node, subscription, group=group)
+        group, callback = _group(subscription.callback_group, node), subscription.callback
+        _endpoint(
+            "subscription", node, subscription, group=group, callback=_callback_name(callback)
+        )
 
     _wrap(node_class, "__init__", after=made)
     _wrap(node_class, "create_publisher", after=published)
@@ -246,6 +249,7 @@ def _patch_context(module: Any) -> None:
         if str(context.get_domain_id()) != MIDDLEWARE.get("ROS_DOMAIN_ID", "0"):
             changed.add("ROS_DOMAIN_ID")
         report("init", changed=" ".join(sorted(changed)))
+        watch()
 
     _wrap(module.Context, "init", before=_freeze, after=made)
     _wrap(module.Context, "shutdown", before=lambda _: flush())

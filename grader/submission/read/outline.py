@@ -32,6 +32,8 @@ def outline(tree: ast.Module, path: str, module: str) -> SourceFile:
     stars: list[str] = []
     prints: dict[ast.expr, int] = {}
     to_file: set[ast.expr] = set()
+    uses: set[str] = set()
+    sets: list[tuple[str, int]] = []
     redefined = False
     for node, scope in _walk(tree):
         if isinstance(node, ast.ClassDef):
@@ -59,6 +61,15 @@ def outline(tree: ast.Module, path: str, module: str) -> SourceFile:
                 names.update(dict.fromkeys(targets, dotted))
         elif isinstance(node, ast.Call) and not _is_to_console(node):
             to_file.add(node.func)
+        elif isinstance(node, ast.Attribute):
+            if isinstance(node.ctx, ast.Load):
+                uses.add(node.attr[:_LONGEST_NAME])
+            elif dotted := _dotted(node):
+                sets.append((dotted, node.lineno))
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            # As getattr() takes it.
+            is_name = node.value.isidentifier() and len(node.value) <= _LONGEST_NAME
+            uses.update([node.value] if is_name else [])
         elif isinstance(node, ast.Name) and node.id == "print":
             prints[node] = node.lineno
             redefined |= isinstance(node.ctx, ast.Store)
@@ -72,6 +83,8 @@ def outline(tree: ast.Module, path: str, module: str) -> SourceFile:
         names=tuple(sorted(names.items())[:_MOST]),
         stars=tuple(dict.fromkeys(stars)),
         prints=() if redefined else tuple(sorted(lines)[:_MOST]),
+        uses=tuple(sorted(uses)[:_MOST]),
+        sets=tuple(sorted(sets, key=lambda item: item[1])[:_MOST]),
     )
 
 

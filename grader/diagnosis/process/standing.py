@@ -1,0 +1,162 @@
+"""Where a program stands that does not go on, and what to do about that line."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from grader.diagnosis.process.raised import interrupted_call, submission_path
+from grader.findings.wording import code
+from grader.measure.declarations import never_spun
+from grader.measure.standing import Standing, at_the_end, longest_callback
+from grader.recording.model import NS, Recording
+from grader.spec.unit import format_duration
+from grader.submission.record import SourceError
+
+_LONGEST_TEXT = 80
+# What a line waits for -> what to do about it in a callback.
+_WAITS = (
+    (
+        r"\brate\w*\.sleep\(",
+        "A rate waits for a timer that the same executor must call, so it waits for ever. Remove "
+        "it: what calls the callback already sets the rhythm.",
+    ),
+    (
+        r"\.call\(",
+        "It waits for an answer that the executor can take in only when this callback has "
+        "returned. Instead of call() or spin_until_future_complete() use call_async() or "
+        "send_goal_async(), return, and go on in the callback of future.add_done_callback().",
+    ),
+    (
+        r"\bspin|future|\.done\(|\.result\(",
+        "Do not spin or wait for a future in a callback: what it waits for can come only when the "
+        "callback has returned. Return, and go on in the callback of future.add_done_callback().",
+    ),
+    (
+        r"lock|acquire\(",
+        "Something holds this lock already, perhaps the same callback, and never releases it. A "
+        "callback that holds a lock must not call a method that takes it again.",
+    ),
+)
+_INPUT = "A launched node has no keyboard: take the value from a ROS parameter, not from input()."
+_LOOP = (
+    "While a callback loops, it gets no new message. Write `if` in place of the loop, and return: "
+    "the callback is called again, and sees what is new then."
+)
+_SLEEP = (
+    "While a callback sleeps or works, the node calls nothing else. Do one short step and return: "
+    "the callback is called again."
+)
+_NOT_YET = (
+    "Let main() come to rclpy.spin(node): do one step in a callback, which is called again and "
+    "again, in place of a loop or a wait before it."
+)
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A call of the student's that did not return, or not soon.
+
+    Attributes:
+        place: Its line in the submission.
+        words: What it does, in words.
+        lasted_s: How long it was seen, or None where nothing but its end tells of it.
+    """
+
+    place: SourceError
+    words: str
+    hint: str
+    in_callback: bool
+    lasted_s: float | None = None
+
+
+def where_it_stands(
+    recording: Recording, process: str, *, in_callback: bool = False
+) -> Stand | None:
+    """Where a process did not go on at the end of the observation, or None where nothing tells.
+
+    Its tracer declares that; else the traceback tells it that SIGINT caused.
+
+    Args:
+        in_callback: Only if rclpy had called it: a loop in main() is no callback.
+    """
+    found = at_the_end(recording, process)
+    place = _place(recording, found) if found is not None else None
+    if found is None or place is None:
+        call = interrupted_call(recording, process)
+        if call is None or (in_callback and not call.in_callback):
+            return None
+        line, text = call.place.line or 0, call.text
+        words = _words(call.function, line, text, "when it was stopped", call.in_callback)
+        return Stand(call.place, words, _hint(text, "", call.in_callback), call.in_callback)
+    if not found.in_callback and (in_callback or not never_spun(recording, process)):
+        return None
+    since = f"from {recording.since_launch_s(found.began_ns):.2f} s after launch on"
+    words = _words(found.function, place.line or 0, _text(found), since, found.in_callback)
+    return _stand(found, place, words)
+
+
+def stuck(recording: Recording) -> Stand | None:
+    """Where a callback did not return until the end, or what comes before spin(); or None."""
+    for process in recording.processes:
+        spins = not never_spun(recording, process.name)
+        found = where_it_stands(recording, process.name, in_callback=spins)
+        if found is not None:
+            return found
+    return None
+
+
+def slow_callback(recording: Recording, process: str | None = None) -> Stand | None:
+    """Where the callback was that took the longest; None where all were short."""
+    found = longest_callback(recording, process)
+    place = _place(recording, found) if found is not None else None
+    if found is None or place is None:
+        return None
+    took = format_duration(round((found.seen_ns - found.began_ns) / NS, 1))
+    words = f"{code(found.function)} takes {took} or more: {_at(place.line or 0, _text(found))}"
+    return _stand(found, place, words)
+
+
+def _stand(found: Standing, place: SourceError, words: str) -> Stand:
+    hint = _hint(found.text, found.loop_text if found.loop else "", found.in_callback)
+    return Stand(place, words, hint, found.in_callback, (found.seen_ns - found.began_ns) / NS)
+
+
+def _waits(text: str) -> bool:
+    return any(re.search(pattern, text) for pattern, _ in _WAITS)
+
+
+def _text(found: Standing) -> str:
+    """The line that keeps a call: the one that waits for ever, or the loop, or where it is."""
+    text = found.text if not found.loop or _waits(found.text) else found.loop_text
+    return text[:_LONGEST_TEXT]
+
+
+def _place(recording: Recording, found: Standing) -> SourceError | None:
+    at_line = not found.loop or _waits(found.text)
+    file, line = (found.file, found.line) if at_line else (found.loop_file, found.loop)
+    path = submission_path(file, recording.submission)
+    return SourceError(path, line, f"{code(found.function)} stands here") if path else None
+
+
+def _at(line: int, text: str) -> str:
+    return f"it is in line {line}" + (f", {code(text)}" if text else "")
+
+
+def _words(function: str, line: int, text: str, when: str, in_callback: bool) -> str:
+    what = f"{code(function)} does not return"
+    if not in_callback:
+        what = f"rclpy.spin() is not reached, because {what}"
+    return f"{what}: {_at(line, text)}, {when}"
+
+
+def _hint(text: str, loop: str, in_callback: bool) -> str:
+    if "input(" in text:
+        return _INPUT
+    if not in_callback:
+        return _NOT_YET
+    for pattern, hint in _WAITS:
+        if re.search(pattern, text) or re.search(pattern, loop):
+            return hint
+    is_loop = loop or text.startswith(("while ", "for "))
+    return _LOOP if is_loop else _SLEEP
