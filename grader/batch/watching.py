@@ -25,6 +25,9 @@ _SETTLED_MS = 50
 _LONGEST_MS = 400
 """Of a stream of changes, the first are acted on after this time."""
 
+_LOOK_MS = 500
+"""How often it is looked whether a watched folder is still the one at its path."""
+
 T = TypeVar("T")
 
 
@@ -143,16 +146,38 @@ class Watching:
         def concerns(_: Change, path: str) -> bool:
             return not Path(path).is_relative_to(self._report) and matters(Path(path))
 
-        for _ in watch(
-            root,
-            watch_filter=concerns,
-            debounce=_LONGEST_MS,
-            step=_SETTLED_MS,
-            stop_event=self._stop,
-            recursive=recursive,
-            raise_interrupt=False,
-        ):
+        while not self._stop.is_set():
+            watched = _identity(root)
+            if watched is None:
+                self._stop.wait(_LOOK_MS / 1000)
+                continue
+            # What was there before the watch began may be new.
             self._news.put(None)
+            with contextlib.suppress(FileNotFoundError):
+                for changes in watch(
+                    root,
+                    watch_filter=concerns,
+                    debounce=_LONGEST_MS,
+                    step=_SETTLED_MS,
+                    stop_event=self._stop,
+                    recursive=recursive,
+                    raise_interrupt=False,
+                    rust_timeout=_LOOK_MS,
+                    yield_on_timeout=True,
+                ):
+                    if changes:
+                        self._news.put(None)
+                    # A folder that is removed and made again is another one, which nobody watches.
+                    if _identity(root) != watched:
+                        break
+
+
+def _identity(folder: Path) -> tuple[int, int] | None:
+    """Which folder is at a path now, or None without one."""
+    with contextlib.suppress(OSError):
+        status = folder.stat()
+        return status.st_dev, status.st_ino
+    return None
 
 
 def _ended(grading: Future[Graded]) -> Ended:

@@ -37,6 +37,7 @@ from grader.cli.options import (
     chosen_names,
     chosen_sandbox,
     file_option,
+    report_folder,
 )
 from grader.cli.screen.console import open_page, output_console, say
 from grader.cli.screen.progress import Progress, syntax_errors
@@ -56,7 +57,7 @@ def check(
     submission: Annotated[
         Path, typer.Argument(help="The submission: a folder, a .zip or a .tar.gz.")
     ] = Path(),
-    report: ReportFolder = Path("rosgrade-report"),
+    report: ReportFolder = None,
     json_file: Annotated[
         Path | None, file_option("--json", text="Also write the result to this file.")
     ] = None,
@@ -91,6 +92,7 @@ def check(
     from grader.run.runner import Runner
 
     clock = Clock()
+    report = report_folder(report, assignment)
     page = report / "report.html"
     formats = Formats(files, junit_family, gradescope_metadata, github, classroom50)
     refuse_inputs(

@@ -32,7 +32,11 @@ UsedAssignment = Annotated[
 ]
 ClassFolder = Annotated[Path, typer.Argument(help="Folder of a batch.")]
 ReportFolder = Annotated[
-    Path, typer.Option(help="Folder for report.html, result.json and the recordings.")
+    Path | None,
+    typer.Option(
+        help="Folder for report.html, result.json and the recordings; by default "
+        "rosgrade-report/ASSIGNMENT."
+    ),
 ]
 Scenarios = Annotated[
     list[str] | None, typer.Option(metavar="ID", help="Run only this scenario; may be repeated.")
@@ -85,6 +89,12 @@ def file_option(*names: str, text: str) -> Any:
         return file
 
     return typer.Option(*names, metavar="FILE", help=text, callback=read)
+
+
+def report_folder(chosen: Path | None, assignment: str) -> Path:
+    """Where a report is written: each assignment has its own folder."""
+    place = Path(assignment).resolve()
+    return chosen or Path("rosgrade-report", (place.parent if place.is_file() else place).name)
 
 
 def assignment_places(name: str) -> tuple[Path, Path]:

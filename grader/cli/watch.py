@@ -26,6 +26,7 @@ from grader.cli.options import (
     assignment_places,
     chosen_names,
     chosen_sandbox,
+    report_folder,
 )
 from grader.cli.screen.console import open_page, output_console, print_error, say
 from grader.cli.screen.progress import Progress, syntax_errors
@@ -52,7 +53,7 @@ def watch(
     submission: Annotated[
         Path, typer.Argument(help="Your package, workspace, or its src.")
     ] = Path(),
-    report: ReportFolder = Path("rosgrade-report"),
+    report: ReportFolder = None,
     scenario: Scenarios = None,
     only: Checks = None,
     seed: Seed = None,
@@ -86,6 +87,7 @@ def watch(
         shown = whole if hidden else visible_part(whole)
         return select(shown, tuple(only or ()), tuple(scenario or ()))
 
+    report = report_folder(report, assignment)
     outputs = [report, report / "report.html"]
     refuse_inputs(outputs, [*assignment_places(assignment), submission])
     loaded = load()

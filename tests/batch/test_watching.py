@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -70,6 +71,21 @@ def test_a_saved_file_is_graded_again(watched: SimpleNamespace) -> None:
     assert next(watched.events) is Step.BEGAN
     assert isinstance(next(watched.events), Ended)
     assert watched.played.grades == 2
+
+
+def test_a_folder_that_is_replaced_is_watched_on(watched: SimpleNamespace) -> None:
+    next(watched.events), next(watched.events)
+    # As `git clone` or an unpacked archive puts another folder in the place of the first.
+    fresh = watched.submission.with_name("fresh")
+    shutil.copytree(watched.submission, fresh)
+    (fresh / "bot" / "node.py").write_text("two")
+    watched.submission.rename(watched.submission.with_name("old"))
+    fresh.rename(watched.submission)
+    assert next(watched.events) is Step.BEGAN
+    assert isinstance(next(watched.events), Ended)
+    watched.file.write_text("three")
+    assert next(watched.events) is Step.BEGAN
+    assert isinstance(next(watched.events), Ended)
 
 
 def test_what_is_no_work_is_not_graded(watched: SimpleNamespace) -> None:

@@ -48,7 +48,9 @@ def test_a_forgotten_dependency_names_the_import_and_the_tag_to_add():
     assert finding.observed == f"{SOURCE}:3 imports `geometry_msgs`"
     assert "Don't forget the dependencies" in finding.hint
     assert "`<depend>geometry_msgs</depend>`" in finding.hint
-    assert finding.evidence.places == (SourceError(SOURCE, 3, "imports geometry_msgs"),)
+    # What is to be changed is package.xml, not the import.
+    (place,) = finding.evidence.places
+    assert (place.file, place.line) == ("src/bot_publisher/package.xml", 10)
 
 
 def test_every_forgotten_dependency_is_listed_once():

@@ -9,7 +9,6 @@ from grader.recording.interaction import Service
 from grader.recording.model import Ending
 from tests.checks.builder import (
     NODE,
-    SOURCE,
     at,
     call,
     calls,
@@ -163,7 +162,7 @@ class TestBlocked:
     def test_the_line_of_the_loop_is_named(self):
         log = output(traceback("KeyboardInterrupt", source="time.sleep(0.3)", line=17))
         finding = responsive(recording(**LOOPING, log=log))
-        assert f"it was at {SOURCE}:17 when it was interrupted" in finding.observed
+        assert "it is in line 17, `time.sleep(0.3)`, when it was stopped" in finding.observed
         assert finding.evidence.places[0].line == 17
 
     def test_a_node_that_no_executor_has(self):

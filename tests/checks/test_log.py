@@ -191,7 +191,8 @@ class TestAnyFormatIsRight:
         "text", ["765,07", "1765,072", "765,0722", "765_072_1", "0.765,072", "765  072", "1765 072"]
     )
     def test_other_digits_are_no_groups(self, text):
-        assert "none shows" in front(lines(text, SCAN_TIMES_S), **ranging(765072.0, *RANGES[1:]))
+        found = front(lines(text, SCAN_TIMES_S), **ranging(765072.0, *RANGES[1:]))
+        assert "none shows" in found or "1000 times too small" in found
 
     def test_what_is_printed_counts_as_well(self):
         log = tuple(replace(line, stream="stdout") for line in lines("1.37 -0.62", ODOM_TIMES_S))
@@ -249,7 +250,7 @@ class TestAnyRhythmIsRight:
         slow = front(log, calls=tuple(call(0.5 * n, 1.0, of=BOT) for n in range(1, 7)))
         assert "only 1 of 6 messages on `/scan`" in slow
         assert "the node's parameter service waited 1 s or more" in slow
-        assert "time.sleep()" in slow
+        assert "A callback must return soon" in slow
         lost = (*(call(0.5 * n, of=BOT) for n in range(2, 7)), call(0.5, None, of=BOT))
         assert "waited" not in front(log) and "waited" not in front(log, calls=lost)
 
@@ -387,7 +388,7 @@ class TestWhatKeepsLinesBack:
         found = front(lines("1.37 -0.62", ODOM_TIMES_S), calls=calls)
         assert "something blocks the executor" in found
         assert "from 1.50 s after launch on the node's parameter service does not answer" in found
-        assert "`while True`" in found
+        assert "Look for a loop" in found
         busy = taken(1.0, 4.0, waited_s=2.0)
         assert "blocks the executor" in front(
             lines("1.37 -0.62", [1.0]), calls=calls, disturbance=busy

@@ -166,13 +166,13 @@ class TestExists:
         interrupted = traceback("KeyboardInterrupt", source="time.sleep(60)", line=5)
         run = nodeless(processes=(process(),), log=output(interrupted, time_s=5.0))
         found = failing("node.exists", run, name=NODE)
-        assert f"never called rclpy.init() ({SOURCE}:5)" in found
+        assert "never called rclpy.init()" in found and "in line 5, `time.sleep(60)`" in found
         assert "sleep" in found
 
     def test_a_process_that_waits_for_input(self):
         log = output(traceback("KeyboardInterrupt", source="name = input('Name? ')", line=6))
         found = failing("node.exists", nodeless(log=log), name=NODE)
-        assert f"never called rclpy.init() ({SOURCE}:6)" in found and "input()" in found
+        assert "in line 6, `name = input('Name? ')`" in found and "no keyboard" in found
 
     def test_a_process_that_called_init_but_made_no_node(self):
         run = nodeless(declarations=(declared("started"), declared("init")))

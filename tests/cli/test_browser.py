@@ -79,5 +79,5 @@ def test_check_opens_the_report(
     monkeypatch.setenv("BROWSER", f"{browser} %s")
     ended = rosgrade("check", "timed_publisher", REFERENCE, "--only", "package", "--open")
     assert ended.returncode == 0, ended.stderr
-    report = tmp_path / "rosgrade-report" / "report.html"
+    report = tmp_path / "rosgrade-report" / "timed_publisher" / "report.html"
     assert (tmp_path / "asked").read_text() == f"{report.as_uri()}\n"

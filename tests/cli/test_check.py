@@ -18,6 +18,7 @@ from tests.cli.conftest import ROOT, Rosgrade
 
 REFERENCE = ROOT / "reference" / "timed_publisher"
 NODE = "bot_publisher/bot_publisher/bot_publisher.py"
+REPORT = Path("rosgrade-report", "timed_publisher")
 
 pytestmark = pytest.mark.ros
 
@@ -35,7 +36,7 @@ def copy(folder: Path, old: str = "", new: str = "", file: str = NODE) -> Path:
 
 def result(folder: Path) -> Any:
     """What was written into the default report folder."""
-    return json.loads((folder / "rosgrade-report" / "result.json").read_text(encoding="utf-8"))
+    return json.loads((folder / REPORT / "result.json").read_text(encoding="utf-8"))
 
 
 def statuses(folder: Path) -> dict[str, str]:
@@ -50,9 +51,9 @@ def test_the_reference_gets_full_points_and_a_report(rosgrade: Rosgrade, tmp_pat
     written = result(tmp_path)
     assert (written["score"], written["max_score"], written["graded"]) == (10, 10, True)
     assert json.loads(ended.stdout) == written
-    assert "10" in (tmp_path / "rosgrade-report" / "report.html").read_text(encoding="utf-8")
+    assert "10" in (tmp_path / REPORT / "report.html").read_text(encoding="utf-8")
 
-    again = rosgrade("regrade", tmp_path / "rosgrade-report")
+    again = rosgrade("regrade", tmp_path / REPORT)
     assert again.returncode == 0
     assert "no check changed" in again.stdout
 
@@ -73,7 +74,7 @@ def test_only_one_check_and_what_it_requires_is_judged(rosgrade: Rosgrade, tmp_p
     judged = statuses(tmp_path)
     assert {"package", "dependencies"} <= judged.keys()
     assert "period" not in judged
-    assert not list((tmp_path / "rosgrade-report" / "recordings").glob("*.mcap"))
+    assert not list((tmp_path / REPORT / "recordings").glob("*.mcap"))
 
 
 @pytest.mark.parametrize(
@@ -108,9 +109,9 @@ def test_a_report_shows_the_attempts_before_it(rosgrade: Rosgrade, tmp_path: Pat
         rosgrade("check", "timed_publisher", notes.parent)
     first, second = result(tmp_path)["attempts"]
     assert (first["counts"], second["counts"]) == (False, True)
-    page = (tmp_path / "rosgrade-report" / "report.html").read_text(encoding="utf-8")
+    page = (tmp_path / REPORT / "report.html").read_text(encoding="utf-8")
     assert "the one before had 0 points" in page
-    assert rosgrade("regrade", "rosgrade-report").returncode == 1
+    assert rosgrade("regrade", REPORT).returncode == 1
     assert [one["sha256"] for one in result(tmp_path)["attempts"]] == [
         first["sha256"],
         second["sha256"],
@@ -128,12 +129,12 @@ def test_a_crash_is_shown_with_the_student_s_file_and_line(
     line = (submission / NODE).read_text().splitlines().index("        print(undefined)") + 1
     assert f"{NODE}:{line}" in ended.stdout
     assert f"❱ {line}     print(undefined)" in ended.stdout
-    report = tmp_path / "rosgrade-report"
+    report = tmp_path / REPORT
     address = f'href="vscode://file{submission.resolve()}/{NODE}:{line}"'
     assert address in (report / "report.html").read_text(encoding="utf-8")
     # As it was graded, also when it is rendered for others.
     assert (report / "source" / NODE).read_text() == (submission / NODE).read_text()
-    rosgrade("report", "rosgrade-report")
+    rosgrade("report", REPORT)
     again = (report / "report.html").read_text(encoding="utf-8")
     assert "vscode://" not in again and 'class="is-meant"' in again
 
@@ -188,7 +189,7 @@ def test_an_interrupted_check_leaves_nothing_behind_that_stops_the_next(
     assert check.returncode == 130, told
     assert "rosgrade: interrupted: ending what still runs" in told
     assert "Traceback" not in told
-    assert not (tmp_path / "rosgrade-report" / "result.json").exists()
+    assert not (tmp_path / REPORT / "result.json").exists()
     assert not list(tmp_path.glob("rosgrade-scratch-*"))
     assert not _running(str(tmp_path))
     again = rosgrade("check", "timed_publisher", submission, "--only", "package")

@@ -142,7 +142,7 @@ def test_an_instructor_s_run_judges_everything(rosgrade: Rosgrade, tmp_path: Pat
     assert [test["visibility"] for test in data["tests"]] == ["visible", "visible", "hidden"]
     assert "zq" not in data["output"]
 
-    report = tmp_path / "rosgrade-report"
+    report = tmp_path / "rosgrade-report" / "lesson"
     assert "zqtitle" in (report / "report.html").read_text(encoding="utf-8")
     copy = report / "student-report.html"
     assert "1 hidden check, 3 points, runs at grading" in copy.read_text(encoding="utf-8")

@@ -13,7 +13,8 @@ from tests.cli.conftest import Rosgrade
 
 
 def statuses(folder: Path) -> dict[str, str]:
-    text = (folder / "rosgrade-report" / "result.json").read_text(encoding="utf-8")
+    (file,) = (folder / "rosgrade-report").glob("*/result.json")
+    text = file.read_text(encoding="utf-8")
     return {check["id"]: check["status"] for check in json.loads(text)["checks"]}
 
 

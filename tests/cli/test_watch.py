@@ -64,11 +64,17 @@ def test_a_save_is_graded_again_and_ctrl_c_leaves_nothing(tmp_path: Path) -> Non
         assert "saved again: starting over" in told
         lost = POINTS["period"]
         assert f"Score: {10 - lost:g} of 10 points, before 10" in told
-        assert f"Since your last save: period: passed → failed, −{lost:g}   █" in told
+        assert (
+            f"Since your last save: “A message comes every 300 ms”: passed → failed, −{lost:g}   █"
+            in told
+        )
         browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
         browser.open(url).close()
         with browser.open(f"{url.partition('?')[0]}report.html") as served:
-            assert served.read() == (tmp_path / "rosgrade-report" / "report.html").read_bytes()
+            assert (
+                served.read()
+                == (tmp_path / "rosgrade-report" / "timed_publisher" / "report.html").read_bytes()
+            )
 
         right = node.read_text()
         line = right[: right.index("PERIOD_S = 0.4")].count("\n") + 1
@@ -128,7 +134,7 @@ def test_the_author_s_own_yaml_is_read_again_and_a_mistake_in_it_ends_nothing(
         told = read_until(watch.stdout, "Ctrl-C ends")
         package = f"{POINTS['package']:g}"
         assert f"Score: {package} of {package} points" in told
-        report = assignment / "rosgrade-report" / "report.html"
+        report = assignment / "rosgrade-report" / assignment.name / "report.html"
         assert "Somebody handed in a package" in report.read_text(encoding="utf-8")
         watch.send_signal(signal.SIGINT)
         told, _ = watch.communicate(timeout=60)

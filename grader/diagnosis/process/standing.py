@@ -48,8 +48,8 @@ _SLEEP = (
     "the callback is called again."
 )
 _NOT_YET = (
-    "Let main() come to rclpy.spin(node): do one step in a callback, which is called again and "
-    "again, in place of a loop or a wait before it."
+    "Put one step of it into a callback, which is called again and again, and let main() go on to "
+    "rclpy.spin(node)."
 )
 
 
