@@ -50,8 +50,8 @@ class RosInstallation:
         """What to say of sourced workspaces, or nothing if there are none."""
         places = ", ".join(map(str, self.left_out))
         return places and (
-            f"left out: {places} (sourced, but no part of ROS: what submissions need of it stands "
-            "under `underlays` in assignment.yaml)"
+            f"left out: {places} (sourced, but no part of ROS). If submissions need it, name its "
+            "folder src under `underlays` in assignment.yaml"
         )
 
     @cached_property
