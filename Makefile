@@ -33,8 +33,8 @@ lock: setup ## regenerate requirements.lock; UPGRADE=1 to newer versions
 bench: setup ## measure rosgrade's own overhead
 	@$(run) -m grader.bench
 
-soak: setup ## grade a class of 200 (or N=...) under load, and look for a grade that changes
-	@$(run) -m grader.soak $(if $(N),--students $(N))
+soak: setup ## grade a class of 200 (or N=...) under load (LOAD=30), and look for a grade that changes
+	@$(run) -m grader.soak $(if $(N),--students $(N)) $(if $(LOAD),--load $(LOAD))
 
 wheels: setup ## build both wheels in dist/: rosgrade, and the solutions for instructors
 	@$(run) -m hatchling build -t wheel

@@ -1,8 +1,9 @@
 """``make soak``: grade a class on a loaded machine, and look for a grade that changes.
 
-The class is made of references and mutants in random order, while processes load every CPU in
-bursts. Each grade (see :mod:`grader.report.model.grade_part`) is compared with the one that the
-same submission got alone on the machine before.
+The class is made of references and mutants in random order, in Python and, where rclcpp is there,
+in C++. Each is built while processes load every CPU, in bursts or all the time. Each grade (see
+:mod:`grader.report.model.grade_part`) is compared with the one that the same submission got alone
+on the machine before.
 """
 
 from __future__ import annotations
@@ -18,11 +19,12 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
-from grader.assignment.mutant import reference_of
+from grader.assignment.mutant import CPP, PYTHON, Language, reference_of
 from grader.batch.grading import Grading
 from grader.batch.selftest import Role, Trial, TrialResult, run_trial, trials
 from grader.report.model.grade_part import differences
@@ -33,6 +35,8 @@ from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose
 from grader.scratch import Scratch
+from grader.submission.underlay.definition import find_underlay
+from grader.submission.underlay.store import UNDERLAYS, UnderlayStore
 
 ASSIGNMENTS = ("simple_publisher", "timed_publisher", "bot_controller", "p_controller")
 _BURST_S = _PAUSE_S = (0.3, 3.0)
@@ -49,17 +53,21 @@ class Job:
     loaded: LoadedAssignment
     grading: Grading
     trial: Trial
+    language: Language
     alone: str = ""
 
     @property
     def name(self) -> str:
         """Assignment and trial."""
-        return f"{self.loaded.assignment.id}/{self.trial.id}"
+        language = "C++" if self.language is CPP else "Python"
+        return f"{self.loaded.assignment.id}/{self.trial.id} in {language}"
 
     def grade(self, folder: Path) -> TrialResult:
         """Grade it into a new folder."""
-        reference = reference_of(self.loaded.assignment.id)
-        return run_trial(self.trial, self.loaded, self.grading, reference, folder)
+        reference = reference_of(self.loaded.assignment.id, language=self.language)
+        return run_trial(
+            self.trial, self.loaded, self.grading, reference, folder, language=self.language
+        )
 
 
 def main() -> int:
@@ -72,41 +80,56 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="of the class and of the bursts")
     parser.add_argument("--sandbox", type=Choice, default=Choice.AUTO)
     parser.add_argument("--calm", action="store_true", help="do not load the CPUs")
+    parser.add_argument(
+        "--load", type=int, default=0, help="busy processes at any time, instead of bursts"
+    )
     options = parser.parse_args()
     sandbox, notice = choose(options.sandbox, cache_folder())
     if notice:
         print(notice, file=sys.stderr)
-    order = random.Random(options.seed)
-    with Runner(ros.find(), Admission(), sandbox=sandbox) as runner:
-        alone = _graded_alone(_jobs(runner, options.different, order))
-        queue = [alone[number % len(alone)] for number in range(options.students)]
-        order.shuffle(queue)
+    with (
+        Runner(ros.find(), Admission(), sandbox=sandbox) as runner,
+        Scratch("soak-cache") as cache,
+    ):
+        # Nothing is built in there yet, so the class is built under load.
+        (cache / UNDERLAYS).symlink_to(cache_folder() / UNDERLAYS)
+        known, new = (
+            _jobs(runner, folder, options.different, random.Random(options.seed))
+            for folder in (cache_folder(), cache)
+        )
+        grades = _graded_alone(known)
+        jobs = [replace(job, alone=alone) for job, alone in zip(new, grades, strict=True)]
+        queue = [jobs[number % len(jobs)] for number in range(options.students)]
+        random.Random(options.seed).shuffle(queue)
         began_s = time.monotonic()
-        with _load(0 if options.calm else cpu_count(), options.seed):
+        busy = 0 if options.calm else options.load or cpu_count()
+        with _load(busy, options.seed, (0.0, 0.0) if options.load else _PAUSE_S):
             results = _grade_all(queue, 8 * cpu_count())
     return _summary(results, time.monotonic() - began_s)
 
 
-def _jobs(runner: Runner, different: int, order: random.Random) -> list[Job]:
+def _jobs(runner: Runner, cache: Path, different: int, order: random.Random) -> list[Job]:
     """The references, and mutants drawn from all of them."""
     references, mutants = [], []
-    for name in ASSIGNMENTS:
+    store = UnderlayStore(cache_folder(), runner.ros)
+    languages = [PYTHON] if store.missing([find_underlay("rclcpp")]) else [PYTHON, CPP]
+    for name, language in product(ASSIGNMENTS, languages):
         loaded = load_assignment(name)
-        grading = Grading(loaded, runner, cache_folder())
-        for trial in trials(loaded):
+        grading = Grading(loaded, runner, cache)
+        for trial in trials(loaded, language):
             if trial.role is Role.REFERENCE:
-                references.append(Job(loaded, grading, trial))
+                references.append(Job(loaded, grading, trial, language))
             elif trial.role is Role.MUTANT:
-                mutants.append(Job(loaded, grading, trial))
+                mutants.append(Job(loaded, grading, trial, language))
     return references + order.sample(mutants, max(0, different - len(references)))
 
 
-def _graded_alone(jobs: Sequence[Job]) -> list[Job]:
+def _graded_alone(jobs: Sequence[Job]) -> list[str]:
     found = []
     with Scratch("soak") as folder:
         for number, job in enumerate(jobs, start=1):
             result = job.grade(folder / str(number))
-            found.append(replace(job, alone=result.grade))
+            found.append(result.grade)
             lost = ", ".join(result.lost) or "full points" if result.graded else "not graded"
             print(
                 f"alone: {number} of {len(jobs)}, {job.name}: {lost}", file=sys.stderr, flush=True
@@ -115,12 +138,12 @@ def _graded_alone(jobs: Sequence[Job]) -> list[Job]:
 
 
 @contextmanager
-def _load(cpus: int, seed: int) -> Iterator[None]:
+def _load(processes: int, seed: int, pause_s: tuple[float, float]) -> Iterator[None]:
     burners = [
         multiprocessing.get_context("spawn").Process(
-            target=_burn, args=(seed + number,), daemon=True
+            target=_burn, args=(seed + number, pause_s), daemon=True
         )
-        for number in range(cpus)
+        for number in range(processes)
     ]
     for burner in burners:
         burner.start()
@@ -131,7 +154,7 @@ def _load(cpus: int, seed: int) -> Iterator[None]:
             burner.kill()
 
 
-def _burn(seed: int) -> None:
+def _burn(seed: int, pause_s: tuple[float, float]) -> None:
     order = random.Random(seed)
     parent = os.getppid()
     # It must not outlive a soak that was killed.
@@ -139,7 +162,7 @@ def _burn(seed: int) -> None:
         until_s = time.monotonic() + order.uniform(*_BURST_S)
         while time.monotonic() < until_s:
             pass
-        time.sleep(order.uniform(*_PAUSE_S))
+        time.sleep(order.uniform(*pause_s))
 
 
 def _grade_all(queue: Sequence[Job], at_once: int) -> list[tuple[Job, TrialResult]]:
