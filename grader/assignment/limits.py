@@ -76,8 +76,9 @@ class BuildLimitOptions(LimitOptions):
     cpu_time: _CpuTime = BUILD.cpu_s
     wall_time: Duration | None = Field(
         None,
-        description="Time of the whole build; by default 2 min if all packages are ament_python, "
-        "else 5 min.",
+        description="Time of the whole build, without that in which this machine gave it no CPU; "
+        "by default 2 min if all packages are ament_python, else 5 min. A build that needs eight "
+        "times as long because of the machine is repeated alone, and then not graded.",
     )
     file_size: _FileSize = BUILD.file_bytes
     disk: _Disk = BUILD.disk_bytes

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -25,6 +26,7 @@ from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording, to_json
 from grader.report.files import write_whole
 from grader.report.html.replay import Replay
+from grader.run.admission import Admission
 from grader.run.host.load import cpu_count
 from grader.run.runner import Runner, scenario_seed
 from grader.sandbox.python_tree import check_installed
@@ -88,7 +90,8 @@ class Grading:
         self._stop = threading.Event()
         self._type_support = TypeSupport(loaded, runner.ros, cache, self._stop)
         self._scenarios = loaded.assignment.scenarios
-        self._builds = threading.BoundedSemaphore(cpu_count())
+        # A build takes a CPU or more; too many would only slow down each other.
+        self._builds = Admission(cells=cpu_count(), starts=cpu_count())
 
     def grade(
         self,
@@ -117,25 +120,31 @@ class Grading:
             self._on_recorded(record, {})
             return _tested(named(self._loaded, replace(record, given=outside))[0])
 
-        # A build takes a CPU or more; too many would only slow down each other.
-        with self._builds:
-            prepared = prepare(
-                path,
-                ros,
-                cache=self._cache,
-                limits=self._build_limits,
-                on_progress=on_build,
-                sandbox=sandbox,
-                stop=self._stop,
-                on_output=on_output,
-                tested=tested,
-                source_folder=source_folder,
-                with_bags=self._with_bags,
-            )
+        prepared = prepare(
+            path,
+            ros,
+            cache=self._cache,
+            limits=self._build_limits,
+            on_progress=on_build,
+            sandbox=sandbox,
+            stop=self._stop,
+            on_output=on_output,
+            tested=tested,
+            source_folder=source_folder,
+            with_bags=self._with_bags,
+            place=self._build_place,
+        )
         if name is not None:
             prepared = prepared.named(name)
         prepared = replace(prepared, record=replace(prepared.record, given=outside))
         return self.grade_prepared(prepared, folder)
+
+    @contextmanager
+    def _build_place(self, alone: bool) -> Iterator[None]:
+        """The place of one build; where it must be alone, no other one runs, and no cell."""
+        cells = self._runner.admission.cell(alone=True) if alone else nullcontext()
+        with self._builds.cell(alone=alone), cells:
+            yield
 
     @property
     def surroundings(self) -> list[str]:

@@ -14,6 +14,8 @@ from grader.findings.wording import code, codes
 from grader.spec.name import package_name
 from grader.spec.nearest_name import nearest
 from grader.submission.build.build_log import modules_not_found, not_found
+from grader.submission.build.ros_damage import damage_in
+from grader.submission.build.toolchain import apt_package
 from grader.submission.intake.paths import is_within
 from grader.submission.record import (
     EMPTY,
@@ -183,13 +185,23 @@ def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
 
 @explanation(NotBuilt)
 def build_takes_too_long(symptom: NotBuilt) -> Cause | None:
-    """The build does not end: input() or an endless loop in setup.py or CMakeLists.txt."""
-    if not symptom.build.timed_out:
+    """The build does not end: a sleep or an endless loop in setup.py or CMakeLists.txt."""
+    build, name = symptom.build, symptom.name
+    begun = [one for one in build.failed_packages if _failed_itself(build, one)]
+    if not build.timed_out or name not in (begun or build.failed_packages or [name]):
         return None
+    looked_for = {
+        None: "Look for input(), an endless loop or a long computation in setup.py or "
+        "CMakeLists.txt.",
+        True: "It waited: look for input(), a sleep, a lock or a download in setup.py or "
+        "CMakeLists.txt.",
+        False: "It kept computing: look for an endless loop or a long computation in setup.py or "
+        "CMakeLists.txt.",
+    }
     return Cause(
         "`colcon build` did not finish within its time limit and was ended",
-        "Look for input(), an endless loop or a long computation in setup.py or CMakeLists.txt.",
-        _evidence(symptom.build, symptom.name),
+        looked_for[build.waited],
+        _evidence(build, name),
     )
 
 
@@ -246,13 +258,15 @@ def why_lacking(submission: SubmissionRecord, name: str) -> Cause | None:
 
 
 def _not_here(lacking: list[str]) -> Cause:
-    ways = ways_to_get(lacking)
-    other = f", and so does {ways}" if ways else ""
+    found = {name: apt_package(name) for name in lacking}
+    named = " ".join(sorted(filter(None, found.values())))
+    ways = [f"`sudo apt install --reinstall {named}`"] if named else []
+    ways += [way for way in [ways_to_get(lacking)] if way]
     return Cause(
-        f"it needs {codes(lacking)} to build: ROS 2 Jazzy has it, but it is not installed on the "
-        "machine that grades",
+        f"it needs {codes(lacking)} to build: ROS 2 Jazzy has it, but it is missing or damaged on "
+        "the machine that grades",
         "You lose no points for it. Tell your instructor that a full ROS 2 Jazzy builds it"
-        f"{other}.",
+        f"{''.join(f', or {way}' for way in ways)}.",
         ours=True,
     )
 
@@ -304,7 +318,7 @@ def _lacking(submission: SubmissionRecord, build: BuildRecord, name: str) -> lis
         found = modules_not_found(written)
         package = submission.package(one)
         if package is None or package.build_type != "ament_python":
-            found |= not_found(written) | set(COMPILERS.values())
+            found |= not_found(written) | damage_in(written) | set(COMPILERS.values())
         missing |= found
         # Another package of the submission is not there, which lacks something itself.
         ahead += found & set(build.failed_packages) - seen

@@ -150,6 +150,10 @@ def why_not_generated(
             return built
         # The end of the log shows what became of what is missing.
         return replace(cause, evidence=replace(cause.evidence, log=built.evidence.log))
+    build = submission.build
+    if cause is None and build is not None and build.timed_out and build.waited is None:
+        # A recording of before, when nothing was kept of such a build.
+        return Cause("the build was ended, and nothing was kept of it: grade again", ours=True)
     return cause or Cause(
         f"the build installed no code for {code(interface.file)}",
         f"List {code(interface.file)} in {_GENERATE}() in CMakeLists.txt.",

@@ -25,11 +25,11 @@ from grader.sandbox.python_tree import discard, is_whole, student_prefix, trees_
 from grader.sandbox.seccomp import student_filter
 from grader.sandbox.usage import (
     OrphanCpu,
+    Usage,
     folder_usage,
     hidden_bytes,
     memory_bytes,
     open_files,
-    usage_of,
 )
 
 LAYERS = ("userns", "netns", "seccomp", "rlimits", "watchdog")
@@ -192,10 +192,9 @@ class BuildRoom:
         filter_file = self.sandbox.filter_file(student_filter(one_session=True))
         return bubblewrap.launch(arguments, binds, last, inner, filter_file, self.uid)
 
-    def excess(self, pid: int) -> str | None:
-        """Say which limit a build has passed, or None."""
+    def excess(self, usages: Sequence[Usage]) -> str | None:
+        """Say which limit the processes of a build have passed, or None."""
         limits = self.limits
-        usages = usage_of([pid])
         room = limits.memory_bytes - memory_bytes(usages, limits.memory_bytes)
         taken = memory_bytes(usages, limits.memory_bytes, hidden_bytes(usages, room))
         if taken > limits.memory_bytes:

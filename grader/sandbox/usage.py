@@ -11,7 +11,7 @@ import os
 import re
 import sys
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -51,6 +51,7 @@ class Usage(NamedTuple):
     taken: Taken
     threads: int
     resident_bytes: int
+    state: str = "S"
 
 
 class OrphanCpu:
@@ -118,6 +119,49 @@ def usage_of(roots: Iterable[int]) -> list[Usage]:
         if pid in found:
             wanted.append(found.pop(pid))
     return wanted
+
+
+def states(usages: Iterable[Usage]) -> set[str]:
+    """What the threads of processes do, such as ``R``: proc(5), "state"."""
+    return {state for one in usages for state in (one.state, *_states_of_threads(one))}
+
+
+def _states_of_threads(usage: Usage) -> Iterator[str]:
+    if usage.threads == 1:
+        return
+    # They may end meanwhile.
+    with contextlib.suppress(OSError):
+        for name in os.listdir(f"{_PROC}/{usage.pid}/task"):  # noqa: PTH208  often
+            thread = usage_at(int(name), f"{_PROC}/{usage.pid}/task")
+            if thread is not None:
+                yield thread.state
+
+
+class IdleCpu:
+    """Time in which the CPUs that this process may use had nothing to do."""
+
+    def __init__(self) -> None:
+        self._cpus = os.sched_getaffinity(0)
+        self.cpus = len(self._cpus)
+        # A container's /proc/stat (lxcfs) calls a CPU idle that another container uses.
+        self._is_known = not os.path.ismount(f"{_PROC}/stat")
+
+    def ticks(self) -> int:
+        """What it is so far, with waits for a disk; 0 where it is not known."""
+        if not self._is_known:
+            return 0
+        try:
+            with open(f"{_PROC}/stat", encoding="ascii") as file:  # noqa: PTH123  often
+                return idle_ticks(file.read(), self._cpus)
+        except (OSError, ValueError, IndexError):
+            return 0
+
+
+def idle_ticks(stat: str, cpus: Iterable[int]) -> int:
+    """Ticks in which CPUs had nothing to do, waits for a disk among them."""
+    wanted = {f"cpu{number}" for number in cpus}
+    rows = (line.split() for line in stat.splitlines())
+    return sum(int(row[4]) + int(row[5]) for row in rows if row and row[0] in wanted)
 
 
 def memory_bytes(usages: Sequence[Usage], enough: int, hidden: int = 0) -> int:
@@ -189,10 +233,10 @@ def folder_usage(folders: Iterable[Path], most_bytes: int, most_files: int) -> t
     return total, count
 
 
-def usage_at(pid: int) -> Usage | None:
+def usage_at(pid: int, folder: str = _PROC) -> Usage | None:
     """What one process takes by itself; None where it has ended."""
     try:
-        with open(f"{_PROC}/{pid}/stat", "rb") as file:  # noqa: PTH123  often
+        with open(f"{folder}/{pid}/stat", "rb") as file:  # noqa: PTH123  often
             # The command's name may contain anything, but the last ")" ends it.
             fields = file.read().rpartition(b")")[2].split()
         # The numbers of the fields are those of proc(5), less three.
@@ -204,6 +248,7 @@ def usage_at(pid: int) -> Usage | None:
             taken=Taken(int(fields[11]) + int(fields[12]), int(fields[13]) + int(fields[14])),
             threads=int(fields[17]),
             resident_bytes=int(fields[21]) * _PAGE,
+            state=fields[0].decode(),
         )
     except (OSError, IndexError, ValueError):
         return None

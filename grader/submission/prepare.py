@@ -6,6 +6,7 @@ import hashlib
 import os
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -71,6 +72,7 @@ def prepare(
     tested: Callable[[SubmissionRecord], frozenset[str]] = lambda _: frozenset(),
     source_folder: Path | None = None,
     with_bags: bool = False,
+    place: Callable[[bool], AbstractContextManager[object]] = nullcontext,
 ) -> Prepared:
     """Find the packages of a submission, read them, build them.
 
@@ -85,6 +87,8 @@ def prepare(
         tested: Packages whose own tests are run after the build, by what was read before it.
         source_folder: Where the text files of the submission are kept, or None.
         with_bags: Whether its bags are read.
+        place: Entered for the time of the build, and with True for one that is repeated because of
+            the machine: nothing else of rosgrade's is to run beside that.
 
     Raises:
         UsageError: Nothing is at ``path``, or it is a URL.
@@ -104,7 +108,7 @@ def prepare(
     )
 
     def attempt(is_second: bool) -> Prepared:
-        with opened(source) as located:
+        with place(is_second), opened(source) as located:
             if source_folder is not None:
                 keep_source(located.root, source_folder)
             bags = read_bags(located, ros, sandbox) if with_bags else None

@@ -238,11 +238,14 @@ class BuildRecord:
 
     Attributes:
         duration_s: Wall time of the build when it ran, also when taken from the cache now.
+        timed_out: It did not end in the time that it may have for itself.
         failed_packages: Packages that failed, or that colcon never began.
-        lacking: Packages that CMake did not find, because this machine does not have them.
+        lacking: What the build needs of ROS and its tools, and this machine does not have whole.
         culprit: The student's file and line that the log names first, or None.
         log: The end of colcon's output, student's paths mapped back, at most 64 KiB.
         tests: Runs of the tests that the assignment asks for, of packages that were built.
+        waited: Of one that timed out: whether it waited, instead of computing; None where nobody
+            looked.
     """
 
     succeeded: bool
@@ -254,6 +257,7 @@ class BuildRecord:
     culprit: SourceError | None = None
     log: str = ""
     tests: tuple[PytestRecord, ...] = ()
+    waited: bool | None = None
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import pytest
 
 from grader.findings.finding import Finding, Status
 from grader.submission.record import BuildRecord, Definition, Dependency, PackageRecord
+from tests.checks import builder
 from tests.checks.builder import failing, judge, package, submission
 
 INTERFACE = "bot_msgs/msg/BotStatus"
@@ -41,6 +42,41 @@ DEPENDENCIES = (
     ("geometry_msgs", "depend"),
     ("rosidl_default_runtime", "exec_depend"),
 )
+
+
+HANGS = "Starting >>> hangs\n\n[rosgrade: the build was ended after 300 s: it waited]\n"
+
+
+def test_nothing_is_claimed_of_what_was_never_built():
+    hangs = BuildRecord(
+        False,
+        300.0,
+        timed_out=True,
+        failed_packages=("bot_msgs", "hangs"),
+        log=HANGS,
+        waited=True,
+    )
+    for build, status, words in (
+        (hangs, Status.FAILED, "it was not built, because `hangs` failed to build"),
+        (replace(hangs, failed_packages=("hangs",), waited=None), Status.ERROR, "was ended"),
+    ):
+        subject = submission(interfaces(generated=()), package("hangs"), build=build)
+        finding = judge("interface.generated", subject, interface=INTERFACE)
+        assert finding.status is status
+        assert words in finding.observed
+        assert "installed no code" not in builder.text(finding)
+
+
+@pytest.mark.parametrize(
+    ("waited", "words"),
+    [(True, "look for input(), a sleep"), (False, "endless loop"), (None, "Look for input()")],
+)
+def test_a_build_that_waits_is_told_from_one_that_computes(waited: bool | None, words: str):
+    build = BuildRecord(
+        False, 300.0, timed_out=True, failed_packages=("hangs",), log=HANGS, waited=waited
+    )
+    subject = submission(package("hangs"), build=build)
+    assert words in failing("package.builds", subject, package="hangs")
 
 
 def interfaces(text: str = TEXT, file: str = "msg/BotStatus.msg", **changes) -> PackageRecord:

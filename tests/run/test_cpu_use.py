@@ -19,12 +19,12 @@ from grader.run.host.disturbance import (
     CpuTimes,
     DisturbanceMeter,
     Interval,
-    idle_ticks,
     interval,
     others_share,
     run_delays,
 )
 from grader.run.process.descendants import Family
+from grader.sandbox.usage import idle_ticks
 
 MS = 1_000_000
 

@@ -6,6 +6,8 @@ import os
 import signal
 import subprocess
 import time
+from collections.abc import Iterable
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,15 +15,19 @@ import pytest
 
 from grader.diagnosis.not_built import why_not_built
 from grader.errors import GraderFault
+from grader.findings.finding import Status
 from grader.ros import RosInstallation
 from grader.run.process.descendants import descendants
 from grader.sandbox.limits import BUILD
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
+from grader.sandbox.usage import Usage
 from grader.submission.build.build import build_key
 from grader.submission.build.colcon import BuildLimits, builds_at_once
+from grader.submission.build.own_time import OwnTime
 from grader.submission.prepare import Prepared, prepare
 from grader.submission.record import BuildRecord, PackageRecord
+from tests.checks.builder import judge
 from tests.submission.samples import INTERFACES, MANIFEST, NODE, SETUP_PY, Tree, zip_bytes
 
 pytestmark = pytest.mark.ros
@@ -198,7 +204,8 @@ def test_a_daemon_of_setup_py_that_holds_the_output_costs_the_wall_limit_at_most
     assert time.monotonic() - started < 25
     build = build_of(found)
     assert (build.succeeded, build.timed_out, found.install) == (False, True, None)
-    assert str(build.culprit) == f"{FOLDER}/setup.py: the build was ended after 8 s"
+    ended = "the build was ended after 8 s: it waited for something"
+    assert (str(build.culprit), build.waited) == (f"{FOLDER}/setup.py: {ended}", True)
     assert not build_of(prepared(tree, real_ros, python_s=0.1)).cached
 
 
@@ -214,6 +221,47 @@ def test_setup_py_does_not_see_the_callers_home_and_variables(
     assert "HAS" in build.log
     assert "token" not in build.log
     assert "/home/grader" not in build.log
+
+
+class Starving(OwnTime):
+    """The clock of a program that gets no CPU."""
+
+    def look(self, usages: Iterable[Usage], late_s: float) -> None:
+        self.wall_s += 10_000
+
+
+def test_a_build_without_cpu_is_repeated_alone_and_then_not_graded(
+    tree: Tree, real_ros: RosInstallation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tree.package()
+    cache = tree.root.parent / "cache"
+    places: list[bool] = []
+
+    def place(alone: bool) -> nullcontext[None]:
+        places.append(alone)
+        return nullcontext()
+
+    monkeypatch.setattr("grader.submission.build.bounded.OwnTime", Starving)
+    with pytest.raises(GraderFault, match="this machine has too little time"):
+        prepare(tree.root, real_ros, cache=cache, place=place)
+    assert places == [False, True]
+    assert list(cache.rglob("build.json")) == []
+
+
+@pytest.mark.compiles
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_what_was_built_before_another_package_hangs_counts(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    tree.write(INTERFACES)
+    tree.package({"setup.py": f"import time\ntime.sleep(900)\n{SETUP_PY}"})
+    limits = BuildLimits(other_s=20.0)
+    found = prepare(tree.root, real_ros, cache=tree.root.parent / "cache", limits=limits)
+    build = build_of(found)
+    assert (build.timed_out, build.failed_packages) == (True, ("bot_publisher",)), build.log
+    interface = {"interface": "bot_msgs/msg/Bot"}
+    assert judge("interface.generated", found.record, **interface).status is Status.PASSED
 
 
 @pytest.mark.parametrize("kills", [2, 1])

@@ -1,4 +1,4 @@
-from grader.submission.build.build_log import MAX_BYTES, clean, ending, own_lines
+from grader.submission.build.build_log import MAX_BYTES, clean, ending, folded, own_lines
 
 
 def test_colours_and_control_characters_are_gone() -> None:
@@ -42,3 +42,44 @@ def test_what_colcon_says_begins_a_line_of_its_own() -> None:
         "Starting >>> a\ndone\nFinished <<< a [0.1s]\nFailed   <<< \nFailed   <<< b [0.2s, exited\n"
     )
     assert own_lines(own_lines(log)) == own_lines(log)
+
+
+WARNED = """\
+Starting >>> bot
+CMake Warning at /opt/ros/jazzy/share/tracetools/cmake/extras.cmake:116 (message):
+  Package 'tracetools' exports library 'lttng-ust' which couldn't be found
+Call Stack (most recent call first):
+  /opt/ros/jazzy/share/rclcpp/cmake/rclcppConfig.cmake:41 (include)
+  CMakeLists.txt:4 (find_package)
+
+
+CMake Warning (dev) at /usr/share/cmake/Modules/FindPackage.cmake:438 (message):
+  The package name passed does not match.
+This warning is for project developers.  Use -Wno-dev to suppress it.
+
+CMake Warning at CMakeLists.txt:3 (message):
+  my own
+CMake Error at /opt/ros/jazzy/share/ament_cmake/target.cmake:77 (message):
+  ament_target_dependencies() the passed package name 'x' was not found before
+Call Stack (most recent call first):
+  /opt/ros/jazzy/share/ament_cmake/other.cmake:9 (inner)
+  CMakeLists.txt:5 (ament_target_dependencies)
+
+
+-- Configuring incomplete, errors occurred!
+"""
+
+
+def test_nothing_of_others_stands_above_the_students_own_error() -> None:
+    assert folded(WARNED).splitlines() == [
+        "Starting >>> bot",
+        "CMake Warning at CMakeLists.txt:3 (message):",
+        "  my own",
+        "CMake Error at /opt/ros/jazzy/share/ament_cmake/target.cmake:77 (message):",
+        "  ament_target_dependencies() the passed package name 'x' was not found before",
+        "Call Stack (most recent call first):",
+        "  CMakeLists.txt:5 (ament_target_dependencies)",
+        "",
+        "",
+        "-- Configuring incomplete, errors occurred!",
+    ]

@@ -16,13 +16,11 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 from grader.recording.event import Disturbance
 from grader.recording.model import NS
-from grader.sandbox.usage import OrphanCpu, Process, Taken, usage_at
+from grader.sandbox.usage import IdleCpu, OrphanCpu, Process, Taken, usage_at
 
-_STAT = Path("/proc/stat")
 _TICK_NS = NS // os.sysconf("SC_CLK_TCK")
 # Of a CPU. With a robot in it a cell and the student's process took 0.12 of one together (the
 # references of bot_controller and p_controller); what makes it take more is what it is sent.
@@ -94,10 +92,8 @@ class CpuMeter:
     """Reads CPU times of this machine."""
 
     def __init__(self) -> None:
-        self._cpus = os.sched_getaffinity(0)
-        self.cpus = len(self._cpus)
-        # A container's /proc/stat (lxcfs) calls a CPU idle that another container uses.
-        self._knows_idle = not os.path.ismount(_STAT)
+        self._idle = IdleCpu()
+        self.cpus = self._idle.cpus
         self._orphan_cpu = OrphanCpu()
 
     def read(self, pids: Iterable[int]) -> CpuTimes:
@@ -112,23 +108,9 @@ class CpuMeter:
         self._orphan_cpu.look(there, complete=complete)
         ticks = sum(taken.waited for taken in there.values()) + self._orphan_cpu.ticks
         student_ns = ticks * _TICK_NS + sum(filter(None, own.values()))
-        times = (time.monotonic_ns(), student_ns, self._idle_ns(), time.process_time_ns())
+        idle_ns = self._idle.ticks() * _TICK_NS
+        times = (time.monotonic_ns(), student_ns, idle_ns, time.process_time_ns())
         return CpuTimes(*times, self._orphan_cpu.ended)
-
-    def _idle_ns(self) -> int:
-        if not self._knows_idle:
-            return 0
-        try:
-            return idle_ticks(_STAT.read_text(), self._cpus) * _TICK_NS
-        except (OSError, ValueError, IndexError):
-            return 0
-
-
-def idle_ticks(stat: str, cpus: Iterable[int]) -> int:
-    """Ticks in which CPUs had nothing to do, waits for a disk among them."""
-    wanted = {f"cpu{number}" for number in cpus}
-    rows = (line.split() for line in stat.splitlines())
-    return sum(int(row[4]) + int(row[5]) for row in rows if row and row[0] in wanted)
 
 
 def _own_ns(pid: int) -> int | None:

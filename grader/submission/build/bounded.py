@@ -14,12 +14,16 @@ from pathlib import Path
 from typing import IO
 
 from grader.errors import GraderFault
+from grader.sandbox.usage import Usage, usage_of
+from grader.submission.build.own_time import OwnTime
 
 _SUPERVISOR = Path(__file__).with_name("supervise.py")
 _CHUNK = 64 * 1024
 _KILL_S = 15.0
 _POLL_S = 0.25
 _LONGEST_LINE = 4096
+_LONGEST_STRETCH = 8.0
+"""Wall time, as a multiple of the time that a command may have for itself, until it is given up."""
 
 
 @dataclass(frozen=True)
@@ -73,12 +77,18 @@ class Outcome:
     Attributes:
         status: Exit status, or minus the signal's number, or None if it passed a limit.
         ended_by_us: The limit that it passed: ``time``, ``output`` or what ``excess`` returned.
+        waited: Whether it computed in less than half of the time that it had for itself.
     """
 
     status: int | None
     ended_by_us: str | None
     output: str
     duration_s: float
+    waited: bool = False
+
+
+class Starved(GraderFault):
+    """The machine gave a command too little time to say how it ends; later it may."""
 
 
 def run_bounded(
@@ -89,25 +99,59 @@ def run_bounded(
     wall_s: float,
     output: OutputLimits | None = None,
     on_line: Callable[[str], None] | None = None,
-    excess: Callable[[int], str | None] = lambda _: None,
+    excess: Callable[[Sequence[Usage]], str | None] = lambda _: None,
 ) -> Outcome:
     """Run a command and wait until it and everything that it started is gone.
 
     Args:
-        excess: Called several times a second with the id of the process that everything
-            descends from; names the limit that was passed, which ends the command.
+        wall_s: Most wall time, less what the machine takes of it: see :class:`OwnTime`.
+        excess: Called several times a second with what all its processes take; names the limit
+            that was passed, which ends the command.
+
+    Raises:
+        Starved: It did not end, and the machine had no time for it.
     """
     limits = output or OutputLimits()
     kept = CappedOutput(limits, on_line)
     started = time.monotonic()
+    clock = OwnTime()
     with _supervised(command, cwd, environment) as process:
-        ended_by_us = _drain(process, kept, started + wall_s, excess)
+        ended_by_us = _drain(process, kept, _watch(process, clock, wall_s, excess))
     return Outcome(
         status=None if ended_by_us else process.returncode,
         ended_by_us=ended_by_us,
         output=kept.text(),
         duration_s=time.monotonic() - started,
+        waited=clock.computed_s < clock.own_s / 2,
     )
+
+
+def _watch(
+    process: subprocess.Popen[bytes],
+    clock: OwnTime,
+    wall_s: float,
+    excess: Callable[[Sequence[Usage]], str | None],
+) -> Callable[[float], str | None]:
+    """A function that looks at a command, so much later than due; names a limit that it passed."""
+
+    def look(late_s: float) -> str | None:
+        usages = usage_of([process.pid])
+        clock.look(usages, late_s)
+        passed = excess(usages)
+        # What has ended was in time, also where this process was stopped meanwhile.
+        if passed is not None or process.poll() is not None:
+            return passed
+        if clock.own_s > wall_s:
+            return "time"
+        if clock.wall_s > _LONGEST_STRETCH * wall_s:
+            raise Starved(
+                "this machine has too little time for it: after "
+                f"{clock.wall_s / 60:.0f} min a program that may take {wall_s:.0f} s had got "
+                f"{clock.computed_s:.0f} s of CPU time. Grade again when less runs here"
+            )
+        return None
+
+    return look
 
 
 @contextlib.contextmanager
@@ -146,18 +190,18 @@ def _supervised(
 def _drain(
     process: subprocess.Popen[bytes],
     kept: CappedOutput,
-    deadline: float,
-    excess: Callable[[int], str | None],
+    look: Callable[[float], str | None],
 ) -> str | None:
     """Take the output until the supervisor has ended; the limit that was passed, or None."""
     assert process.stdout is not None
-    next_look = time.monotonic() + _POLL_S
+    due = time.monotonic() + _POLL_S
     with selectors.DefaultSelector() as selector:
         selector.register(process.stdout, selectors.EVENT_READ)
         while True:
             # Asked first: what was written until its end is there to be read afterwards.
             is_gone = process.poll() is not None
-            if selector.select(0.0 if is_gone else _POLL_S):
+            remaining = max(0.0, due - time.monotonic())
+            if selector.select(0.0 if is_gone else remaining):
                 block = os.read(process.stdout.fileno(), _CHUNK)
                 if not block:
                     return None
@@ -167,15 +211,12 @@ def _drain(
             elif is_gone:
                 # A daemon holds the pipe although the supervisor is gone.
                 return None
-            now = time.monotonic()
-            # What has ended was in time, also where this process was stopped meanwhile.
-            if now > deadline and not is_gone:
-                return "time"
-            if now >= next_look:
-                passed = excess(process.pid)
+            late_s = time.monotonic() - due
+            if late_s >= 0.0:
+                passed = look(late_s)
                 if passed is not None:
                     return passed
-                next_look = time.monotonic() + _POLL_S
+                due = time.monotonic() + _POLL_S
 
 
 def _close(stream: IO[bytes] | None) -> None:

@@ -21,11 +21,12 @@ from grader.errors import GraderFault, machine_fault
 from grader.out_of_memory import oom_kills
 from grader.ros import RosInstallation
 from grader.submission.build import build_log, own_tests, standalone_build
-from grader.submission.build.bounded import Outcome
+from grader.submission.build.bounded import Outcome, Starved
 from grader.submission.build.build_cache import INSTALL, BuildCache, CachedBuild
 from grader.submission.build.build_error_location import Sources, find_build_error, last_started
 from grader.submission.build.colcon import COMPILE_S, BuildLimits, BuildSetting, Colcon
 from grader.submission.build.installed import tidy
+from grader.submission.build.ros_damage import damaged, state_of
 from grader.submission.build.toolchain import missing_here, missing_tools, watched_folders
 from grader.submission.intake.locate import Located, only
 from grader.submission.intake.members import MIB
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 # Raise it when the same submission would now be built differently.
-_VERSION = 6
+_VERSION = 7
 _TOOLS = ("cc", "c++", "cmake", "ld", "make", "ninja")
 _SUMMARY = re.compile(r"Summary: \d+ packages? finished")
 _SIGNALLED = 128
@@ -88,10 +89,10 @@ class BuildKilled(GraderFault):
 
 
 def once_more(attempt: Callable[[bool], _T]) -> _T:
-    """Build, and build again if the first build was killed."""
+    """Build, and build again if the machine ended the first build, or had no time for it."""
     try:
         return attempt(False)
-    except BuildKilled:
+    except (BuildKilled, Starved):
         return attempt(True)
 
 
@@ -99,7 +100,7 @@ def once_more(attempt: Callable[[bool], _T]) -> _T:
 class Builder(BuildSetting):
     """Builds submissions in one setting, or takes them from the cache.
 
-    The cache keeps failed builds, too, but not those that the time limit ended.
+    The cache keeps failed builds, too, where it is certain that the reason is the student's.
     """
 
     cache: BuildCache
@@ -132,7 +133,7 @@ class Builder(BuildSetting):
             )
         self.on_progress("looking for an earlier build")
         with self.cache.locked(key, wait_s=wall_s + COMPILE_S):
-            found = self.cache.find(key)
+            found = self.cache.find(key, self._state)
             if found is not None:
                 return found
             parts = dict(self._parts(located, sources, standalone))
@@ -150,10 +151,13 @@ class Builder(BuildSetting):
                     is_standalone=is_standalone,
                     wall_s=wall_s,
                 )
-                record = self._run(colcon, sources, parts)
-                if record.timed_out:
-                    return CachedBuild(record, None)
-                return self.cache.store(key, unfinished, record)
+                record, is_certain = self._run(colcon, sources, parts)
+                seen_with = None if record.succeeded else self._state() if is_certain else ""
+                return self.cache.store(key, unfinished, record, seen_with)
+
+    def _state(self) -> str:
+        """What a failure is seen with, besides what is in the key."""
+        return state_of(self.ros)
 
     def _parts(
         self, located: Located, sources: Sources, names: Sequence[str]
@@ -175,8 +179,8 @@ class Builder(BuildSetting):
 
     def _run(
         self, colcon: Colcon, sources: Sources, parts: Mapping[str, CachedBuild]
-    ) -> BuildRecord:
-        """Build without a look into the cache."""
+    ) -> tuple[BuildRecord, bool]:
+        """Build without a look into the cache; also whether it would come to the same again."""
         install = colcon.install
         for name, part in parts.items():
             assert part.install is not None
@@ -198,8 +202,12 @@ class Builder(BuildSetting):
             most_bytes=self.limits.install_bytes,
             most_files=self.limits.install_files,
         )
+        if problem is not None:
+            # Nothing of it is there any more.
+            finished.clear()
         problem = problem or _limit(outcome, colcon.wall_s)
-        record = self._record(outcome, colcon, sources, sources.folders.keys() - finished, problem)
+        failed = sources.folders.keys() - finished
+        record, is_certain = self._record(outcome, colcon, sources, failed, problem)
         if finished:
             # Nodes then start without doing it.
             colcon.compile()
@@ -207,7 +215,7 @@ class Builder(BuildSetting):
             # colcon writes its own setup files first.
             shutil.rmtree(install, ignore_errors=True)
         builds = [part.build for part in parts.values()]
-        return replace(
+        record = replace(
             record,
             tests=tuple(
                 own_tests.pytest_record(name, *colcon.test(sources.folders[name]))
@@ -216,6 +224,7 @@ class Builder(BuildSetting):
             duration_s=round(record.duration_s + sum(one.duration_s for one in builds), 3),
             log=build_log.ending("".join(one.log for one in builds) + record.log),
         )
+        return record, is_certain
 
     def _check_machine(self, outcome: Outcome, colcon: Colcon, *, memory_ran_out: bool) -> None:
         """Raise an error for a failure that is not the student's fault."""
@@ -247,38 +256,45 @@ class Builder(BuildSetting):
         sources: Sources,
         failed: set[str],
         problem: str | None,
-    ) -> BuildRecord:
+    ) -> tuple[BuildRecord, bool]:
+        ros = [*self.ros.underlays, *self.ros.prefixes]
         paths = {
             str(colcon.root): "",
             str(colcon.scratch / "build"): "build",
             str(colcon.install): "install",
             str(colcon.scratch): "scratch",
+            **{str(prefix): build_log.ROS for prefix in ros},
         }
         log = build_log.clean(outcome.output, paths)
         succeeded = outcome.status == 0 and not failed and problem is None
-        culprit = None
-        if not succeeded:
-            culprit = find_build_error(log, failed, sources)
-            culprit = culprit or last_started(log, sources, problem)
+        lacking = self._lacking(log, sources) if failed else set()
+        culprit = None if succeeded else find_build_error(log, failed, sources)
+        timed_out = outcome.ended_by_us == "time"
+        is_certain = not timed_out and not lacking and not (culprit is None and problem is None)
+        if not succeeded and culprit is None:
+            culprit = last_started(log, sources, problem)
+        log = build_log.folded(log)
         if problem is not None:
             log += f"\n[rosgrade: {problem}]\n"
-        return BuildRecord(
+        record = BuildRecord(
             succeeded=succeeded,
             duration_s=outcome.duration_s,
-            timed_out=outcome.ended_by_us == "time",
+            timed_out=timed_out,
+            waited=outcome.waited if timed_out else None,
             failed_packages=tuple(sorted(failed)),
-            lacking=tuple(sorted(self._lacking(outcome.output, sources))) if failed else (),
+            lacking=tuple(sorted(lacking)),
             culprit=culprit,
             log=log,
         )
+        return record, is_certain
 
-    def _lacking(self, output: str, sources: Sources) -> set[str]:
-        """What ROS 2 Jazzy has and is neither installed here nor handed in."""
-        named = build_log.not_found(output)
-        wanted = named | build_log.modules_not_found(output)
+    def _lacking(self, log: str, sources: Sources) -> set[str]:
+        """What ROS 2 Jazzy has and is neither handed in nor whole on this machine."""
+        named = build_log.not_found(log)
+        wanted = named | build_log.modules_not_found(log)
         missing = wanted & PACKAGES - self.ros.packages - set(sources.folders)
         tools = missing_tools(self.ros.environment({})["PATH"])
-        return missing | missing_here(named) | set(tools)
+        return missing | missing_here(named) | set(tools) | damaged(log, self.ros, sources.folders)
 
 
 def _is_cut_off(status: int, output: str) -> bool:
@@ -300,8 +316,9 @@ def _limit(outcome: Outcome, wall_s: float) -> str | None:
     """The limit that a build passed, in words for the student."""
     if outcome.ended_by_us is None:
         return None
+    waited = "it waited for something" if outcome.waited else "it was still computing"
     reasons = {
-        "time": f"after {wall_s:.0f} s",
+        "time": f"after {wall_s:.0f} s: {waited}",
         "output": "because it wrote too much output",
     }
     reason = reasons.get(outcome.ended_by_us, f"because {outcome.ended_by_us}")

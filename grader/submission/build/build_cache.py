@@ -16,7 +16,7 @@ import shutil
 import stat
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -44,12 +44,18 @@ _IN_USE_S = 3600.0
 
 @dataclass(frozen=True)
 class _Entry:
-    """The content of ``build.json``."""
+    """The content of ``build.json``.
+
+    Attributes:
+        seen_with: State of the machine for which the build holds; None for every state, and an
+            empty text for none: it is there for who uses it now.
+    """
 
     build: BuildRecord
     installed: bool
     tree: str
     size: int
+    seen_with: str | None = None
 
 
 _ENTRY = TypeAdapter(_Entry)
@@ -97,12 +103,18 @@ class BuildCache:
         finally:
             os.close(file)
 
-    def find(self, key: str) -> CachedBuild | None:
-        """Return a build that is there and whole, or None."""
+    def find(self, key: str, state: Callable[[], str] = str) -> CachedBuild | None:
+        """Return a build that is there and whole, or None.
+
+        Args:
+            state: Tells the state of the machine, where a build holds only for one.
+        """
         folder = self._folder / key
         entry = _read(folder)
         install = folder / INSTALL
         if entry is None or (entry.installed and tree_hash(install) != entry.tree):
+            return None
+        if entry.seen_with is not None and (not entry.seen_with or entry.seen_with != state()):
             return None
         with contextlib.suppress(OSError):
             os.utime(folder)
@@ -119,7 +131,9 @@ class BuildCache:
         finally:
             remove_tree(folder)
 
-    def store(self, key: str, unfinished: Path, build: BuildRecord) -> CachedBuild:
+    def store(
+        self, key: str, unfinished: Path, build: BuildRecord, seen_with: str | None = None
+    ) -> CachedBuild:
         """Make an unfinished folder, with what is in its ``install``, the build of that key.
 
         An entry that another process stored meanwhile stays and is returned.
@@ -127,14 +141,15 @@ class BuildCache:
         install = unfinished / INSTALL
         installed = install.is_dir()
         size = sum(path.lstat().st_size for path in _files(install))
-        entry = _Entry(build, installed, tree_hash(install) if installed else "", size)
+        entry = _Entry(build, installed, tree_hash(install) if installed else "", size, seen_with)
         with _usable(self._folder):
             (unfinished / _RECORD).write_bytes(_ENTRY.dump_json(entry))
-            other = self.find(key)
+            other = self.find(key, lambda: seen_with or "")
             if other is not None:
                 return other
             with contextlib.suppress(FileNotFoundError):
-                # A damaged one; renamed, so that the place is free for the shortest time.
+                # One that does not hold, or is damaged; renamed, so that the place is free for the
+                # shortest time.
                 (self._folder / key).rename(unfinished / "damaged")
             unfinished.rename(self._folder / key)
         shutil.rmtree(self._folder / key / "damaged", ignore_errors=True)

@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping
 
 MAX_BYTES = 64 * 1024
+ROS = "/opt/ros/jazzy"
+"""Where ROS is to a student, wherever it is here."""
 
 _ANSI = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\x1b\][^\x07\x1b]*(?:\x07|\x1b\\)|\x1b[@-_]")
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
@@ -23,6 +25,13 @@ _FOLDED = (
     (re.compile(r"\b(using \w+ = )(?:class |struct )?"), ""),
     (re.compile(r" \{aka (?:‘[^’\n]*’|'[^'\n]*')\}"), ""),
 )
+# What CMake says of files that are not the student's, and who called whom there.
+_OTHERS_WARNING = re.compile(
+    r"^CMake (?:\w+ )?Warning(?: \(dev\))? at /.*\n"
+    r"(?:[ \t].*\n|\n|Call Stack .*\n|This warning .*\n)*",
+    re.MULTILINE,
+)
+_OTHERS_CALL = re.compile(r"^  /\S.*:\d+ \(\w+\)\n|^Call Stack .*\n(?=\n|\Z)", re.MULTILINE)
 _ENDED = re.compile(r"(?<!^)(?=(?:Finished|Failed  |Aborted ) <<< \S+ \[)", re.MULTILINE)
 _NOT_FOUND = (
     re.compile(r"Could not find a package configuration file provided by\s+\"([\w-]+)\""),
@@ -31,8 +40,8 @@ _NOT_FOUND = (
     re.compile(r"required packages were not found:\s+- ([\w.+-]+)"),
 )
 """What CMake says of a package that is not there."""
-# CMake's FindPython3 names the part of it that it did not find.
-_NO_HEADERS = "Development.Module"
+# CMake's FindPython3 names the part of it that it did not find, a compiler the header.
+_NO_HEADERS = ("Development.Module", "fatal error: Python.h: No such file")
 PYTHON_HEADERS = "python3-dev"
 _MISSING_MODULE = re.compile(r"^ModuleNotFoundError: No module named '(\w+)'$", re.MULTILINE)
 
@@ -55,6 +64,13 @@ def clean(output: str, paths: Mapping[str, str]) -> str:
     return _NOISE.sub("", text)
 
 
+def folded(log: str) -> str:
+    """A cleaned log without warnings and callers in CMake files of others, above one's error."""
+    for _ in range(2):
+        log = _OTHERS_CALL.sub("", _OTHERS_WARNING.sub("", log))
+    return log
+
+
 def own_lines(output: str) -> str:
     """Begin a line wherever colcon says how a package ended.
 
@@ -75,7 +91,7 @@ def ending(log: str) -> str:
 def not_found(log: str) -> set[str]:
     """Packages and libraries that CMake did not find."""
     packages = {name for pattern in _NOT_FOUND for name in pattern.findall(log)}
-    return packages | ({PYTHON_HEADERS} if _NO_HEADERS in log else set())
+    return packages | ({PYTHON_HEADERS} if any(text in log for text in _NO_HEADERS) else set())
 
 
 def modules_not_found(log: str) -> set[str]:

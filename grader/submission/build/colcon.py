@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from grader.errors import GraderFault
 from grader.ros import RosInstallation, site_packages
 from grader.sandbox.limits import BUILD, SandboxLimits
+from grader.sandbox.usage import Usage
 from grader.submission.build import build_log, own_tests
 from grader.submission.build.bounded import Outcome, OutputLimits, run_bounded
 from grader.submission.intake.members import MIB
@@ -44,7 +45,11 @@ _PROGRESS = re.compile(r"(Starting|Finished|Failed|Aborted) +(?:>>>|<<<) (\S+)")
 
 @dataclass(frozen=True)
 class BuildLimits:
-    """How much a build may take: wall time of pure Python packages, and of others, and space."""
+    """How much a build may take: its own time (:class:`OwnTime`), and space.
+
+    Attributes:
+        python_s: Time where all packages are pure Python; else ``other_s``.
+    """
 
     python_s: float = 120.0
     other_s: float = 300.0
@@ -216,10 +221,10 @@ class Colcon:
                 )
                 command, environment = room.command(command, environment), room.environment
 
-            def excess(pid: int) -> str | None:
+            def excess(usages: Sequence[Usage]) -> str | None:
                 if setting.stop is not None and setting.stop.is_set():
                     raise GraderFault("interrupted")
-                return room.excess(pid) if room else None
+                return room.excess(usages) if room else None
 
             try:
                 outcome = run_bounded(

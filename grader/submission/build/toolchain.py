@@ -10,7 +10,9 @@ from pathlib import Path
 
 from grader.bootstrap import COMPILERS
 from grader.errors import GraderFault
+from grader.ros import DISTRO
 from grader.submission.build.build_log import PYTHON_HEADERS
+from grader.submission.read.rosdistro import PACKAGES
 
 _HINT = "this machine cannot build packages that are not pure Python, because tools are missing:"
 # What CMake calls the libraries that rosdep installs for the packages of ROS 2 Jazzy.
@@ -58,6 +60,13 @@ def _has_library(name: str) -> bool:
 def has_headers() -> bool:
     """Whether this machine has Python's headers."""
     return Path(sysconfig.get_path("include"), "Python.h").is_file()
+
+
+def apt_package(name: str) -> str:
+    """What Debian and Ubuntu call a tool, or a package of ROS; nothing where that is not known."""
+    if name in PACKAGES:
+        return f"ros-{DISTRO}-{name.replace('_', '-')}"
+    return name if name in COMPILERS.values() or name == PYTHON_HEADERS else ""
 
 
 def headers_package() -> str:

@@ -11,7 +11,7 @@ import os
 import shutil
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +21,7 @@ from pydantic import TypeAdapter
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
 from grader.sandbox.limits import BUILD, size_words
-from grader.sandbox.usage import folder_usage
+from grader.sandbox.usage import Usage, folder_usage
 from grader.submission.build.bounded import Outcome, OutputLimits, run_bounded
 from grader.submission.intake.locate import Located
 from grader.submission.intake.paths import join, shown
@@ -99,12 +99,12 @@ def _run(
         "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1",
     }
 
-    def disk(_: int) -> str | None:
+    def disk(_: object) -> str | None:
         size, _ = folder_usage((scratch,), BUILD.disk_bytes, BUILD.files)
         unpacked = f"it unpacks to more than {size_words(BUILD.disk_bytes)}"
         return unpacked if size > BUILD.disk_bytes else None
 
-    excess: Callable[[int], str | None] = disk
+    excess: Callable[[Sequence[Usage]], str | None] = disk
     with ExitStack() as stack:
         if sandbox is not None:
             room = stack.enter_context(

@@ -45,7 +45,7 @@ CARRIED = carried_interfaces()
 
 # Raise it when the same sources would now be built differently, as by another wheels.cmake.
 _RECIPE = 1
-_FOLDER, _NOTE = "underlays", "underlay.json"
+UNDERLAYS, _NOTE = "underlays", "underlay.json"
 _INDEX = "share/ament_index/resource_index/packages"
 # Thirty interfaces take 95 s of CPU, and rclcpp more.
 _LIMITS = BuildLimits(
@@ -100,7 +100,7 @@ class UnderlayStore:
             sandbox: In which packages are built.
             stop: Set when nothing needs to be built any more.
         """
-        self._folder = cache / _FOLDER
+        self._folder = cache / UNDERLAYS
         self._kept = BuildCache(self._folder, is_pruned=False)
         self._passing = BuildCache(cache)
         self._ros = ros

@@ -18,7 +18,7 @@ REPOSITORY = "repositories:\n  a/b:\n    type: git\n    url: https://example.org
 
 
 def test_the_named_sets_are_those_that_courses_need() -> None:
-    assert named_sets() == ("launch", "rclcpp", "ros2cli", "tf2")
+    assert named_sets() == ("ament_cmake_auto", "launch", "rclcpp", "ros2cli", "tf2")
 
 
 @pytest.mark.parametrize("name", named_sets())

@@ -1,0 +1,124 @@
+"""The time that a program had for itself: wall time, less what the machine took from it.
+
+A program computes, or it waits (for input, a lock, the network, a sleep), or it is ready and gets
+no CPU. Only the last is the machine's, and only as far as others explain it: where a program's own
+processes are on the CPUs, they wait for each other.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.sandbox.usage import IdleCpu, OrphanCpu, Usage, states
+
+_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
+_PRESSURE = Path("/proc/pressure/io")
+_CGROUP = Path("/sys/fs/cgroup")
+_THROTTLED = re.compile(r"^throttled_(usec|time) (\d+)$", re.MULTILINE)
+_PER_S = {"usec": 1e6, "time": 1e9}
+_STALLED = re.compile(r"^some .*total=(\d+)$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Look:
+    """What is known of a program and its machine at one moment, in seconds.
+
+    Attributes:
+        used_s: CPU time of its processes so far.
+        unseen: How many of them have ended since the look before, if some of what they took is not
+            known.
+        idle_s: In which CPUs had nothing to do.
+        throttled_s: In which this container got no CPU, for it had had its share (cgroups(7)).
+        stalled_s: In which something on the machine waited for a disk (PSI).
+        late_s: How much later this look is than it was to be.
+        does: What its threads do now: ``R`` is ready or running, ``D`` waits for a disk.
+    """
+
+    time_s: float
+    used_s: float = 0.0
+    unseen: int = 0
+    idle_s: float = 0.0
+    throttled_s: float = 0.0
+    stalled_s: float = 0.0
+    late_s: float = 0.0
+    does: Sequence[str] | set[str] = ()
+
+
+def taken_s(before: Look, after: Look, cpus: int) -> float:
+    """How much of the time between two looks the machine took from a program."""
+    wall_s = after.time_s - before.time_s
+    ran_s = max(0.0, after.used_s - before.used_s)
+    # This process was held up, and saw nothing of what the program did meanwhile.
+    explained_s = after.late_s
+    if "R" in after.does:
+        idle_s = after.idle_s - before.idle_s
+        others_s = cpus * wall_s - ran_s - idle_s - after.unseen * wall_s
+        explained_s += max(0.0, others_s) + after.throttled_s - before.throttled_s
+    if "D" in after.does:
+        explained_s += after.stalled_s - before.stalled_s
+    return max(0.0, min(wall_s - ran_s, explained_s))
+
+
+class OwnTime:
+    """A clock that stands still while the machine gives a program no CPU.
+
+    Attributes:
+        wall_s: Since its start.
+        own_s: The time that it shows.
+        computed_s: CPU time of all processes of the program.
+    """
+
+    def __init__(self) -> None:
+        """Start it."""
+        self.wall_s = self.own_s = self.computed_s = 0.0
+        self._cpu = OrphanCpu()
+        self._idle = IdleCpu()
+        self._last = self._look((), 0.0)
+
+    def look(self, usages: Iterable[Usage], late_s: float) -> None:
+        """Read it, with what the processes of the program take now."""
+        now = self._look(usages, late_s)
+        wall_s = now.time_s - self._last.time_s
+        self.wall_s += wall_s
+        self.own_s += wall_s - taken_s(self._last, now, self._idle.cpus)
+        self.computed_s = now.used_s
+        self._last = now
+
+    def _look(self, usages: Iterable[Usage], late_s: float) -> Look:
+        there = list(usages)
+        used_s = self._cpu.used_s(there)
+        return Look(
+            time.monotonic(),
+            used_s,
+            self._cpu.ended,
+            self._idle.ticks() / _TICKS_PER_S,
+            throttled_s(),
+            stalled_s(),
+            late_s,
+            states(there),
+        )
+
+
+def throttled_s(root: Path = _CGROUP) -> float:
+    """Time in which the container of this process was kept from all CPUs, as far as it can see."""
+    for folder in (root, root / "cpu"):
+        with suppress(OSError):
+            found = _THROTTLED.search((folder / "cpu.stat").read_text())
+            if found:
+                return int(found[2]) / _PER_S[found[1]]
+    return 0.0
+
+
+def stalled_s(file: Path = _PRESSURE) -> float:
+    """Time in which something on this machine waited for a disk; 0 where it is not known."""
+    with suppress(OSError):
+        found = _STALLED.search(file.read_text())
+        if found:
+            return int(found[1]) / 1e6
+    return 0.0

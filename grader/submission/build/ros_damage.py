@@ -1,0 +1,135 @@
+"""What a build finds damaged in the ROS installation: the machine's fault, and not the student's.
+
+A build file may print the same words; so what the log says is looked up on the disk.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib.util
+import os
+import re
+from collections.abc import Collection, Iterator
+from pathlib import Path
+
+from grader.ros import RosInstallation
+from grader.submission.build.build_log import ROS
+from grader.submission.read.rosdistro import PACKAGES
+
+_FILE = rf"(?P<file>{ROS}/[^\s:'\"]+)"
+_DAMAGE = tuple(
+    re.compile(pattern)
+    for pattern in (
+        r"mported target \"(?P<package>[\w.+-]+)::[^\"]+\"\s+(?:includes non-existent path|"
+        r"references the file)\s+\"(?P<named>/[^\"]+)\"",
+        rf"No rule to make target '{_FILE}', needed by",
+        rf"'{_FILE}', needed by '[^']+', missing and no known rule",
+        rf"{_FILE}: file (?:not recognized|truncated)",
+        rf"(?:CMake Error at|Error in cmake code at)\s+{_FILE}:\d+(?: \(\w+\))?:\s+"
+        r"(?:Parse error|A logical block|Flow control|include could not)",
+        rf"CMake Error at {ROS}/\S+ \(find_package\):\s+By not providing \"Find(?P<package>[\w-]+)",
+        rf"CMake Error at {ROS}/\S+ \(include\):\s+include could not find [\w ]+:\s+{_FILE}",
+        rf"{ROS}/[^\s:]+:\d+:\d+: fatal error: (?P<header>[\w./+-]+): No such file",
+        rf"File \"{ROS}/[^\"]+\", line \d+, in .*\n(?:.*\n)?"
+        r"ModuleNotFoundError: No module named '(?P<module>\w+)",
+    )
+)
+# .../include/NAME/..., .../share/NAME/..., .../lib/NAME/..., .../lib/libNAME__typesupport.so
+_OWNER = re.compile(
+    r"/(?:include|share|site-packages)/([\w+-]+)|/lib/(?:lib)?([\w+-]+?)(?:__|\.|/)"
+)
+_BLOCKS = ("if", "foreach", "while", "function", "macro")
+
+
+def damaged(log: str, ros: RosInstallation, own: Collection[str]) -> set[str]:
+    """Packages of ROS that are not whole, by a cleaned log, and modules that ROS itself lacks.
+
+    Args:
+        own: Names of the submission's packages.
+    """
+    names = {_name(found) for found in _found(log) if _is_damaged(found, ros)}
+    return names - set(own) - {""}
+
+
+def damage_in(log: str) -> set[str]:
+    """The same, as far as the log alone can tell."""
+    return {_name(found) for found in _found(log)}
+
+
+def _found(log: str) -> Iterator[dict[str, str | None]]:
+    for pattern in _DAMAGE:
+        for match in pattern.finditer(log):
+            yield match.groupdict()
+
+
+def _name(found: dict[str, str | None]) -> str:
+    """The package of ROS that the log speaks of, or a module; nothing for the student's own."""
+    if found.get("module"):
+        return found["module"] or ""
+    owner = _OWNER.search(found.get("file") or "")
+    header = (found.get("header") or "").partition("/")[0]
+    name = found.get("package") or header or (owner and (owner[1] or owner[2])) or ""
+    return name if name in PACKAGES else ""
+
+
+def _is_damaged(found: dict[str, str | None], ros: RosInstallation) -> bool:
+    prefixes = [*ros.underlays, *ros.prefixes]
+    if header := found.get("header"):
+        # One that is there was only not looked for: the submission links too little.
+        package = header.partition("/")[0]
+        places = (place for at in prefixes for place in (at / "include", at / "include" / package))
+        return not any((place / header).is_file() for place in places)
+    if module := found.get("module"):
+        there = any(any(site.glob(f"{module}*")) for site in ros.site_packages)
+        return not there and importlib.util.find_spec(module) is None
+    if file := found.get("file"):
+        places = (at / file.removeprefix(f"{ROS}/") for at in prefixes)
+        return all(map(_is_broken, places))
+    folders = [at / "share" / (found["package"] or "") / "cmake" for at in prefixes]
+    if not (named := found.get("named")):
+        return not any([*at.glob("*[Cc]onfig.cmake")] for at in folders)
+    if any(Path(named.replace(ROS, str(at))).exists() for at in prefixes):
+        return False
+    written = (named, named.replace(ROS, "${_IMPORT_PREFIX}"))
+    texts = [path.read_text(errors="replace") for at in folders for path in at.glob("*.cmake")]
+    return any(name in text for name in written for text in texts)
+
+
+def _is_broken(file: Path) -> bool:
+    """Whether a file is missing or was cut off: a library, or a file of CMake."""
+    try:
+        data = file.read_bytes()
+    except OSError:
+        return True
+    if file.suffix == ".cmake":
+        text = data.decode(errors="replace")
+        ends = (
+            len(re.findall(rf"^\s*{word}\s*\(", text, re.MULTILINE | re.IGNORECASE))
+            == len(re.findall(rf"^\s*end{word}\s*\(", text, re.MULTILINE | re.IGNORECASE))
+            for word in _BLOCKS
+        )
+        return text.count("(") != text.count(")") or not all(ends)
+    # Where the section headers begin, their size and number; elf(5), of 64 bits.
+    begin, each, count = (
+        int.from_bytes(data[at : at + size], "little") for at, size in ((40, 8), (58, 2), (60, 2))
+    )
+    return data[:4] != b"\x7fELF" or len(data) < begin + each * count
+
+
+def state_of(ros: RosInstallation) -> str:
+    """What changes with any file of an installation that others look after."""
+    if ros.source != "sourced":
+        return ros.source
+    total = hashlib.sha256()
+    for prefix in ros.prefixes:
+        for parent, folders, names in os.walk(prefix):
+            # Python compiles whenever something is imported.
+            folders[:] = sorted(name for name in folders if name != "__pycache__")
+            for name in sorted(names):
+                path = os.path.join(parent, name)  # noqa: PTH118  often
+                with contextlib.suppress(OSError):
+                    status = os.lstat(path)
+                    line = f"{path}\0{status.st_size}\0{status.st_mtime_ns}\n"
+                    total.update(line.encode(errors="surrogateescape"))
+    return total.hexdigest()
