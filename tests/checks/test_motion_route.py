@@ -96,6 +96,13 @@ def test_a_place_is_missed_for_a_cause_of_its_own(way, said, when):
     assert finding.hint
 
 
+def test_a_route_that_ends_where_it_began_was_not_there_too_early():
+    """It is at its last place at the start, and at the place before while it leaves that."""
+    run = legs(0.1, 0.5, RIGHT_ANGLE, 0.2)
+    finding = judge("motion.visits", run, places=[[0, 0], *SQUARE, [0.5, 0], [0, 0]])
+    assert "2 of 5 places; it stopped 0.2" in finding.observed
+
+
 def test_the_cause_is_shown_at_the_turn_and_not_at_the_end():
     finding = judge("motion.visits", legs(0.1, 0.5, -RIGHT_ANGLE, 0.5), places=SQUARE)
     at_corner, wrong = finding.evidence.moments

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import dropwhile
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
@@ -117,12 +118,9 @@ def _why_missed(
     place, name = places[number], _words(places[number])
     x_m, y_m, reach_m = _middle(place, parameters.position)
     seen = f"{len(visited)} of {counted(len(places), 'place')}"
-    there = next((step for step in truth if parameters.is_at(place, step)), None)
-    later = {
-        index: next((step for step in way if parameters.is_at(places[index], step)), None)
-        for index in range(number + 1, len(places) if parameters.ordered else 0)
-    }
-    skipped = next((_words(places[index]) for index, step in later.items() if step), "")
+    there = _arrival(way if parameters.pause else truth, place, parameters)
+    later = places[number + 1 :] if parameters.ordered else ()
+    skipped = next((_words(one) for one in later if _arrival(way, one, parameters)), "")
     symptom = PlaceMissed(recording, seen, name, x_m, y_m, reach_m, way, moments, skipped)
     if there is None:
         return cause_of(symptom)
@@ -133,6 +131,12 @@ def _why_missed(
         hint = "Take the places in their order: choose the next one when the robot is at this one."
     told = symptom.cause(f"it was at {name}, {how}", hint, f"at {name}", there)
     return why_off_course(recording) or told
+
+
+def _arrival(steps: Sequence[Truth], place: Place, parameters: Visits) -> Truth | None:
+    """When the robot came to a place where it was not at first; None if it did not."""
+    away = dropwhile(lambda step: parameters.is_at(place, step), steps)
+    return next((step for step in away if parameters.is_at(place, step)), None)
 
 
 def _visits(truth: Sequence[Truth], parameters: Visits) -> dict[int, int]:
