@@ -208,6 +208,7 @@ def of_speed(run):
         (lambda d, e: 0.5 * d, {"top": 0.1}),
         (lambda d, e: max(0.04, 0.6 * d), {}),
         (lambda d, e: round(0.3 * d, 2), {}),
+        (lambda d, e: round(0.544 * d, 2), {"top": 0.05, "angular": 3.6, "spin": 1.0}),
         (lambda d, e: 0.6 * d * max(0.0, math.cos(e)), {}),
         (lambda d, e: 0.6 * d * (1.0 - abs(e) / math.pi), {}),
         (lambda d, e: 0.0 if abs(e) > 0.05 else 0.6 * d, {}),

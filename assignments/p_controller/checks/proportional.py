@@ -32,6 +32,8 @@ from .control_law import LEAST_SAMPLES, Law, LawVerdict, at_the_goal, examine, o
 _MOST_POINTS = 400
 # A robot that looks at the goal need not be slower because it turns.
 _FACING_RAD = 0.1
+# Half a step of commands with two decimals, and what odometry is late.
+_ROUNDED_M_S = 0.006
 # Of distances that are more alike a root looks like a line.
 _LEAST_SPREAD = 1.5
 _WHAT = {"position": "the direction of the goal", "align": "the goal's heading"}
@@ -150,7 +152,8 @@ def proportional_speed(recording: Recording, parameters: ProportionalSpeed) -> F
     )
     if far.error < _LEAST_SPREAD * near.error:
         return Finding.passed(parameters.asked_for, "the distances hardly differ")
-    if line.r2 >= parameters.r2:
+    rounded = all(abs(one.command - line.gain * one.error) <= _ROUNDED_M_S for one in samples)
+    if line.r2 >= parameters.r2 or rounded:
         seen = f"gain {line.gain:.3g} 1/s, R² {line.r2:.3f}, {counted(line.used, 'command')}"
         return Finding.passed(parameters.asked_for, seen, Evidence(plots=(plot,)))
     return why_off_course(recording) or Cause(
