@@ -69,7 +69,8 @@ class StudentReview(AttemptReview):
 
     def others_than(self, shown: AttemptReview, before: Collection[str]) -> list[AttemptReview]:
         """What is written about the attempts before, by their hashes, first to last."""
-        found = {id(one): one for one in map(self.of, before) if one is not shown}
+        found = {id(one): one for one in map(self.of, before) if len(_content(one)) > 1}
+        found.pop(id(shown), None)
         return list(found.values())
 
     def about(self, attempt: str, **update: object) -> StudentReview:

@@ -13,11 +13,12 @@ from grader.review.store import ReviewStore
 from grader.server.review import ReviewServer
 from tests.browser.conftest import SCREENSHOTS
 from tests.browser.test_report import violations
-from tests.server.make_class import NODE, make_class
+from tests.server.make_class import NODE, hand_in_again, make_class
 
 pytestmark = pytest.mark.slow
 SAVED = re.compile(r"saved \d\d:\d\d:\d\d")
 Opened = Callable[..., Page]
+expect.set_options(timeout=20_000)
 
 
 @pytest.fixture
@@ -191,3 +192,58 @@ def test_a_changed_check_is_previewed_applied_and_taken_back(visit: Opened) -> N
     page.get_by_role("button", name="Back").click()
     expect(page.get_by_text("3 lose 12")).to_be_visible()
     expect(page.get_by_role("button", name="Back")).to_be_hidden()
+
+
+def test_a_draft_keeps_its_line(visit: Opened, out: Path) -> None:
+    page = visit("s/ben/")
+    page.keyboard.press("s")
+    page.locator("#L6 .line").click()
+    page.keyboard.type("Why here?")
+    page.reload()
+    expect(page.locator("#where")).to_contain_text(f"at {NODE}:6")
+    page.keyboard.press("Tab")
+    page.get_by_role("button", name="Save comment").click()
+    saved(page)
+    (comment,) = ReviewStore(out).student("ben").content.of("ben").comments
+    assert (comment.text, comment.line) == ("Why here?", 6)
+
+
+def test_points_for_one_student_and_a_cause_of_one_are_a_few_clicks(
+    visit: Opened, out: Path
+) -> None:
+    page = visit("s/ben/")
+    give = page.locator("#give")
+    give.get_by_label("Points").fill("1.4")
+    give.get_by_label("Why").fill("a good question")
+    give.get_by_role("button", name="Give").click()
+    expect(page.locator(".given")).to_contain_text("+1.4: a good question (AK)")
+    expect(give.get_by_label("Why")).to_have_value("")
+    causes = visit("clusters#cause-1")
+    causes.locator("#cause-1").get_by_role("checkbox", name="cai").check()
+    causes.locator("#cause-1").get_by_label("Another cause").fill("a generated file")
+    causes.locator("#cause-1").get_by_role("button", name="Split").click()
+    expect(causes.locator("summary", has_text="a generated file")).to_contain_text("1 student")
+    review = ReviewStore(out).student("cai").content.of("cai")
+    assert review.causes == {"docs": "a generated file"}
+
+
+def test_the_page_of_a_new_attempt_shows_what_was_written_about_the_one_before_as_such(
+    visit: Opened, out: Path
+) -> None:
+    page = visit("s/ana/")
+    page.keyboard.press("s")
+    page.locator("#L6 .line").click()
+    page.keyboard.type("Why here?")
+    page.keyboard.press("Control+Enter")
+    saved(page)
+    hand_in_again(out, "ana", documented=1)
+    page.reload()
+    expect(page.locator(".earlier")).to_contain_text("Why here?")
+    page.keyboard.press("s")
+    expect(page.locator("#L6 .note.is-finding")).to_be_visible()
+    expect(page.locator("#L6 .note", has_text="Why here?")).to_have_count(0)
+    assert violations(page) == []
+    page.get_by_role("link", name="Attempt 1").click()
+    page.wait_for_url("**attempt*")
+    page.keyboard.press("s")
+    expect(page.locator("#L6 .note")).to_have_text("Why here?")
