@@ -244,6 +244,6 @@ def test_the_page_of_a_new_attempt_shows_what_was_written_about_the_one_before_a
     expect(page.locator("#L6 .note", has_text="Why here?")).to_have_count(0)
     assert violations(page) == []
     page.get_by_role("link", name="Attempt 1").click()
-    page.wait_for_url("**attempt*")
+    page.wait_for_url(re.compile("attempt"))
     page.keyboard.press("s")
     expect(page.locator("#L6 .note")).to_have_text("Why here?")
