@@ -9,12 +9,13 @@ import pytest
 from grader.diagnosis.process import missing_library
 from grader.diagnosis.process.failure import Failure
 from grader.recording.model import Ending, Recording
-from grader.submission.record import PackageRecord, SubmissionRecord
+from grader.submission.record import PackageRecord, SourceFile, SubmissionRecord
 
 
 def lacking_package(message: str, recording: Recording) -> str | None:
     failure = Failure("ModuleNotFoundError", message, ())
-    return missing_library.lacking_package(failure, recording)
+    found = missing_library.lacking_here(failure, recording)
+    return found and found[0]
 
 
 def run() -> Recording:
@@ -35,9 +36,22 @@ def test_a_package_of_ros_that_is_not_installed_here_is_not_the_student_s_fault(
     assert lacking_package(f"No module named '{name}'", run()) == name
 
 
+@pytest.mark.parametrize("name", ["transforms3d", "cv2", "PIL"])
+def test_a_library_on_which_packages_of_ros_depend_is_judged_as_they_are(name: str) -> None:
+    assert lacking_package(f"No module named '{name}'", run()) == name
+
+
+def test_an_own_module_that_is_not_found_is_the_student_s_whatever_its_name() -> None:
+    sources = (SourceFile("robot_tools/serial.py", "robot_tools.serial"),)
+    package = PackageRecord(name="robot_tools", path=".", sources=sources)
+    own = replace(run(), submission=replace(run().submission, packages=(package,)))
+    assert lacking_package("No module named 'serial'", own) is None
+
+
 @pytest.mark.parametrize(
     "message",
     [
+        "No module named 'transform3d'",
         "No module named 'tf_transformation'",
         "No module named 'geometry_msgs.msgs'",
         "No module named 'rclcpp'",

@@ -11,7 +11,7 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.process.exceptions import Raised
 from grader.diagnosis.process.failure import Failure
-from grader.diagnosis.process.missing_library import lacking_package
+from grader.diagnosis.process.missing_library import lacking_here
 from grader.diagnosis.process.newer_names import newer_name
 from grader.diagnosis.process.raised import fatal_failure, in_brackets, own_frames, raised_at
 from grader.findings.finding import Evidence, Moment
@@ -19,9 +19,7 @@ from grader.findings.wording import code
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.spec.source import Model, read_source
-from grader.submission.read.rosdistro import PYTHON_MODULES
 from grader.submission.record import PYTHON, SourceError
-from grader.submission.underlay.definition import ways_to_get
 
 _LOG_LINES = 15
 # What a failure ends a compiled program by.
@@ -279,18 +277,12 @@ def hides_what_node_has(symptom: ProcessExit) -> Cause | None:
 
 @explanation(ProcessExit)
 def machine_lacks_it(symptom: ProcessExit) -> Cause | None:
-    """It needs a ROS 2 package or a newer Python that the machine lacks; this costs no points."""
+    """It needs a package or library of ROS 2, or a newer Python, that is not here: no points lost."""
     failure, recording = symptom.failure, symptom.recording
-    newer = failure and newer_name(failure, recording)
-    lacking = failure and lacking_package(failure, recording)
-    if newer:
-        name, needs = newer
-    elif lacking:
-        ways = ways_to_get(PYTHON_MODULES.get(lacking, (lacking,)))
-        apt = f"`sudo apt install ros-jazzy-{lacking.replace('_', '-')}`"
-        name, needs = lacking, ways or apt
-    else:
+    lacking = failure and (newer_name(failure, recording) or lacking_here(failure, recording))
+    if not lacking:
         return None
+    name, needs = lacking
     return Cause(
         f"{symptom.seen}: it uses {code(name)}{in_brackets(symptom.place)}: ROS 2 Jazzy has "
         "it, but it is not installed on the machine that grades",

@@ -1,4 +1,4 @@
-"""Names of ROS 2 Jazzy packages and rosdep keys, read from ``rosdistro.yaml`` beside it."""
+"""Names of ROS 2 Jazzy packages, their libraries and rosdep keys, read from ``rosdistro.yaml`` beside it."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ NOT_IN_JAZZY = frozenset(_LISTS["not in Jazzy"].split())
 """Names that students take from ROS 1, or from a build type, and that are no packages of Jazzy."""
 ROSDEP_KEYS = frozenset(_LISTS["rosdep keys"].split())
 """rosdep keys of system packages; most are known by pattern, in ``dependencies.py``."""
+LIBRARIES: dict[str, str] = _LISTS["libraries"]
+"""Module of a Python library on which packages of Jazzy depend -> its name for pip."""
 
 _INTERFACE_ENDINGS = ("_msgs", "_interfaces", "_srvs", "_msg")
 PYTHON_MODULES: dict[str, tuple[str, ...]] = {
