@@ -21,7 +21,7 @@ from grader.checks.need import Bags, Need, StudentTests
 from grader.errors import GraderFault, UsageError, machine_fault
 from grader.findings.finding import Status
 from grader.grade import Grade, grade
-from grader.grade.naming import named
+from grader.grade.naming import named, with_stand_ins
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording, to_json
 from grader.report.files import write_whole
@@ -118,7 +118,10 @@ class Grading:
 
         def tested(record: SubmissionRecord) -> frozenset[str]:
             self._on_recorded(record, {})
-            return _tested(named(self._loaded, replace(record, given=outside))[0])
+            record = replace(record, given=outside)
+            wanted = _tested(named(self._loaded, record)[0])
+            record = with_stand_ins(self._loaded, record)
+            return frozenset(one.name for name in wanted if (one := record.package(name)))
 
         prepared = prepare(
             path,
@@ -164,6 +167,8 @@ class Grading:
 
     def grade_prepared(self, prepared: Prepared, folder: Path) -> Graded:
         """Run and judge a submission that is built already."""
+        record = with_stand_ins(self._loaded, prepared.record)
+        prepared = replace(prepared, record=record)
         for old in folder.glob("*.mcap"):
             old.unlink()
         write_whole(folder / SUBMISSION_FILE, to_json(prepared.record))
@@ -180,7 +185,8 @@ class Grading:
         longest = sorted(self._scenarios, key=lambda scenario: -scenario.timeout)
         again = [scenario.id for scenario in longest] if can_run else []
         alone: list[str] = []
-        remaps = {scenario.id: frozenset[str]() for scenario in self._scenarios}
+        # What is wrong in what was built is known before any run.
+        remaps = grade(self._loaded, prepared.record, {}).remaps
         first = 1
         repeats: list[str] = []
         for attempt in range(1, MOST_RUNS + 1):

@@ -26,6 +26,13 @@ class NoExecutable(Symptom[Cause], concept="packages"):
         """Where executables of a Python package are defined."""
         return _at(self.package, "setup.py", "console_scripts")
 
+    @property
+    def misplaced(self) -> str:
+        """That it is in a wrong folder, in words; or nothing."""
+        folder = self.package.misplaced(self.name).rpartition("/")[0]
+        where = f"{code(self.name)} was installed in {folder}/, where `ros2 run` does not look"
+        return where if folder else ""
+
 
 def why_no_executable(submission: SubmissionRecord, package: str, name: str) -> Cause | None:
     """Why a package has no executable of a name, or None if it has one."""
@@ -33,7 +40,9 @@ def why_no_executable(submission: SubmissionRecord, package: str, name: str) -> 
     if cause is not None:
         return cause
     record = existing_package(submission, package)
-    is_there = name in record.executables and name not in dict(record.missing_targets)
+    # The setup.cfg of a package with a wrong name may say the right one.
+    is_there = name in record.executables or record.misplaced(name) == f"lib/{package}/{name}"
+    is_there = is_there and name not in dict(record.missing_targets)
     if is_there and (record.registered or record.build_type == "ament_python"):
         return None
     return cause_of(NoExecutable(submission, record, name))
@@ -65,14 +74,14 @@ def no_such_function(symptom: NoExecutable) -> Cause | None:
 
 
 @explanation(NoExecutable, only=PYTHON)
-def installed_in_bin(symptom: NoExecutable) -> Cause | None:
-    """setup.cfg is missing or wrong: the executable was installed in bin/."""
+def installed_elsewhere(symptom: NoExecutable) -> Cause | None:
+    """setup.cfg is missing or wrong: the executable is in bin/ or in another package's folder."""
     package = symptom.package
-    if symptom.name not in package.misplaced_executables or package.build_type != "ament_python":
+    if not symptom.misplaced or package.build_type != "ament_python":
         return None
     folder = f"$base/lib/{package.name}"
     return Cause(
-        f"{code(symptom.name)} was installed in bin/, where `ros2 run` does not look",
+        symptom.misplaced,
         f"setup.cfg beside setup.py must hold these four lines: [develop] / script_dir={folder} / "
         f"[install] / install_scripts={folder}",
         _at(package, "setup.cfg", "script_dir"),
@@ -86,8 +95,8 @@ def not_installed_by_cmake(symptom: NoExecutable) -> Cause | None:
     if package.build_type == "ament_python":
         return None
     seen = f"the build installed {codes(package.executables) or 'no executable'}"
-    if name in package.misplaced_executables:
-        seen = f"{code(name)} was installed in bin/, where `ros2 run` does not look"
+    if symptom.misplaced:
+        seen = symptom.misplaced
     elif package.cmake is not None and not package.cmake.strip():
         seen = "CMakeLists.txt is empty"
     elif name in package.executables:

@@ -54,11 +54,11 @@ class NoPackage(Symptom[Cause], concept="packages"):
     @property
     def match(self) -> str | None:
         """The package whose name is nearly the wanted one."""
-        return nearest(self.name, self.names)
+        return dict(self.submission.stand_ins).get(self.name) or nearest(self.name, self.names)
 
 
 def why_no_package(submission: SubmissionRecord, name: str) -> Cause | None:
-    """Why the submission has no package of a name, or None if it has one."""
+    """Why the submission has no package of a name and none instead, or None if it has one."""
     if submission.problem is None and submission.package(name) is not None:
         return None
     return cause_of(NoPackage(submission, name))
@@ -112,6 +112,13 @@ def other_package_name(symptom: NoPackage) -> Cause:
         + ("" if match else " A package inside another one is not found: put them side by side."),
         Evidence(places=places[:10]),
     )
+
+
+def why_misnamed(submission: SubmissionRecord, name: str) -> Cause | None:
+    """Why a package has another name than that which it stands in for, or None if it has not."""
+    if existing_package(submission, name).name == name:
+        return None
+    return cause_of(NoPackage(submission, name))
 
 
 def breach_of_rep_144(name: str) -> str:
@@ -174,7 +181,7 @@ def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
     cause = cause or why_too_new(existing_package(submission, name))
     if cause is not None:
         return cause
-    build = submission.build
+    build, name = submission.build, existing_package(submission, name).name
     if build is None:
         return Cause("nothing was built, so this cannot be judged", ours=True)
     # A package that is not among the failed ones was built, even if others failed.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import statistics
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from graphlib import TopologicalSorter
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ from grader.findings.finding import Finding, Status
 from grader.findings.wording import percent
 from grader.grade.language import finding_in_cpp, in_cpp, is_cpp
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
-from grader.grade.naming import named
+from grader.grade.naming import named, with_stand_ins
 from grader.grade.origins import with_origins
 from grader.grade.runtime_imports import with_runtime_imports
 from grader.grade.windowed import judged_in
@@ -58,6 +58,7 @@ def grade(
         faults: By scenario id: why there is no recording.
     """
     loaded, unnamed = named(loaded, submission, recordings)
+    submission = with_stand_ins(loaded, submission)
     bound = {item.spec.id: item for item in loaded.checks}
     known = with_runtime_imports(submission, recordings.values())
     results: dict[str, CheckResult] = {}
@@ -68,7 +69,8 @@ def grade(
         if roots:
             findings = (_skipped([results[root] for root in roots]),)
         else:
-            why = unnamed if unnamed and _is_about_names(bound[name], loaded) else None
+            is_unnamed = unnamed and _needs_names(bound[name], loaded, unnamed.variables)
+            why = unnamed.finding if unnamed and is_unnamed else None
             findings = tuple(_findings(bound[name], loaded, known, recordings, faults, why))
         spec = bound[name].spec
         speaks_cpp = is_cpp(known, _about(bound[name], loaded))
@@ -110,7 +112,7 @@ def _is_put_right(item: ScenarioFinding, recordings: Mapping[str, Recording]) ->
     rule = item.finding.remap
     runs = [run for name, run in recordings.items() if item.scenario in (None, name)]
     return item.finding.status is Status.PASSED or (
-        bool(rule and runs) and all(rule in run.remaps for run in runs)
+        bool(rule) and all(rule in run.remaps for run in runs)
     )
 
 
@@ -183,12 +185,12 @@ def _findings(
             yield judged
 
 
-def _is_about_names(bound: BoundCheck, loaded: LoadedAssignment) -> bool:
-    """Whether a check needs a run, or names what the submission chooses."""
+def _needs_names(bound: BoundCheck, loaded: LoadedAssignment, names: Collection[str]) -> bool:
+    """Whether a check needs a run, or one of some names that the submission chooses."""
     written = loaded.source.data["checks"] if loaded.source else ()
     own = str([entry.get("with") for entry in written if entry.get("id") == bound.spec.id])
     is_run = bound.check.subject is Subject.RECORDING
-    return is_run or any(f"{{{name}}}" in own for name in loaded.values)
+    return is_run or any(f"{{{name}}}" in own for name in names)
 
 
 def why_not_run(submission: SubmissionRecord, packages: Iterable[str]) -> Finding | None:

@@ -54,9 +54,10 @@ def in_cpp(text: str) -> str:
 
 def is_cpp(submission: SubmissionRecord, names: Collection[str]) -> bool:
     """Whether packages are written in C++; if they have no programs, the whole submission."""
-    spoken = {one.name: submission.language(one) for one in submission.packages}
-    named = {language for name, language in spoken.items() if name in names} - {""}
-    return (named or {*spoken.values()} - {""}) == {CPP}
+    about = [package for name in names if (package := submission.package(name))]
+    spoken = {submission.language(one) for one in about} - {""}
+    spoken = spoken or {submission.language(one) for one in submission.packages} - {""}
+    return spoken == {CPP}
 
 
 def finding_in_cpp(finding: Finding) -> Finding:

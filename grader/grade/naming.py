@@ -5,15 +5,21 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
+from grader.checks.package.package import PackageFound
 from grader.diagnosis.no_endpoint import ACTION, PUBLISHER, SERVICE, SUBSCRIPTION, NoEndpoint
+from grader.diagnosis.no_executable import why_no_executable
+from grader.diagnosis.not_built import why_not_built
 from grader.errors import AssignmentError, UsageError
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes
 from grader.recording.model import Recording
-from grader.submission.record import SourceError, SubmissionRecord
+from grader.spec.nearest_name import nearest
+from grader.submission.read.cmake import read_commands
+from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
 
 if TYPE_CHECKING:
     from grader.assignment.load import LoadedAssignment
@@ -28,18 +34,66 @@ _WORDS = {
 _MOST_PLACES = 10
 
 
+@dataclass(frozen=True)
+class Unnamed:
+    """A name of a submission that has not the form that is asked for: it cannot be run.
+
+    Attributes:
+        variables: Those that have no value by that.
+    """
+
+    finding: Finding
+    variables: frozenset[str]
+
+
+def with_stand_ins(loaded: LoadedAssignment, submission: SubmissionRecord) -> SubmissionRecord:
+    """The submission with packages of wrong names in the places of those that are asked for.
+
+    Such a package has a name like the right one, or one of its executables.
+    """
+    asked = {package.name: package for package in loaded.assignment.packages}
+    lacking = {
+        bound.parameters.package
+        for bound in loaded.checks
+        if isinstance(bound.parameters, PackageFound) and bound.parameters.remap
+    }
+    found: dict[str, str] = {}
+    for name in sorted(lacking - {package.name for package in submission.packages}):
+        programs = set(asked[name].executables) if name in asked else set()
+        others = [
+            package
+            for package in submission.packages
+            if package.name not in {*asked, *found.values()} and package.manifest_error is None
+        ]
+        having = [one.name for one in others if programs.intersection(_programs(one))]
+        only = having[0] if len(having) == 1 else None
+        if stand_in := only or nearest(name, having or [one.name for one in others]):
+            found[name] = stand_in
+    return replace(submission, stand_ins=tuple(found.items()))
+
+
+def _programs(package: PackageRecord) -> list[str]:
+    """Executables of a package, by what was built, or else by what it says."""
+    found = [*package.executables, *dict(package.entry_points)]
+    if not found:
+        commands = read_commands(package.cmake or "")
+        found = [one.arguments[0] for one in commands if one.name == "add_executable"]
+    return list(dict.fromkeys(found))
+
+
 def named(
     loaded: LoadedAssignment,
     submission: SubmissionRecord,
     recordings: Mapping[str, Recording] = {},
-) -> tuple[LoadedAssignment, Finding | None]:
+) -> tuple[LoadedAssignment, Unnamed | None]:
     """The assignment with the names of a submission in it.
 
     What is found only in runs is the author's example until recordings show exactly one such name.
+    So is an executable of what was not built: that is told first.
 
     Returns:
-        The assignment, and why the submission cannot be run: its names have not the form that is
-        asked for. The assignment then has the author's examples.
+        The assignment, and why the submission cannot be run. The author's examples then stand in
+        place of the names that were not found.
 
     Raises:
         UsageError: The roster has no value for a variable.
@@ -52,6 +106,7 @@ def named(
     from grader.assignment.variable import form
 
     given, values = dict(submission.given), dict[str, str]()
+    unnamed = None
     for name, variable in variables.items():
         told = given.get(name)
         if told is not None and re.fullmatch(variable.part, told):
@@ -64,17 +119,38 @@ def named(
         found = {match["value"]: match[0] for match in matches}
         if len(found) == 1:
             values.update(dict.fromkeys([name], *found))
-        elif variable.is_of_runs:
+        elif variable.is_of_runs or _unbuilt(loaded, name, values, submission):
             values[name] = str(variable.example)
         else:
-            fitting = list(found.values())
-            return loaded, _unnamed(loaded, name, values, fitting, offered, submission)
+            why = _unnamed(loaded, name, values, list(found.values()), offered, submission)
+            names = list(variables)
+            unnamed = Unnamed(why, frozenset(names[names.index(name) :]))
+            values = {**loaded.values, **values}
+            break
     try:
-        return with_values(loaded, values), None
+        return with_values(loaded, values), unnamed
     except AssignmentError as error:
         chosen = codes(f"{name}: {value}" for name, value in values.items())
         seen = f"with {chosen}, {error.problems[0].message}"
-        return loaded, Finding.failed("names that ROS allows", seen, "Choose another name.")
+        why = Finding.failed("names that ROS allows", seen, "Choose another name.")
+        return loaded, Unnamed(why, frozenset(variables))
+
+
+def _unbuilt(
+    loaded: LoadedAssignment, name: str, values: Values, submission: SubmissionRecord
+) -> bool:
+    """Whether a name is of what a build makes, and the package was not built."""
+    from grader.assignment.variable import fill_text
+
+    variable = loaded.assignment.variables[name]
+    if variable.in_ != "executables" or submission.build is None:
+        return False
+    packages = (
+        [fill_text(variable.of, values)]
+        if variable.of
+        else [package.name for package in submission.packages]
+    )
+    return any(why_not_built(submission, package) for package in packages)
 
 
 def _not_given(name: str, variable: Variable, told: str | None) -> str:
@@ -100,7 +176,7 @@ def _offered(
         if variable.in_ == "packages":
             yield package.name
         elif variable.in_ == "executables" and of in (None, package.name):
-            yield from dict.fromkeys((*package.executables, *dict(package.entry_points)))
+            yield from _programs(package)
         elif variable.in_ == "interfaces":
             for item in (*package.definitions, *package.generated):
                 file = PurePosixPath(item.file)
@@ -118,6 +194,13 @@ def _offered(
             yield from (item.name for item in there if of in (None, item.type))
 
 
+def _defining(package: PackageRecord, noun: str) -> str:
+    """The file that names an executable, or anything else of a package."""
+    if noun != "executable":
+        return "package.xml"
+    return "setup.py" if package.build_type == "ament_python" else "CMakeLists.txt"
+
+
 def _unnamed(
     loaded: LoadedAssignment,
     name: str,
@@ -131,7 +214,8 @@ def _unnamed(
 
     variable = loaded.assignment.variables[name]
     noun = variable.in_.removesuffix("s")
-    place = f" of {code(fill_text(variable.of, values))}" if variable.of else ""
+    of = variable.of and fill_text(variable.of, values)
+    place = f" of {code(of)}" if of else ""
     shape = fill_text(str(variable.match), values)
     like = code(str(variable.example) if shape == ANY else fill_text(shape, loaded.values))
     of_form = "of any name" if shape == ANY else f"with a name of the form {code(shape)}"
@@ -141,12 +225,18 @@ def _unnamed(
             " The same name stands in package.xml, setup.py, setup.cfg, resource/ and for the "
             "folder of the Python module, or in CMakeLists.txt."
         )
+    asked = f"one {noun}{place} {of_form}, such as {like}"
+    if noun == "executable" and of and not offered:
+        cause = why_no_executable(submission, of, str(variable.example))
+        if cause is not None:
+            return cause.finding(asked)
     places = tuple(
-        SourceError(item.file("package.xml"), None, f"the package {code(item.name)}")
+        SourceError(item.file(_defining(item, noun)), None, f"the package {code(item.name)}")
         for item in submission.packages[:_MOST_PLACES]
+        if noun != "executable" or of in (None, item.name)
     )
     return Finding.failed(
-        f"one {noun}{place} {of_form}, such as {like}",
+        asked,
         f"found {codes(fitting or dict.fromkeys(offered)) or f'no {noun}'}",
         f"Hand in one {noun} of this form only." if fitting else hint,
         Evidence(places=places),

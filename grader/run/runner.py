@@ -102,21 +102,24 @@ def process_command(
 
     Args:
         remaps: Rules such as ``/cmdvel:=/cmd_vel`` that put wrong names right; of a file of
-            the install space, without a slash in front.
+            the install space, without a slash in front; of a package, without any.
     """
     rules = [rule.split(":=") for rule in remaps]
     topics = {old: new for old, new in rules if old.startswith("/")}
-    files = {new: old for old, new in rules if not old.startswith("/")}
-    package = launch.package or assignment.packages[0].name
+    others = {new: old for old, new in rules if not old.startswith("/")}
+    asked = launch.package or assignment.packages[0].name
+    package = others.get(asked, asked)
     if launch.executable is None:
         program = launch_file_program(ros, package, launch.program)
         # It says itself how topics of its nodes are called.
         topics = {}
     else:
-        place = f"lib/{package}/{launch.executable}"
-        program = _program(ros, install / files.get(place, place))
+        place, right = (f"lib/{one}/{launch.executable}" for one in (package, asked))
+        # The setup.cfg of a package with a wrong name may say the right one.
+        place = right if (install / right).is_file() else place
+        program = _program(ros, install / others.get(place, place))
     return ProcessCommand(
-        name=f"{package}/{launch.program}",
+        name=f"{asked}/{launch.program}",
         argv=(*program, *ros_arguments(launch, values, topics)),
         after_s=launch.after,
         is_launch_file=launch.file is not None,

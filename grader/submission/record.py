@@ -168,7 +168,8 @@ class PackageRecord:
         newer_syntax: Other files, that only the Python of ROS 2 Jazzy can parse.
         entry_points: console_scripts: executable -> ``module:function``.
         executables: What the build installed for ``ros2 run``, in ``lib/<package>/``.
-        misplaced_executables: What it installed in ``bin/`` instead (a wrong setup.cfg).
+        misplaced_executables: What it installed elsewhere (a wrong setup.cfg): paths in the install
+            space, such as ``lib/other/bot``; in older records names in ``bin/``.
         missing_targets: Executables whose ``module:function`` does not exist, with what is wrong.
         files: Python files as installed -> path in the submission; relative to site-packages
             (``bot_publisher/node.py``), or ``lib/<package>/...`` for scripts.
@@ -211,6 +212,11 @@ class PackageRecord:
     registered: bool = True
     sources: tuple[SourceFile, ...] = ()
     lint: Lint | None = None
+
+    def misplaced(self, executable: str) -> str:
+        """Path in the install space of an executable that is in a wrong folder, or nothing."""
+        paths = (one if "/" in one else f"bin/{one}" for one in self.misplaced_executables)
+        return next((one for one in paths if one.rpartition("/")[2] == executable), "")
 
     def file(self, name: str) -> str:
         """Path in the submission of a file of the package."""
@@ -296,6 +302,7 @@ class SubmissionRecord:
         bags: Recordings of ``ros2 bag record``; None where no check asked for them.
         build: None where nothing was built.
         given: Variable of the assignment -> its value, from the roster or from `--set`.
+        stand_ins: Package that is asked for -> the one that was handed in under a wrong name.
     """
 
     id: str
@@ -308,6 +315,7 @@ class SubmissionRecord:
     headings: tuple[tuple[str, tuple[str, ...]], ...] = ()
     bags: tuple[BagRecord, ...] | None = None
     given: tuple[tuple[str, str], ...] = ()
+    stand_ins: tuple[tuple[str, str], ...] = ()
 
     @property
     def foreign_imports(self) -> frozenset[str]:
@@ -329,8 +337,9 @@ class SubmissionRecord:
         return CPP if is_compiled else PYTHON if package.sources else ""
 
     def package(self, name: str) -> PackageRecord | None:
-        """The package of that name, or None."""
-        return next((package for package in self.packages if package.name == name), None)
+        """The package of that name, or what stands in for it; else None."""
+        own = dict(self.stand_ins).get(name, name)
+        return next((package for package in self.packages if package.name == own), None)
 
 
 _RECORD = TypeAdapter(SubmissionRecord)

@@ -441,7 +441,7 @@ CASES: list[Group] = [
             "NoExecutable.no_such_function": submission(
                 package(missing_targets=(("bot_pub", SourceError("setup.py", 22, "no module")),))
             ),
-            "NoExecutable.installed_in_bin": submission(
+            "NoExecutable.installed_elsewhere": submission(
                 package(executables=(), misplaced_executables=("bot_pub",))
             ),
             "NoExecutable.not_installed_by_cmake": submission(

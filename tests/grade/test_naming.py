@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,8 +13,8 @@ from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.selection import select
 from grader.errors import UsageError
 from grader.findings.finding import Status
-from grader.grade import grade
-from grader.grade.naming import named
+from grader.grade import Grade, grade
+from grader.grade.naming import named, with_stand_ins
 from grader.recording.interaction import Service
 from grader.recording.model import Recording
 from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
@@ -128,8 +129,46 @@ def test_two_names_that_fit_are_both_told(loaded: LoadedAssignment) -> None:
 def test_a_free_choice_must_be_a_single_one(loaded: LoadedAssignment) -> None:
     _, why = named(loaded, submission("group7_gp2", scripts=("bot", "test")))
     assert why is not None
-    assert why.expected == "one executable of `group7_gp2` of any name, such as `bot`"
-    assert why.observed == "found `bot` and `test`"
+    assert why.finding.expected == "one executable of `group7_gp2` of any name, such as `bot`"
+    assert why.finding.observed == "found `bot` and `test`"
+
+
+def failed_build(record: SubmissionRecord, name: str) -> SubmissionRecord:
+    """In C++, with an error of the compiler in a package."""
+    log = f"Starting >>> {name}\nsrc/bot.cpp:3:1: error: expected ';'\nFailed   <<< {name} [1s]"
+    cmake = "add_executable(driver src/bot.cpp)\ninstall(TARGETS driver DESTINATION lib)"
+    packages = tuple(
+        dataclasses.replace(one, build_type="ament_cmake", entry_points=(), cmake=cmake)
+        for one in record.packages
+    )
+    build = BuildRecord(False, 1.0, failed_packages=(name,), log=log)
+    return dataclasses.replace(record, packages=packages, build=build)
+
+
+def test_a_name_of_what_was_not_built_is_not_asked_for_and_the_build_is_told(
+    loaded: LoadedAssignment,
+) -> None:
+    record = failed_build(submission("group12_gp2", "red_maps"), "group12_gp2")
+    found, why = named(loaded, record)
+    assert why is None
+    assert (found.assignment.title, found.values["run"]) == ("The bot of group 12", "driver")
+    silent = dataclasses.replace(
+        record, packages=tuple(dataclasses.replace(one, cmake="") for one in record.packages)
+    )
+    found, why = named(loaded, silent)
+    assert why is None
+    assert (found.assignment.title, found.values["run"]) == ("The bot of group 12", "bot")
+
+
+def test_a_check_of_a_name_that_was_found_does_not_fail_by_another(
+    loaded: LoadedAssignment,
+) -> None:
+    graded = grade(loaded, submission("group12_gp2", "red_maps", scripts=()), {})
+    assert graded.result("bot").status is Status.PASSED
+    assert "group12_gp2" in graded.result("bot").decisive.finding.observed
+    service = graded.result("service").decisive.finding
+    assert service.observed == "setup.py defines no console_scripts"
+    assert [place.file for place in service.evidence.places] == ["src/group12_gp2/setup.py"]
 
 
 def test_the_roster_comes_before_what_was_handed_in(loaded: LoadedAssignment) -> None:
@@ -184,4 +223,76 @@ def test_a_name_that_ros_does_not_allow_is_told_and_not_run(tmp_path: Path) -> N
     (folder / "assignment.yaml").write_text(text, encoding="utf-8")
     _, why = named(load_assignment(folder), submission("group7_gp2", "7up_maps"))
     assert why is not None
-    assert "'/7up/toggle' is not a ROS topic name" in why.observed
+    assert "'/7up/toggle' is not a ROS topic name" in why.finding.observed
+
+
+STAND_IN = """\
+rosgrade: 1
+id: stand_in
+title: Publish
+packages: [{name: bot_publisher, executables: [bot_pub]}]
+scenarios: [{id: main, launch: [{executable: bot_pub}], timeout: 5 s}]
+checks:
+  - {id: package, uses: package.found, with: {package: bot_publisher, remap: true}, points: 1}
+  - {id: builds, uses: package.builds, with: {package: bot_publisher}, requires: [package], points: 1}
+  - id: executable
+    uses: package.executable
+    with: {package: bot_publisher, executable: bot_pub, remap: true}
+    requires: [builds]
+    points: 1
+  - {id: starts, uses: node.starts, requires: [executable], points: 1}
+"""
+
+
+def stand_in(tmp_path: Path, **facts: Any) -> tuple[Grade, SubmissionRecord]:
+    """The grade of a package with a wrong name that was built, before any run."""
+    folder = tmp_path / "stand_in"
+    folder.mkdir()
+    (folder / "assignment.yaml").write_text(STAND_IN, encoding="utf-8")
+    loaded = load_assignment(folder)
+    package = PackageRecord(**{"name": "bot_publish", "path": "bot_publish", **facts})
+    record = dataclasses.replace(submission(), packages=(package,))
+    return grade(loaded, record, {}), with_stand_ins(loaded, record)
+
+
+@pytest.mark.parametrize(
+    "facts",
+    [
+        {"executables": ("bot_pub",)},
+        {"name": "week3", "executables": ("bot_pub",)},
+        # setup.cfg says the right name.
+        {"misplaced_executables": ("lib/bot_publisher/bot_pub",)},
+    ],
+)
+def test_a_package_with_a_wrong_name_costs_the_points_of_its_own_check(
+    tmp_path: Path, facts: dict[str, Any]
+) -> None:
+    graded, record = stand_in(tmp_path, **facts)
+    package = graded.result("package")
+    assert (package.status, package.put_right) == (Status.FAILED, True)
+    assert record.packages[0].name in package.decisive.finding.observed
+    assert graded.result("builds").status is Status.PASSED
+    assert graded.result("executable").status is Status.PASSED
+    rule = f"{record.packages[0].name}:=bot_publisher"
+    assert graded.remaps == {"main": {rule}}
+    run = dataclasses.replace(
+        recording(), scenario="main", submission=record, environment={"remaps": rule}
+    )
+    graded = grade(load_assignment(tmp_path / "stand_in"), record, {"main": run})
+    assert graded.result("starts").status is not Status.SKIPPED
+
+
+def test_another_package_does_not_stand_in_for_the_one_that_is_asked_for(tmp_path: Path) -> None:
+    graded, record = stand_in(tmp_path, name="notes", executables=("talker",))
+    assert record.stand_ins == ()
+    assert graded.result("builds").status is Status.SKIPPED
+
+
+def test_a_setup_cfg_that_names_another_package_costs_the_points_of_the_executable(
+    tmp_path: Path,
+) -> None:
+    wrong = {"name": "bot_publisher", "misplaced_executables": ("lib/my_package/bot_pub",)}
+    graded, _ = stand_in(tmp_path, **wrong)
+    finding = graded.result("executable").decisive.finding
+    assert "lib/my_package/, where `ros2 run` does not look" in finding.observed
+    assert finding.remap == "lib/my_package/bot_pub:=lib/bot_publisher/bot_pub"

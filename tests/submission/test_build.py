@@ -139,7 +139,15 @@ def test_without_setup_cfg_and_with_a_syntax_error_in_a_node_it_is_built(
     assert [error.line for error in package_of(found).syntax_errors] == [1]
     assert build_of(found).succeeded
     assert package_of(found).executables == ()
-    assert package_of(found).misplaced_executables == ("bot_pub",)
+    assert package_of(found).misplaced_executables == ("bin/bot_pub",)
+
+
+def test_an_executable_in_the_folder_of_another_package_is_found_there(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    tree.package({"setup.cfg": "[install]\ninstall_scripts=$base/lib/my_package\n"})
+    found = package_of(prepared(tree, real_ros))
+    assert (found.executables, found.misplaced("bot_pub")) == ((), "lib/my_package/bot_pub")
 
 
 def test_a_bad_e_mail_is_reported_and_does_not_hide_other_packages(

@@ -17,6 +17,7 @@ from grader.diagnosis.no_executable import why_no_executable, why_nothing_to_run
 from grader.diagnosis.not_built import (
     breach_of_rep_144,
     existing_package,
+    why_misnamed,
     why_no_manifest,
     why_not_built,
     why_too_new,
@@ -46,6 +47,12 @@ class PackageFound(OfPackage):
     build_type: BuildTypes = Field(
         (), description="Expected build type, or several; by default any."
     )
+    remap: bool = Field(
+        False,
+        description="If the package has another name, judge and run that: one whose name is similar "
+        "or that has one of the executables. This check fails, and checks that require it are "
+        "still judged.",
+    )
 
     def _asked(self) -> str:
         types = f" with the build type {' or '.join(self.build_type)}" if self.build_type else ""
@@ -61,6 +68,10 @@ def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding | C
     """
     stop_if(why_no_manifest(submission, parameters.package))
     package = existing_package(submission, parameters.package)
+    if cause := why_misnamed(submission, parameters.package):
+        finding = cause.finding(parameters.asked_for)
+        seen = f"{finding.observed}; everything else was judged in this package"
+        return replace(finding, observed=seen, remap=f"{package.name}:={parameters.package}")
     if breach := breach_of_rep_144(package.name):
         seen = f"found in {code(package.path)}{breach}"
         return Cause(seen, "Give the package another name.")
@@ -107,8 +118,8 @@ class Executable(OfPackage):
     executable: str = Field(min_length=1, description="Name in the command `ros2 run`.")
     remap: bool = Field(
         False,
-        description="If the only executable of the package has another name or is in bin/, run "
-        "that instead. This check fails, and checks that require it are still judged.",
+        description="If the only executable of the package has another name, or it is in another "
+        "folder, run that instead. This check fails, and checks that require it are still judged.",
     )
 
 
@@ -131,9 +142,8 @@ def _misnamed(submission: SubmissionRecord, parameters: Executable) -> str:
     if why_not_built(submission, parameters.package) is not None:
         return ""
     package, name = existing_package(submission, parameters.package), parameters.executable
-    if name in package.misplaced_executables:
-        there = [f"bin/{name}"]
-    else:
+    there = [package.misplaced(name)]
+    if not there[0]:
         there = [f"lib/{package.name}/{other}" for other in package.executables]
     runs = len(there) == 1 and name not in package.executables and _FILE.fullmatch(there[0])
     return f"{there[0]}:=lib/{package.name}/{name}" if runs else ""

@@ -8,7 +8,7 @@ from grader.checks.check import Subject, check, stop_if
 from grader.checks.need import StudentTests
 from grader.checks.package.package import OfPackage
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.not_built import why_not_built
+from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes, counted
 from grader.submission.record import SubmissionRecord
@@ -36,7 +36,8 @@ def tests(submission: SubmissionRecord, parameters: Tests) -> Finding | Cause:
     """
     stop_if(why_not_built(submission, parameters.package))
     runs = submission.build.tests if submission.build else ()
-    run = next((one for one in runs if one.package == parameters.package), None)
+    name = existing_package(submission, parameters.package).name
+    run = next((one for one in runs if one.package == name), None)
     if run is None:
         return Cause("the tests were not run: grade again", ours=True)
     if run.problem is not None:

@@ -33,7 +33,7 @@ class InstallSpace:
     """The facts of one install space (merged layout).
 
     Attributes:
-        executables: Package -> what is in ``lib/<package>``.
+        executables: Package, or another folder in ``lib`` -> what is in ``lib/<package>``.
         in_bin: What is in ``bin``.
         python: Path of each Python file -> hash of its content; relative to site-packages, or
             ``lib/<package>/...`` for scripts.
@@ -53,10 +53,25 @@ class InstallSpace:
     shared: Mapping[str, tuple[tuple[str, str], ...]]
     registered: frozenset[str]
 
+    def outside(self, package: str) -> tuple[str, ...]:
+        """Paths of the executables that are not in the folder of a package."""
+        lib = sorted(
+            f"lib/{folder}/{name}"
+            for folder, names in self.executables.items()
+            for name in names
+            if folder != package
+        )
+        return (*(f"bin/{name}" for name in self.in_bin), *lib)
+
 
 def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) -> InstallSpace:
     """Look at an install space; what is not a regular file there does not count."""
-    executables = {}
+    # What a wrong setup.cfg puts into the folder of another package, which need not be there.
+    executables = {
+        folder.name: tuple(sorted(path.name for path in folder.iterdir() if _is_program(path)))
+        for folder in (install / "lib").glob("*")
+        if folder.is_dir() and not folder.is_symlink() and _is_text(folder.name)
+    }
     definitions = {}
     shared = {}
     python: dict[str, str] = {}
@@ -200,6 +215,10 @@ def _definitions(share: Path) -> Iterator[Definition]:
             if path.suffix == f".{kind}" and described and path.stat().st_size <= MOST_BYTES:
                 text = path.read_text(encoding="utf-8", errors="replace")
                 yield Definition(path.relative_to(share).as_posix(), text)
+
+
+def _is_program(path: Path) -> bool:
+    return _is_text(path.name) and stat.S_ISREG(path.lstat().st_mode) and os.access(path, os.X_OK)
 
 
 def _hash(path: Path) -> str:

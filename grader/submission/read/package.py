@@ -301,7 +301,9 @@ def _with_executables(
             registered=package.name in installed.registered,
             executables=installed.executables.get(package.name, ()),
             misplaced_executables=tuple(
-                name for name in installed.in_bin if alone or name in names
+                path
+                for path in installed.outside(package.name)
+                if alone or path.rpartition("/")[2] in names
             ),
         )
     missing = [(entry, missing_target(entry, modules, elsewhere=elsewhere)) for entry in entries]
