@@ -317,6 +317,18 @@ def _(need: needs.ParameterSet, user: _User) -> Iterator[_Lack]:
             yield ("with", need.value), text
 
 
+@_lacks.register
+def _(need: needs.ParametersGiven, user: _User) -> Iterator[_Lack]:
+    for scenario in user.scenarios:
+        given = {name for launch in scenario.launch for name in launch.parameters}
+        if not given:
+            yield ("with",), f"the scenario {scenario.id!r} launches nothing with 'parameters'"
+        for index, name in enumerate(user.value(need.names)):
+            if given and name not in given:
+                text = f"the scenario {scenario.id!r} gives no parameter {name!r}."
+                yield ("with", need.names, index), text + nearest_or_all(name, sorted(given))
+
+
 def _subjects(scenario: Scenario, *keys: str) -> list[str]:
     return [one.subject for one in scenario.stimuli if one.key in keys]
 

@@ -119,6 +119,14 @@ class ParameterSet(Need):
 
 
 @dataclass(frozen=True)
+class ParametersGiven(Need):
+    """Parameters that something is launched with."""
+
+    words = "`parameters` in a `launch` of each scenario, with those of `{names}`"
+    names: str = "names"
+
+
+@dataclass(frozen=True)
 class Submitted(Need):
     """A package of ``packages``, and perhaps one of its executables."""
 

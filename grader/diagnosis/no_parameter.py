@@ -13,7 +13,8 @@ from grader.diagnosis.no_node import why_not_node
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Moment
 from grader.findings.wording import code, codes
-from grader.measure.parameter_calls import calls_to, descriptor, names
+from grader.measure.parameter_calls import calls_to, descriptor, undeclared
+from grader.measure.parameter_calls import names as declared
 from grader.recording.interaction import NO_SERVER
 from grader.recording.model import Call, Recording
 from grader.spec.nearest_name import nearest
@@ -32,7 +33,7 @@ class NotDeclared(Symptom[Cause]):
     @property
     def there(self) -> list[str]:
         """Parameters that the node declares."""
-        return names(self.recording, self.node)
+        return declared(self.recording, self.node)
 
     @property
     def asked(self) -> tuple[Call, ...]:
@@ -73,6 +74,29 @@ def other_parameters(symptom: NotDeclared) -> Cause:
     if symptom.name in there:
         return symptom.cause(f"{code(symptom.name)} is declared, but without a value")
     return symptom.cause(f"declared {f'is {code(match)}' if match else f'are {codes(there)}'}")
+
+
+def why_not_taken(recording: Recording, names: Iterable[str]) -> Cause | None:
+    """Which of some parameters the launch gives and no node declares, or None if there is none."""
+    lacking = [name for name in undeclared(recording) if name in names]
+    if not lacking:
+        return None
+    answered = [call for call in recording.calls if call.service.endswith("/list_parameters")]
+    there = sorted(
+        {one for node in recording.student_nodes for one in declared(recording, node.name)}
+    )
+    others = f"; declared {'is' if len(there) == 1 else 'are'} {codes(there)}" if there else ""
+    return Cause(
+        f"the launch gives {codes(lacking)}, but no node declares {_it(lacking)}{others}",
+        f"Call self.declare_parameter('{lacking[0]}', default) in the node's constructor, and read "
+        f"it with self.get_parameter('{lacking[0]}').value. A parameter that is not declared is "
+        "ignored.",
+        Evidence(moments=answered_at(recording, answered)),
+    )
+
+
+def _it(names: list[str]) -> str:
+    return "it" if len(names) == 1 else "them"
 
 
 def why_services_silent(recording: Recording, calls: Iterable[Call]) -> Cause | None:

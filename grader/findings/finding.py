@@ -174,8 +174,8 @@ class Finding:
         evidence: What to show.
         disturbed: The run should be repeated. For an error: the delays of the machine were too
             large for a fair verdict. For a failure: the machine may be part of the cause.
-        remap: If a wrong name is the only cause of the failure: the rule that corrects it, such
-            as ``/cmdvel:=/cmd_vel``. The other checks are then judged in a run with this rule.
+        remap: If wrong names are the only cause of the failure: the rules that correct them, such
+            as ``/cmdvel:=/cmd_vel``. The other checks are then judged in a run with these rules.
         concept: The page of ``docs/concepts`` that explains the idea behind a failure.
     """
 

@@ -13,9 +13,12 @@ from dataclasses import replace
 from graphlib import TopologicalSorter
 from typing import TYPE_CHECKING, Any
 
-from grader.assignment.model import CheckSpec, Counts
+from grader.assignment.model import Counts
+from grader.assignment.mutant import required_by
 from grader.checks.check import Parameters, Subject
 from grader.checks.doubt import is_doubtful
+from grader.checks.parameter.given import PARAMETERS_GIVEN
+from grader.diagnosis.no_parameter import why_not_taken
 from grader.diagnosis.not_built import why_lacking, why_not_built
 from grader.findings.finding import Finding, Status
 from grader.findings.wording import percent
@@ -25,6 +28,7 @@ from grader.grade.naming import named, with_stand_ins
 from grader.grade.origins import with_origins
 from grader.grade.runtime_imports import with_runtime_imports
 from grader.grade.windowed import judged_in
+from grader.measure.parameter_calls import undeclared
 from grader.recording.model import Ending, Recording
 from grader.submission.record import CPP, SubmissionRecord
 
@@ -51,7 +55,8 @@ def grade(
     """Judge a submission, with its names in the places of the assignment's variables.
 
     A check whose requirement did not pass is skipped, unless that failed by a wrong name which the
-    runs put right. A check that raises an exception ends as an error and keeps the traceback.
+    runs put right. So is one that failed in a run whose parameters the node does not take, if a
+    check is about that. A check that raises an exception ends as an error and keeps the traceback.
 
     Args:
         recordings: By scenario id; empty where nothing could be launched.
@@ -63,8 +68,12 @@ def grade(
     known = with_runtime_imports(submission, recordings.values())
     results: dict[str, CheckResult] = {}
     requires = {name: item.spec.requires for name, item in bound.items()}
-    for name in TopologicalSorter(requires).static_order():
-        roots = _roots(bound[name].spec, results)
+    taking = [name for name, item in bound.items() if item.check.name == PARAMETERS_GIVEN]
+    before = set(taking).union(*(required_by(name, requires) for name in taking))
+    sooner = {name: () if name in before else taking for name in bound}
+    order = TopologicalSorter({name: (*requires[name], *sooner[name]) for name in bound})
+    for name in order.static_order():
+        roots = _roots(requires[name], results)
         findings: tuple[ScenarioFinding, ...]
         if roots:
             findings = (_skipped([results[root] for root in roots]),)
@@ -72,6 +81,9 @@ def grade(
             is_unnamed = unnamed and _needs_names(bound[name], loaded, unnamed.variables)
             why = unnamed.finding if unnamed and is_unnamed else None
             findings = tuple(_findings(bound[name], loaded, known, recordings, faults, why))
+            lacking = _roots(sooner[name], results)
+            if lacking and any(_has_other_parameters(item, recordings) for item in findings):
+                roots, findings = lacking, (_skipped([results[root] for root in lacking]),)
         spec = bound[name].spec
         speaks_cpp = is_cpp(known, _about(bound[name], loaded))
         if speaks_cpp:
@@ -112,13 +124,19 @@ def _is_put_right(item: ScenarioFinding, recordings: Mapping[str, Recording]) ->
     rule = item.finding.remap
     runs = [run for name, run in recordings.items() if item.scenario in (None, name)]
     return item.finding.status is Status.PASSED or (
-        bool(rule) and all(rule in run.remaps for run in runs)
+        bool(rule) and all(set(rule.split()) <= set(run.remaps) for run in runs)
     )
 
 
-def _roots(spec: CheckSpec, results: Mapping[str, CheckResult]) -> tuple[str, ...]:
-    """The failed or errored checks for which a check has to wait, each once."""
-    required = [results[name] for name in spec.requires]
+def _has_other_parameters(item: ScenarioFinding, recordings: Mapping[str, Recording]) -> bool:
+    """Whether a finding is of a failure in a run whose parameters the student's nodes lack."""
+    recording = recordings.get(item.scenario or "")
+    return item.finding.status is Status.FAILED and bool(recording and undeclared(recording))
+
+
+def _roots(requires: Iterable[str], results: Mapping[str, CheckResult]) -> tuple[str, ...]:
+    """Of the checks that a check requires, or of theirs, those that failed or ended as an error."""
+    required = [results[name] for name in requires]
     lacking = [one for one in required if one.status != Status.PASSED and not one.put_right]
     return tuple(dict.fromkeys(root for item in lacking for root in item.waits_for or (item.id,)))
 
@@ -250,6 +268,7 @@ def _judge(
             doubtful = is_doubtful(subject, bound.parameters.doubt)
             finding = replace(finding, disturbed=doubtful or finding.disturbed)
             finding = with_origins(finding, bound.parameters, subject)
+            finding = _with_what_was_not_taken(finding, subject)
     except Exception as error:
         # Any exception of a check is a bug in it, and must not cost the student points.
         trace = "".join(traceback.format_exception(error))
@@ -258,6 +277,19 @@ def _judge(
     if misuse:
         return ScenarioFinding(scenario, _fault(f"the check {bound.check.name!r} {misuse}"))
     return ScenarioFinding(scenario, finding)
+
+
+def _with_what_was_not_taken(finding: Finding, recording: Recording) -> Finding:
+    """The finding of a check that failed; first what the launch gives and no node takes.
+
+    That costs the points of a check of its own, and may be why this one failed too.
+    """
+    right = {rule.partition(":=")[2] for rule in recording.remaps}
+    cause = why_not_taken(recording, set(recording.given_parameters) - right)
+    if cause is None or finding.remap or finding.observed.startswith(cause.observed):
+        return finding
+    hint = cause.finding(finding.expected).hint
+    return replace(finding, observed=f"{cause.observed}; {finding.observed}", hint=hint)
 
 
 def _found(

@@ -124,7 +124,10 @@ class Grade:
         ]
         return {
             name: frozenset(
-                rule for rule, others in wrong if others is None or not others.isdisjoint(launched)
+                one
+                for rules, others in wrong
+                if others is None or not others.isdisjoint(launched)
+                for one in rules.split()
             )
             for name, launched in programs.items()
         }

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, repeat
 from typing import Any, Literal, get_args
 
 from grader.recording.model import Call, Recording
+from grader.spec.nearest_name import nearest
 
 Type = Literal[
     "bool", "integer", "double", "string", "byte_array", "bool_array", "integer_array",
@@ -66,6 +67,42 @@ def names(recording: Recording, node: str) -> list[str]:
             listed = call.response["result"]["names"]
             return [name for name in listed if not name.startswith(_OWN)]
     return []
+
+
+def undeclared(recording: Recording) -> list[str]:
+    """Parameters that the launch gives and no node of the student declares.
+
+    Nothing where a node did not answer, and in older recordings, where none was asked.
+    """
+    answered = {
+        call.service.rpartition("/")[0]
+        for call in recording.calls
+        if call.service.endswith("/list_parameters") and call.response is not None
+    }
+    nodes = [node.name for node in recording.student_nodes]
+    if not nodes or not answered.issuperset(nodes):
+        return []
+    declared = {name for node in nodes for name in names(recording, node)}
+    given = (name for name in recording.given_parameters if not name.startswith(_OWN))
+    return [name for name in given if name not in declared]
+
+
+def misnamed_parameters(recording: Recording, asked: Collection[str]) -> dict[str, str]:
+    """Undeclared parameter of the launch -> another that is declared and is probably meant by it.
+
+    They have most words in common, or nearly the same letters; each is meant once.
+    """
+    nodes = recording.student_nodes
+    declared = {name for node in nodes for name in names(recording, node.name)}
+    others = {name.lower(): name for name in sorted(declared - {*recording.given_parameters})}
+    found: dict[str, str] = {}
+    for name in undeclared(recording):
+        words = [len({*name.split("_")} & {*other.split("_")}) for other in others]
+        best = [one for one, common in zip(others, words, strict=True) if common == max(words) > 0]
+        likely = best[0] if len(best) == 1 else nearest(name, best or others)
+        if name in asked and likely:
+            found[name] = others[likely]
+    return {one: other for one, other in found.items() if [*found.values()].count(other) == 1}
 
 
 def descriptor(recording: Recording, node: str, name: str) -> Descriptor | None:

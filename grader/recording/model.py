@@ -313,7 +313,8 @@ class Recording:
         scene: World and robot, or None in a scenario without a world.
         values: Random values of the scenario by name, in SI units.
         environment: ``ros_distro``, ``rmw``, ``python``, ``domain_id``, ``sandbox``, ...; the
-            ``ros_imports`` that are installed; ``other_domains`` that the student joined;
+            ``ros_imports`` that are installed; the ``parameters`` of the launch, by name;
+            ``other_domains`` that the student joined;
             ``compiled_tracer``: ``preloaded``, ``lacking``, or ``none`` where nothing is compiled.
     """
 
@@ -356,6 +357,11 @@ class Recording:
     def remaps(self) -> tuple[str, ...]:
         """Rules such as ``/cmdvel:=/cmd_vel`` that correct wrong names in this run."""
         return tuple(self.environment.get("remaps", "").split())
+
+    @property
+    def given_parameters(self) -> tuple[str, ...]:
+        """Names of the parameters that the scenario launches its programs with."""
+        return tuple(self.environment.get("parameters", "").split())
 
     def on(self, topic: str) -> tuple[Message, ...]:
         """Messages on a topic, oldest first."""

@@ -54,12 +54,16 @@ def scenario_seed(assignment: str, scenario: str, submission_sha256: str, base: 
 
 
 def ros_arguments(
-    launch: Launch, values: dict[str, float], topics: Mapping[str, str]
+    launch: Launch,
+    values: dict[str, float],
+    topics: Mapping[str, str],
+    others: Mapping[str, str],
 ) -> tuple[str, ...]:
     """Command line arguments of a launch, as ``ros2 run`` passes them on.
 
     Args:
         topics: Rules that put wrong names of topics right, besides those of the launch.
+        others: Right names of parameters -> wrong ones, which get the same values.
     """
     from grader.assignment.random_values import fill_in
 
@@ -72,7 +76,9 @@ def ros_arguments(
         rules += ["-r", f"{old}:={new}"]
     for name, value in launch.parameters.items():
         # The value is YAML to rcl, and JSON is YAML.
-        rules += ["-p", f"{name}:={json.dumps(fill_in(value, values))}"]
+        text = json.dumps(fill_in(value, values))
+        for one in dict.fromkeys((name, others.get(name, name))):
+            rules += ["-p", f"{one}:={text}"]
     ros_args = ("--ros-args", *rules) if rules else ()
     return (*launch.arguments, *ros_args)
 
@@ -102,7 +108,7 @@ def process_command(
 
     Args:
         remaps: Rules such as ``/cmdvel:=/cmd_vel`` that put wrong names right; of a file of
-            the install space, without a slash in front; of a package, without any.
+            the install space, without a slash in front; of a package or parameter, without any.
     """
     rules = [rule.split(":=") for rule in remaps]
     topics = {old: new for old, new in rules if old.startswith("/")}
@@ -120,7 +126,7 @@ def process_command(
         program = _program(ros, install / others.get(place, place))
     return ProcessCommand(
         name=f"{asked}/{launch.program}",
-        argv=(*program, *ros_arguments(launch, values, topics)),
+        argv=(*program, *ros_arguments(launch, values, topics, others)),
         after_s=launch.after,
         is_launch_file=launch.file is not None,
     )
@@ -212,7 +218,14 @@ def _stimuli(
             raise GraderFault(f"{what}: {error}") from error
         except KeyError as error:
             raise GraderFault(f"{what}: no definition of {error.args[0]} was found") from error
+    if given := given_parameters(scenario):
+        found.append({"kind": "DeclaredOrder", "names": given})
     return tuple(found)
+
+
+def given_parameters(scenario: Scenario) -> list[str]:
+    """Names of the parameters that the programs of a scenario are launched with."""
+    return list(dict.fromkeys(name for one in scenario.launch for name in one.parameters))
 
 
 @dataclass
@@ -416,6 +429,7 @@ class Runner:
                 # As many threads as rclpy's MultiThreadedExecutor takes by itself.
                 "cpus": str(cpu_count()),
                 "compiled_tracer": "preloaded" if tracer else "lacking" if compiled else "none",
+                "parameters": " ".join(given_parameters(scenario)),
                 **({"remaps": " ".join(remaps)} if remaps else {}),
             },
             type_support=tuple(map(str, type_support)),

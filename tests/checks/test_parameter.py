@@ -106,6 +106,52 @@ class TestDeclared:
             judge("parameter.declared", recording(), **SPEED, step=0.1)
 
 
+GIVEN = {"parameters": "goal_x goal_y use_sim_time"}
+
+
+class TestGiven:
+    def run(self, environment=GIVEN, **values):
+        return recording(calls=parameters_read(**values), environment=environment)
+
+    def test_every_parameter_of_the_launch_is_declared(self):
+        found = judge("parameter.given", self.run(goal_x=0.1, goal_y=0.2, gain=1.0))
+        assert found.status is Status.PASSED
+
+    @pytest.mark.parametrize(
+        ("values", "words"),
+        [
+            ({}, "the launch gives `goal_x` and `goal_y`, but no node declares them"),
+            ({"goal_x": 1.0, "gain": 1.0}, "declares it; declared are `gain` and `goal_x`"),
+        ],
+    )
+    def test_what_the_launch_gives_and_no_node_declares_is_named(self, values, words):
+        assert words in failing("parameter.given", self.run(**values))
+
+    def test_only_what_is_asked_for_counts(self):
+        found = judge("parameter.given", self.run(goal_x=1.0), names=["goal_x"])
+        assert found.status is Status.PASSED
+
+    @pytest.mark.parametrize(
+        ("names", "rules"),
+        [
+            ("x y", "x:=goal_x y:=goal_y"),
+            ("target_x target_y gain", "target_x:=goal_x target_y:=goal_y"),
+            ("goal_X goal_Y", "goal_X:=goal_x goal_Y:=goal_y"),
+            ("goalx goaly", "goalx:=goal_x goaly:=goal_y"),
+            ("goal gain", ""),
+            ("speed gain", ""),
+        ],
+    )
+    def test_a_parameter_with_a_wrong_name_gets_the_value_in_another_run(self, names, rules):
+        run = self.run(**dict.fromkeys(names.split(), 1.0))
+        assert judge("parameter.given", run, remap=True).remap == rules
+        assert judge("parameter.given", run).remap == ""
+
+    def test_a_node_that_did_not_answer_and_an_older_recording_accuse_nobody(self):
+        for run in (recording(environment=GIVEN), self.run(environment={})):
+            assert judge("parameter.given", run).status is Status.PASSED
+
+
 def setting(value, after=None, start=0.5, **changes):
     return recording(
         calls=(*parameters_read(speed=start), *parameter_set(2.0, "speed", value, after, **changes))

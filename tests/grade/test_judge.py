@@ -10,7 +10,7 @@ from grader.checks.motion.robot_check import RobotParameters
 from grader.findings.finding import Evidence, Finding, Moment, Status
 from grader.grade import grade
 from grader.recording.event import Disturbance
-from grader.recording.model import NS, Ending
+from grader.recording.model import NS, Call, Ending, Node, Owner
 from grader.recording.simulated import Truth
 from grader.report.model.facts import RunFacts
 from grader.report.model.result import make_result
@@ -347,6 +347,35 @@ def test_what_requires_a_name_is_judged_where_the_run_put_the_name_right(put_rig
     result = judge(*checks, recordings={"listen": run})
     assert statuses(result) == {"topic": "failed", "sent": "passed" if put_right else "skipped"}
     assert result.remaps == {"listen": {rule}}
+
+
+@pytest.mark.parametrize("has_check", [True, False])
+def test_a_parameter_that_the_node_does_not_take_is_one_mistake_and_is_told_first(has_check):
+    run = make_recording(
+        nodes=(Node("/bot", Owner.STUDENT, LAUNCHED_NS),),
+        calls=(
+            Call(
+                "/bot/list_parameters",
+                "rcl_interfaces/srv/ListParameters",
+                LAUNCHED_NS,
+                LAUNCHED_NS + 1,
+                response={"result": {"names": ["use_sim_time"]}},
+            ),
+        ),
+        environment={"parameters": "goal_x"},
+    )
+    given = Told(
+        "given", FAIL, uses="parameter.given" if has_check else "told.told", requires=("type",)
+    )
+    checks = (Told("goal", FAIL), Told("limits"), Told("type", PASS), given)
+    result = judge(*checks, recordings={"listen": run})
+    assert statuses(result)["limits"] == "passed"
+    assert statuses(result)["goal"] == ("skipped" if has_check else "failed")
+    if has_check:
+        assert result.result("goal").waits_for == ("given",)
+    else:
+        seen = result.result("goal").decisive.finding.observed
+        assert seen.startswith("the launch gives `goal_x`, but no node declares it; ")
 
 
 def test_a_name_is_put_right_only_where_the_program_that_has_it_wrong_is_launched():

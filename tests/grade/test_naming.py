@@ -234,7 +234,11 @@ packages: [{name: bot_publisher, executables: [bot_pub]}]
 scenarios: [{id: main, launch: [{executable: bot_pub}], timeout: 5 s}]
 checks:
   - {id: package, uses: package.found, with: {package: bot_publisher, remap: true}, points: 1}
-  - {id: builds, uses: package.builds, with: {package: bot_publisher}, requires: [package], points: 1}
+  - id: builds
+    uses: package.builds
+    with: {package: bot_publisher}
+    requires: [package]
+    points: 1
   - id: executable
     uses: package.executable
     with: {package: bot_publisher, executable: bot_pub, remap: true}

@@ -49,9 +49,8 @@ class PackageFound(OfPackage):
     )
     remap: bool = Field(
         False,
-        description="If the package has another name, judge and run that: one whose name is similar "
-        "or that has one of the executables. This check fails, and checks that require it are "
-        "still judged.",
+        description="If no package has this name, judge and run one with a similar name or with "
+        "one of the executables. This check fails, and checks that require it are still judged.",
     )
 
     def _asked(self) -> str:

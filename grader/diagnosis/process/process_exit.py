@@ -277,7 +277,7 @@ def hides_what_node_has(symptom: ProcessExit) -> Cause | None:
 
 @explanation(ProcessExit)
 def machine_lacks_it(symptom: ProcessExit) -> Cause | None:
-    """It needs a package or library of ROS 2, or a newer Python, that is not here: no points lost."""
+    """It needs something of ROS 2 or of its Python that the machine lacks; this costs no points."""
     failure, recording = symptom.failure, symptom.recording
     lacking = failure and (newer_name(failure, recording) or lacking_here(failure, recording))
     if not lacking:

@@ -87,6 +87,12 @@ class StimulusContext:
         self.probe.call_executor(node, second if lacks_first else first)
 
     @property
+    def student_nodes(self) -> list[str]:
+        """Names of the student's nodes that are there now."""
+        there = (node for node in self.graph.nodes if node.vanished_ns is None)
+        return list(dict.fromkeys(node.name for node in there if node.owner is Owner.STUDENT))
+
+    @property
     def calm_s(self) -> float:
         """How long the graph has not changed, less what the host took meanwhile."""
         if self._calm is None or self._calm[0] != self.graph.changed_ns:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rclpy.exceptions import InvalidServiceNameException
+
 from grader.recording.interaction import NO_SERVER
-from grader.recording.model import Owner
 from grader.run.stimuli.calling import Requesting
 from grader.run.stimuli.context import Playing, StimulusContext, plays
 
+_ASK_AGAIN_S = 0.5
 _EVERY: Mapping[str, Any] = {"prefixes": [], "depth": 0}
 _TYPES = {
     "list_parameters": "rcl_interfaces/srv/ListParameters",
@@ -120,6 +123,41 @@ def parameter_value(value: Any) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
+class DeclaredOrder:
+    """Ask every node of the student which parameters it declares."""
+
+    names: tuple[str, ...]
+
+
+@plays(DeclaredOrder)
+class AskingForDeclared(Playing):
+    """One call to each node; again while some of the names are not among its answers."""
+
+    def __init__(self, order: DeclaredOrder, context: StimulusContext) -> None:
+        super().__init__(order, context)
+        self._next = 0.0
+        self._last: dict[str, int] = {}
+
+    def tick(self, elapsed_s: float | None) -> None:
+        """Ask the nodes that have not answered yet, or not with every name."""
+        now, calls, type_ = time.monotonic(), self._context.calls, _TYPES["list_parameters"]
+        if now < self._next or not self._context.is_set_up:
+            return
+        self._next = now + _ASK_AGAIN_S
+        answers = [calls.calls[number].response or {} for number in self._last.values()]
+        found = {name for one in answers for name in one.get("result", {}).get("names", ())}
+        for node in self._context.student_nodes:
+            last, service = self._last.get(node), f"{node}/list_parameters"
+            if last is not None and (
+                found.issuperset(self._order.names) or not calls.is_over(last)
+            ):
+                continue
+            with contextlib.suppress(InvalidServiceNameException):
+                if calls.is_ready(service, type_):
+                    self._last[node] = calls.send(service, type_, _EVERY)
+
+
+@dataclass(frozen=True)
 class ListParametersOrder:
     """Call the parameter services of all nodes of the student."""
 
@@ -154,8 +192,7 @@ class ListingParameters(Playing):
         now, every_s = time.monotonic(), self._order.every_s
         if now >= self._next and self._context.is_set_up:
             self._next = next_call_s(self._next or now, every_s, now)
-            there = (node for node in self._context.graph.nodes if node.vanished_ns is None)
-            for name in dict.fromkeys(node.name for node in there if node.owner is Owner.STUDENT):
+            for name in self._context.student_nodes:
                 self._context.call_executor(name)
         self._due_s = None
         if elapsed_s is not None and self._next > now:

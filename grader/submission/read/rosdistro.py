@@ -1,4 +1,4 @@
-"""Names of ROS 2 Jazzy packages, their libraries and rosdep keys, read from ``rosdistro.yaml`` beside it."""
+"""Names of ROS 2 Jazzy packages, libraries and rosdep keys, from ``rosdistro.yaml`` beside it."""
 
 from __future__ import annotations
 
