@@ -247,6 +247,26 @@ def _(need: needs.Recorded, user: _User) -> Iterator[_Lack]:
 
 
 @_lacks.register
+def _(need: needs.SentOrOwn, user: _User) -> Iterator[_Lack]:
+    topic, own = user.value(need.topic), user.value(need.own)
+    for scenario in user.scenarios:
+        given = {one.subject for one in scenario.stimuli if one.key == "publish"}
+        if scenario.world is not None:
+            robot = scenario.model_copy(update={"record": ()})
+            given |= {*robot.recorded_types} - {scenario.topics.command.topic}
+        recorded = {*scenario.recorded_types} - given
+        if own and topic not in recorded:
+            text = f"the scenario {scenario.id!r} records no {topic!r} of the student."
+            yield ("with", need.topic), text + nearest_or_all(topic, recorded, "It records")
+        elif not own and topic not in given:
+            text = (
+                f"nothing sends {topic!r} in the scenario {scenario.id!r}: no robot, no stimulus. "
+                "If a node of the student publishes it, write 'own: true'"
+            )
+            yield ("with", need.topic), text
+
+
+@_lacks.register
 def _(need: needs.OwnTransform, user: _User) -> Iterator[_Lack]:
     edge = user.value(need.parent), user.value(need.child)
     for scenario in user.scenarios:

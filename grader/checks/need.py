@@ -54,6 +54,16 @@ class Recorded(Need):
 
 
 @dataclass(frozen=True)
+class SentOrOwn(Need):
+    """A topic that the robot or a stimulus sends; or one that is recorded, of the student."""
+
+    words = "`{topic}` from the simulated robot or a stimulus; with `{own}` among the topics of "
+    words += "`record`"
+    topic: str = "topic"
+    own: str = "own"
+
+
+@dataclass(frozen=True)
 class OwnTransform(Need):
     """A transform that the simulated robot does not publish itself."""
 

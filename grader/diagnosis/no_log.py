@@ -10,7 +10,7 @@ from itertools import product
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.no_messages import why_not_delivered
+from grader.diagnosis.no_messages import why_few, why_not_delivered
 from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spun, why_slow
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.process.raised import defined_at
@@ -31,6 +31,7 @@ from grader.measure.printed import (
     shown,
 )
 from grader.recording.model import NS, Endpoint, Kind, LogLine, Recording
+from grader.spec.expression import Expression
 from grader.spec.unit import format_duration
 from grader.submission.record import SourceError
 
@@ -53,6 +54,7 @@ class NotLogged(Symptom[Cause]):
         needed: How many there must be.
         decimals: How many decimals must be right.
         within_ns: How soon after its message a line must have come.
+        own: The student publishes the messages.
     """
 
     recording: Recording
@@ -62,6 +64,7 @@ class NotLogged(Symptom[Cause]):
     needed: int
     decimals: int
     within_ns: int
+    own: bool = False
 
     @property
     def seen(self) -> str:
@@ -72,20 +75,20 @@ class NotLogged(Symptom[Cause]):
         return f"no log line shows a message on {code(self.topic)}"
 
     @property
-    def subscriptions(self) -> tuple[Endpoint, ...]:
-        """The student's subscriptions to the topic."""
-        return self.recording.student_endpoints(Kind.SUBSCRIPTION, self.topic)
+    def ends(self) -> tuple[Endpoint, ...]:
+        """The student's subscriptions to the topic, or publishers."""
+        kind = Kind.PUBLISHER if self.own else Kind.SUBSCRIPTION
+        return self.recording.student_endpoints(kind, self.topic)
 
     @property
     def nodes(self) -> set[str]:
         """The nodes that have them."""
-        return {item.node for item in self.subscriptions}
+        return {item.node for item in self.ends}
 
     @property
     def near(self) -> list[LogLine]:
         """Lines that could have been an answer to a message."""
-        begin_ns = self.wanted[0].message.stamp_ns
-        end_ns = self.wanted[-1].due_ns + self.within_ns
+        begin_ns, end_ns = self.wanted[0].begin_ns, self.wanted[-1].due_ns + self.within_ns
         lines = output_lines(self.recording)
         return [line for line in lines if begin_ns <= line.time_ns <= end_ns]
 
@@ -116,15 +119,16 @@ def why_not_logged(
     needed: int,
     decimals: int,
     within_ns: int,
+    own: bool,
 ) -> Cause:
     """Why fewer messages than needed were followed by log lines with their values."""
-    return cause_of(NotLogged(recording, topic, wanted, found, needed, decimals, within_ns))
+    return cause_of(NotLogged(recording, topic, wanted, found, needed, decimals, within_ns, own))
 
 
 @explanation(NotLogged)
 def not_delivered(symptom: NotLogged) -> Cause | None:
     """The messages do not reach the node."""
-    return why_not_delivered(symptom.recording, symptom.topic)
+    return None if symptom.own else why_not_delivered(symptom.recording, symptom.topic)
 
 
 @explanation(NotLogged)
@@ -137,9 +141,9 @@ def process_ended(symptom: NotLogged) -> Cause | None:
 def no_history(symptom: NotLogged) -> Cause | None:
     """A late joiner does not request earlier messages (transient_local)."""
     wanted, recording = symptom.wanted, symptom.recording
-    if not wanted or wanted[-1].message.stamp_ns >= recording.launched_ns:
+    if symptom.own or not wanted or wanted[-1].message.stamp_ns >= recording.launched_ns:
         return None
-    for item in symptom.subscriptions:
+    for item in symptom.ends:
         durability, reliability = item.qos.durability, item.qos.reliability
         if durability in _KEEPS and reliability in _RESENDS:
             continue
@@ -162,6 +166,8 @@ def too_few_sent(symptom: NotLogged) -> Cause | None:
     number = len(symptom.wanted)
     if number >= symptom.needed:
         return None
+    if symptom.own:
+        return why_few(symptom.recording, symptom.topic, symptom.needed)
     sent = f"only {counted(number, 'message was', 'messages were')} sent on {code(symptom.topic)}"
     return why_unsubscribed(symptom.recording, symptom.topic, sent) or Cause.to_repeat(sent)
 
@@ -188,12 +194,16 @@ def no_cpu_time(symptom: NotLogged) -> Cause | None:
 @explanation(NotLogged)
 def subscription_destroyed(symptom: NotLogged) -> Cause | None:
     """The program destroyed its subscription."""
+    if symptom.own:
+        return None
     return why_unsubscribed(symptom.recording, symptom.topic, symptom.seen)
 
 
 @explanation(NotLogged)
 def never_spun(symptom: NotLogged) -> Cause | None:
     """rclpy.spin() is never called, so the callback is never called."""
+    if symptom.own:
+        return None
     return why_never_spun(
         symptom.recording,
         f"the callback is never called: the subscription to {code(symptom.topic)} is there and "
@@ -304,11 +314,13 @@ def other_values(symptom: NotLogged) -> Cause | None:
     lines = "\n".join(logged_text(one.text) for one in symptom.near)
     pair = exchanged(lines, item.values, decimals)
     how = f", where {listing(map(code, pair))} are swapped" if pair else ""
-    fields = listing(code(f"msg.{path}") for path in missing)
+    names = dict.fromkeys(name for path in missing for name in Expression.of(path).fields)
+    fields = listing(code(f"msg.{name}") for name in names)
+    given = "is published" if symptom.own else "the callback is given"
     return Cause(
         f"log lines follow messages on {code(symptom.topic)}, but none shows {values}: "
         f"{quote(line.text)}{how}",
-        f"Log the fields of the message that the callback is given: {fields}.",
+        f"Log the fields of the message that {given}: {fields}.",
         symptom.evidence(line),
     )
 
@@ -318,12 +330,21 @@ def nothing_logged(symptom: NotLogged) -> Cause:
     """Nothing is logged when a message comes."""
     recording, topic = symptom.recording, symptom.topic
     lines = output_lines(recording)
-    return Cause(
+    seen = (
         f"nothing is logged when messages come on {code(topic)}: the subscription is there, its "
-        "type and its QoS match" + (f"; the process wrote {quote(lines[0].text)}" if lines else ""),
+        "type and its QoS match"
+    )
+    hint = (
         "Does the callback of this topic reach the line that logs the message? By default the "
         "output of debug() is not shown, an `except: pass` hides an error, and an `if` may leave "
-        "messages out.",
+        "messages out."
+    )
+    if symptom.own:
+        seen = symptom.seen
+        hint = "Log the message where it is published: self.get_logger().info(f'... {value}')."
+    return Cause(
+        seen + (f"; the process wrote {quote(lines[0].text)}" if lines else ""),
+        hint,
         Evidence(
             moments=first_seen(recording, recording.carried(topic)),
             places=symptom.places,

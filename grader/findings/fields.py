@@ -9,6 +9,7 @@ from pydantic import Field
 
 from grader.findings.condition import is_comparison
 from grader.findings.finding import Table
+from grader.findings.text import is_asked_of_text, text_words
 from grader.findings.value import (
     Difference,
     FieldPath,
@@ -62,6 +63,8 @@ def wanted_text(value: Any) -> str:
 
 
 def _wanted(value: Any) -> str:
+    if is_asked_of_text(value):
+        return text_words(value)
     text = wanted_text(value)
     return text if text[0] in "<>!" else f"= {text}"
 
@@ -72,6 +75,8 @@ def instead(item: Difference) -> str:
 
 
 def _expected_text(item: Difference) -> str:
+    if is_asked_of_text(item.expected):
+        return f"a text that {text_words(item.expected)}"
     is_condition = isinstance(item.expected, str) and isinstance(item.observed, int | float | None)
     return str(item.expected) if is_condition else value_text(item.expected)
 
@@ -120,7 +125,7 @@ def difference_table(title: str, found: Sequence[Difference]) -> Table:
 def _plain(value: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
     for key, item in value.items():
         name = f"{path}.{key}" if path else str(key)
-        if isinstance(item, Mapping):
+        if isinstance(item, Mapping) and not is_asked_of_text(item):
             yield from _plain(item, name)
         else:
             yield name, item

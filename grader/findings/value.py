@@ -14,6 +14,7 @@ from pydantic import AfterValidator
 
 from grader.findings import condition
 from grader.findings.condition import is_comparison, is_near, meets
+from grader.findings.text import check_asked, is_asked_of_text, looks_like_a_condition, says
 from grader.spec.expression import Expression, is_field
 from grader.spec.nearest_name import did_you_mean
 
@@ -79,6 +80,8 @@ def expected_leaves(expected: Mapping[str, Any], message: Mapping[str, Any]) -> 
     found: dict[str, Any] = {}
     _expect(expected, message, "", found)
     for path, item in found.items():
+        if is_asked_of_text(item):
+            continue
         try:
             same(item, item_at(message, path), EXACT, message)
         except NoSuchField as error:
@@ -145,7 +148,13 @@ def number_at(message: Mapping[str, Any], path: str) -> float:
 
 
 def _expect(item: Any, message: Any, path: str, found: dict[str, Any]) -> None:
-    if isinstance(item, Mapping):
+    if isinstance(message, str) and is_asked_of_text(item):
+        try:
+            check_asked(item)
+        except ValueError as error:
+            raise NoSuchField(f"{path}: {error}") from None
+        found[path] = item
+    elif isinstance(item, Mapping):
         for name, inner in item.items():
             here = f"{path}.{name}" if path else str(name)
             try:
@@ -188,8 +197,13 @@ def _other_kind(item: Any, value: Any) -> str:
 
 def unreachable(expected: Any, sample: Any, tolerance: float) -> str:
     """Why a field can never have an expected value, to follow its name; nothing if it can."""
-    if _is_asked(expected, sample):
+    if _is_asked(expected, sample) or is_asked_of_text(expected):
         return ""
+    if isinstance(expected, str) and isinstance(sample, str) and looks_like_a_condition(expected):
+        return (
+            f"is a text, and {expected!r} would be compared with the whole of it: write "
+            "{contains: ...}, {matches: ...} or {number: ...}"
+        )
     if _kind(expected) != _kind(sample):
         return _other_kind(expected, sample)
     items, samples = _items(expected), _items(sample)
@@ -264,7 +278,7 @@ def same(
     message: Mapping[str, Any] = MappingProxyType({}),
     circle: float = 0.0,
 ) -> bool:
-    """Whether an observed value is the wanted one; a text asks something of a number.
+    """Whether an observed value is the wanted one; a text may ask something of a number.
 
     Args:
         message: With the fields that expressions in the text name.
@@ -273,6 +287,8 @@ def same(
     Raises:
         NoSuchField: The text asks nothing of a number, or names what the message does not have.
     """
+    if isinstance(wanted, Mapping):
+        return isinstance(observed, str) and says(observed, **wanted)
     wanted_items, observed_items = _items(wanted), _items(observed)
     if wanted_items is not None and observed_items is not None:
         return len(wanted_items) == len(observed_items) and all(

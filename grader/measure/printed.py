@@ -14,28 +14,14 @@ from grader.findings.value import number_at
 from grader.findings.wording import code
 from grader.recording.model import NS, LogLine, Message, Recording
 from grader.spec.expression import Expression
+from grader.spec.text_numbers import MINUS, NUMBER, numbers_in
 
-_NUMBER = re.compile(
-    r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[-+]?\b(?:inf|nan)\b",
-    re.IGNORECASE,
-)
-# `1,37` as some locales write it. In `(1,37)` it could be two numbers as well: both are tried.
-_DECIMAL_COMMA = re.compile(r"(?<![0-9.,])[-+]?[0-9]+,[0-9]+(?![0-9.,])")
-# `123,456` and `123_456`, as the format specifications `,` and `_` write it; `123 456` and
-# `123'456`, as SI and some locales do. `123 456` could be two numbers as well: both are tried.
-_GROUPED = re.compile(
-    r"(?<![0-9.,_])[-+]?[0-9]{1,3}([,_'\N{RIGHT SINGLE QUOTATION MARK} \N{NO-BREAK SPACE}"
-    r"\N{THIN SPACE}\N{NARROW NO-BREAK SPACE}])[0-9]{3}(?:\1[0-9]{3})*(?:\.[0-9]+)?"
-    r"(?![0-9_]|[.,][0-9])"
-)
-# Typographers' sign, which some locales and tables write.
-_MINUS = "\N{MINUS SIGN}"
 UNFILLED = re.compile(r"\{[A-Za-z_][^{}\s\"',]*\}|%[-+0-9.]*l{0,2}[dfgsuz]\b")
 """``{position.x:.2f}`` or ``%.2f`` as it stands in the source, where a value should be."""
 # `x = 1.37`, `y: -0.62`, `"x": 1.37`: a name and its number with nothing but such signs between.
 _NAMED = re.compile(
     r"""(?<![A-Za-z0-9_])(?P<name>[A-Za-z_]\w*)["']?[ \t]*[:=][ \t]*(?P<number>"""
-    + _NUMBER.pattern
+    + NUMBER.pattern
     + ")",
     re.IGNORECASE,
 )
@@ -59,17 +45,7 @@ def quote(line: str) -> str:
 
 def numbers(line: str) -> tuple[float, ...]:
     """Every number that a line may be read to show, but for those of a logger's prefix."""
-    text = logged_text(line).replace(_MINUS, "-")
-    found: list[float] = []
-    for match in _NUMBER.finditer(text):
-        number = float(match[0])
-        found.append(number)
-        # In `front-1.37` the sign is a dash.
-        if match[0].startswith("-") and text[: match.start()][-1:].isalnum():
-            found.append(-number)
-    found += [float(match[0].replace(",", ".")) for match in _DECIMAL_COMMA.finditer(text)]
-    found += [float(match[0].replace(match[1], "")) for match in _GROUPED.finditer(text)]
-    return tuple(found)
+    return numbers_in(logged_text(line))
 
 
 def exchanged(text: str, values: Mapping[str, float], decimals: int) -> tuple[str, str] | None:
@@ -78,7 +54,7 @@ def exchanged(text: str, values: Mapping[str, float], decimals: int) -> tuple[st
     Names may also follow their numbers or stand apart from them, and such a text is not read.
     """
     named: dict[str, list[float]] = {}
-    for match in _NAMED.finditer(logged_text(text).replace(_MINUS, "-")):
+    for match in _NAMED.finditer(logged_text(text).replace(MINUS, "-")):
         named.setdefault(match["name"].lower(), []).append(float(match["number"]))
 
     def is_named(path: str, value: float) -> bool:
@@ -115,11 +91,18 @@ class Wanted:
 
     Attributes:
         ready_ns: When a subscription was there to get it, perhaps after it was published.
+        sooner_ns: How long before the message a line may come.
     """
 
     message: Message
     values: dict[str, float]
     ready_ns: int = 0
+    sooner_ns: int = 0
+
+    @property
+    def begin_ns(self) -> int:
+        """From when on a line counts."""
+        return self.message.stamp_ns - self.sooner_ns
 
     @property
     def due_ns(self) -> int:
@@ -136,11 +119,13 @@ class Echo:
 
 
 def wanted_values(
-    messages: Sequence[Message], fields: Sequence[str], ready_ns: int = 0
+    messages: Sequence[Message], fields: Sequence[str], ready_ns: int = 0, sooner_ns: int = 0
 ) -> tuple[Wanted, ...]:
     """What the log should show of each message; raises NoSuchField where a number is not there."""
     return tuple(
-        Wanted(message, {path: number_at(message.value, path) for path in fields}, ready_ns)
+        Wanted(
+            message, {path: number_at(message.value, path) for path in fields}, ready_ns, sooner_ns
+        )
         for message in messages
     )
 
@@ -181,7 +166,7 @@ def echoes(
     while number < len(wanted):
         item = wanted[number]
         number += 1
-        begin_ns = item.message.stamp_ns
+        begin_ns = item.begin_ns
         end_ns = item.due_ns + within_ns
         if forgive:
             end_ns += round(recording.stolen_s(begin_ns, end_ns) * NS)
@@ -209,7 +194,7 @@ def echoes(
                 first = max(begin, free) if serving[0] >= free else serving[0]
                 served, free = lines[first : index + 1], max(free, index + 1)
                 others = wanted[number : number + len(printed[index]) - 1]
-                before = [one for one in others if one.message.stamp_ns <= times[index]]
+                before = [one for one in others if one.begin_ns <= times[index]]
                 listed = _listed(printed[index], [item, *before], decimals)
                 found += [Echo(one, served) for one in [item, *before][:listed]]
                 number += listed - 1

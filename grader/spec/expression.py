@@ -15,6 +15,7 @@ from functools import cache
 from typing import Any
 
 from grader.spec.nearest_name import nearest_or_all
+from grader.spec.text_numbers import numbers_in
 from grader.spec.unit import parse_any
 
 Find = Callable[[str], Any]
@@ -49,6 +50,12 @@ def _of_quaternion(angle: Callable[..., float]) -> Callable[[Any], float]:
     return computed
 
 
+def _number(text: Any) -> float:
+    if not isinstance(text, str):
+        raise TypeError("number() is of a text")
+    return next(iter(numbers_in(text)), math.nan)
+
+
 def _norm(vector: Any) -> float:
     return math.hypot(*(vector.values() if isinstance(vector, Mapping) else vector))
 
@@ -57,7 +64,15 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{"yaw": _of_quaternion(yaw), "roll": _of_quaternion(_roll), "pitch": _of_quaternion(_pitch)},
     **{name: getattr(math, name) for name in ("hypot", "sqrt", "sin", "cos", "tan", "asin")},
     **{name: getattr(math, name) for name in ("acos", "atan", "atan2", "degrees", "radians")},
-    **{"norm": _norm, "abs": abs, "min": min, "max": max, "sum": sum, "len": len},
+    **{
+        "number": _number,
+        "norm": _norm,
+        "abs": abs,
+        "min": min,
+        "max": max,
+        "sum": sum,
+        "len": len,
+    },
 }
 _ALL_AROUND = ("yaw", "roll", "atan2")
 _OPERATORS: dict[type, Callable[..., Any]] = {

@@ -201,3 +201,30 @@ def test_of_a_message_that_holds_itself_no_field_is_looked_for(
     holder = tmp_path / "ros/share/geometry_msgs/msg/Vector3.msg"
     holder.write_text("Twist[] inner\n", encoding="utf-8")
     assert found("messages.equal", "topic: /twist, value: {a: 1}") == []
+
+
+WORDS = "/words (std_msgs/msg/String): "
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ('{data: "!= bye"}', "data is a text, and '!= bye' would be compared with the whole of it"),
+        ('{data: "> 3"}', "write {contains: ...}, {matches: ...} or {number: ...}"),
+        ('{data: "0.1 .. 0.5"}', "data is a text"),
+        ('{data: {matches: "("}}', "data: '(' is not a regular expression"),
+        ('{data: {number: "fast"}}', "data: 'fast' asks nothing of a number"),
+        ("{data: {contain: hello}}", "data has no field 'contain'"),
+        ("{data: {contains: hello}}", ""),
+        ('{data: {matches: "^H", number: "> 3"}}', ""),
+        ('{"number(data)": "> 3"}', ""),
+        ("{data: loading .. done}", ""),
+        ("{data: bye!}", ""),
+    ],
+)
+def test_what_is_asked_of_a_text_is_read_before_any_run(
+    found: Found, value: str, words: str
+) -> None:
+    problems = found("messages.equal", f"topic: /words, value: {value}")
+    assert [words in one for one in problems] == ([True] if words else [])
+    assert not words or WORDS in problems[0]

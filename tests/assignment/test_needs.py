@@ -149,3 +149,37 @@ def test_a_topic_that_a_check_names_on_the_way_may_be_misspelt_too(
     assert [one.partition(" is about ")[2].partition(",")[0] for one in told] == [
         repr(topic) for topic in warned
     ]
+
+
+CHATTER = ("/speed, type: std_msgs/msg/Float64", "/chatter, type: std_msgs/msg/String")
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ("topic: /chatter, fields: [number(data)]", "nothing sends '/chatter' in the scenario"),
+        ("topic: /enable, fields: [data], own: true", "records no '/enable' of the student"),
+        ("topic: /chatter, fields: [number(data)], own: true", ""),
+    ],
+)
+def test_a_log_of_what_the_student_publishes_is_asked_for_as_that(
+    found: Found, parameters: str, words: str
+) -> None:
+    problems = found("log.follows", parameters, CHATTER)
+    assert [words in one for one in problems] == ([True] if words else [])
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ("names: [speed]", "launches nothing with 'parameters'"),
+        ("names: [sped]", "gives no parameter 'sped'. Did you mean 'speed'?"),
+        ("names: [speed]", ""),
+    ],
+)
+def test_parameters_are_asked_for_only_where_a_launch_gives_them(
+    found: Found, parameters: str, words: str
+) -> None:
+    given = ("{executable: bot}", "{executable: bot, parameters: {speed: 1.0}}")
+    problems = found("parameter.given", parameters, ("", "") if "nothing" in words else given)
+    assert [words in one for one in problems] == ([True] if words else [])

@@ -451,3 +451,48 @@ def test_a_message_on_rosout_does_not_count_besides_its_line():
     log = lines("1.83", [3.0])
     log += tuple(replace(line, stream="rosout", level="INFO") for line in log)
     assert "follow only 1 of 6" in front(log)
+
+
+SAID = {"topic": "/chatter", "fields": ["number(data)"], "at_least": 2, "own": True}
+
+
+class TestOwn:
+    """log.follows of what the student publishes."""
+
+    def talker(self, log=(), **changes):
+        texts = [{"data": f"Hello World: {number}"} for number in range(10, 16)]
+        said = zip(ODOM_TIMES_S, texts, strict=True)
+        messages = tuple(
+            message(t, value, topic="/chatter", type="std_msgs/msg/String") for t, value in said
+        )
+        own = endpoint("/chatter", type="std_msgs/msg/String", node=BOT)
+        return run(log, messages={"/chatter": messages}, endpoints=(own,), **changes)
+
+    def logged(self, text, delay_s):
+        return tuple(
+            line
+            for number, time_s in enumerate(ODOM_TIMES_S, start=10)
+            for line in output(text.format(number), time_s=time_s + delay_s)
+        )
+
+    @pytest.mark.parametrize("delay_s", [-0.05, 0.05])
+    def test_a_node_that_logs_what_it_publishes_before_or_after_it_passes(self, delay_s):
+        found = judge("log.follows", self.talker(self.logged("I say {}", delay_s)), **SAID)
+        assert found.status is Status.PASSED
+
+    @pytest.mark.parametrize(
+        ("log", "words"),
+        [
+            ("", "no log line shows a message on `/chatter`"),
+            ("published", "none shows `number(data)` = 15"),
+        ],
+    )
+    def test_a_node_that_does_not_log_it_fails_and_is_not_told_to_subscribe(self, log, words):
+        lines = self.logged(log, 0.05) if log else ()
+        found = failing("log.follows", self.talker(lines), **SAID)
+        assert words in found
+        assert "subscri" not in found
+
+    def test_a_node_that_publishes_nothing_is_told_so(self):
+        silent = run(messages={}, endpoints=())
+        assert "publish" in failing("log.follows", silent, **SAID)

@@ -323,3 +323,34 @@ class TestEqual:
         finding = equal(stream(*(twist((wrong if n == index else 1.0, 0, 0)) for n in range(12))))
         assert finding.status is Status.FAILED
         assert f"message {index + 1} of 12" in finding.observed
+
+
+@pytest.mark.parametrize(
+    ("value", "status"),
+    [
+        ({"data": {"contains": "hello"}}, "passed"),
+        ({"data": {"contains": "bye"}}, "failed"),
+        ({"data": {"matches": "^Hello .*: [0-9]+$"}}, "passed"),
+        ({"data": {"matches": "^World"}}, "failed"),
+        ({"data": {"number": "> 41"}}, "passed"),
+        ({"data": {"number": "> 42"}}, "failed"),
+        ({"data": {"number": 42}}, "passed"),
+        ({"data": {"contains": "hello", "number": 41}}, "failed"),
+        ({"number(data)": "40 .. 44"}, "passed"),
+        ({"number(data)": 43}, "failed"),
+    ],
+)
+def test_a_text_is_judged_by_what_it_contains_or_matches_or_by_a_number_in_it(value, status):
+    said = message(1.0, {"data": "Hello World: 42"}, type="std_msgs/msg/String")
+    found = judge(
+        "messages.equal", recording(messages={"/cmd_vel": (said,)}), value=value, topic="/cmd_vel"
+    )
+    assert found.status.value == status
+
+
+def test_a_wrong_text_is_told_with_what_was_asked_of_it():
+    said = message(1.0, {"data": "bye"}, type="std_msgs/msg/String")
+    run = recording(messages={"/cmd_vel": (said,)})
+    found = judge("messages.equal", run, topic="/cmd_vel", value={"data": {"contains": "hello"}})
+    assert found.expected.startswith("data contains “hello”")
+    assert "data = 'bye' instead of a text that contains “hello”" in found.observed

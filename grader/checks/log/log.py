@@ -1,4 +1,4 @@
-"""Checks of what a node logs: that it follows the messages that the node was sent."""
+"""Checks of what a node logs: that it follows messages that it was sent, or that it publishes."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from typing import Literal
 from pydantic import Field
 
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
+from grader.checks.need import SentOrOwn
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_log import why_not_logged
+from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.blocked_executor import why_slow
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen
@@ -35,8 +37,16 @@ _SENT = {
 class Follows(Parameters):
     """Parameters of log.follows."""
 
+    needs = (SentOrOwn(),)
+
     topic: TopicName = Field(
-        description="Fully qualified name of a topic that the simulated robot or a stimulus sends."
+        description="Fully qualified name of a topic that the simulated robot or a stimulus sends; "
+        "or with `own` a node of the student."
+    )
+    own: bool = Field(
+        False,
+        description="Whether the log shows what a node of the student publishes: a line may come "
+        "before or after its message. By default it shows what the node was sent.",
     )
     fields: tuple[FieldPath, ...] = Field(
         min_length=1,
@@ -84,7 +94,7 @@ class Follows(Parameters):
 
 @check("log.follows", Subject.RECORDING, Follows)
 def follows(recording: Recording, parameters: Follows) -> Finding | Cause:
-    """The node logs what it receives.
+    """The node logs what it receives, or with `own` what it publishes.
 
     Lines on stdout and stderr (rclpy's loggers write to stderr) must follow messages on the topic
     and show the values of their fields. Any formatting is right: one line or several, rounded or
@@ -94,7 +104,9 @@ def follows(recording: Recording, parameters: Follows) -> Finding | Cause:
     """
     carried = recording.carried(parameters.topic)
     own = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
-    if own:
+    if parameters.own:
+        stop_if(None if carried else why_silent(recording, parameters.topic))
+    elif own:
         return Cause(
             f"the node itself publishes on {code(parameters.topic)}, so its log shows nothing of "
             "what it was sent",
@@ -108,8 +120,9 @@ def follows(recording: Recording, parameters: Follows) -> Finding | Cause:
         or (parameters.sent == "before_launch") == (message.stamp_ns < recording.launched_ns)
     ]
     ready_ns = recording.matched_ns or recording.launched_ns
-    wanted = wanted_values(messages, parameters.fields, ready_ns)
     within_ns = round(parameters.within * NS)
+    sooner_ns = within_ns if parameters.own else 0
+    wanted = wanted_values(messages, parameters.fields, ready_ns, sooner_ns)
     found = echoes(recording, wanted, parameters.decimals, within_ns)
     if len(found) < parameters.at_least:
         return why_not_logged(
@@ -120,6 +133,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding | Cause:
             needed=parameters.at_least,
             decimals=parameters.decimals,
             within_ns=within_ns,
+            own=parameters.own,
         )
     stop_if(_too_seldom(recording, parameters, wanted, found))
     lines = [line for echo in found for line in echo.lines]
@@ -156,7 +170,8 @@ def _too_seldom(
     if excused:
         return Cause.to_repeat(f"{observed}, but the machine took the time from the process")
     observed += f", although messages came on {code(parameters.topic)}"
-    nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, parameters.topic)}
+    kind = Kind.PUBLISHER if parameters.own else Kind.SUBSCRIPTION
+    nodes = {item.node for item in recording.student_endpoints(kind, parameters.topic)}
     hint = "Log in every call of the callback, or at least once in a second."
     moment = Moment("no line from here on", begin_s)
     return why_slow(recording, observed, nodes) or Cause(

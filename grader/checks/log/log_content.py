@@ -17,9 +17,9 @@ from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.wrong_rhythm import why_paused
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import until_the_end
-from grader.findings.value import EXACT, same
+from grader.findings.text import check_asked, says
 from grader.findings.wording import code, counted, percent
-from grader.measure.printed import logged_text, numbers, quote
+from grader.measure.printed import logged_text, quote
 from grader.recording.model import NS, LogLine, Recording
 from grader.spec.name import QualifiedNodeName
 from grader.spec.nearest_name import nearest
@@ -72,19 +72,12 @@ def logged(recording: Recording) -> tuple[Logged, ...]:
 
 
 def _pattern(text: str) -> str:
-    try:
-        re.compile(text)
-    except re.error as error:
-        raise ValueError(f"{text!r} is not a regular expression: {error}") from None
+    check_asked({"matches": text})
     return text
 
 
 def _number(text: str) -> str:
-    try:
-        same(text, 0.0, EXACT)
-    except ValueError:
-        text = f"{text!r} asks nothing of a number: write 1.5, '> 0' or '0.1 .. 0.5'"
-        raise ValueError(text) from None
+    check_asked({"number": text})
     return text
 
 
@@ -148,13 +141,7 @@ class Matching(Records):
 
     def says(self, text: str) -> bool:
         """Whether a record has the text."""
-        if self.text is not None and self.text.casefold() not in text.casefold():
-            return False
-        if self.number is not None and not any(
-            same(self.number, number, EXACT) for number in numbers(text)
-        ):
-            return False
-        return self.pattern is None or re.search(self.pattern, text) is not None
+        return says(text, self.text, self.pattern, self.number)
 
     def found(self, recording: Recording) -> list[Logged]:
         """The records with the text at the level."""
