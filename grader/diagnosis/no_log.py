@@ -341,7 +341,7 @@ def nothing_logged(symptom: NotLogged) -> Cause:
     )
     if symptom.own:
         seen = symptom.seen
-        hint = "Log the message where it is published: self.get_logger().info(f'... {value}')."
+        hint = "Log the message where it is published: self.get_logger().info('...')."
     return Cause(
         seen + (f"; the process wrote {quote(lines[0].text)}" if lines else ""),
         hint,

@@ -124,5 +124,5 @@ def test_what_was_built_wins_over_what_was_declared(
         ("bot_pub", "bot_publisher.other:main"),
         ("new", "bot_publisher:run"),
     )
-    assert record.misplaced_executables == ("bot_pub",)
+    assert record.misplaced_executables == ("bin/bot_pub",)
     assert [name for name, _ in record.missing_targets] == ["bot_pub", "new"]

@@ -66,28 +66,28 @@ class InstallSpace:
 
 def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) -> InstallSpace:
     """Look at an install space; what is not a regular file there does not count."""
-    # What a wrong setup.cfg puts into the folder of another package, which need not be there.
-    executables = {
-        folder.name: tuple(sorted(path.name for path in folder.iterdir() if _is_program(path)))
-        for folder in (install / "lib").glob("*")
-        if folder.is_dir() and not folder.is_symlink() and _is_text(folder.name)
-    }
+    programs: dict[str, list[str]] = {}
+    # A wrong setup.cfg names the folder of another package, which need not be there.
+    for path in sorted((install / "lib").glob("*/*")):
+        if not path.parent.is_symlink() and _is_program(path) and _is_text(path.parent.name):
+            programs.setdefault(path.parent.name, []).append(path.name)
+    executables = {folder: tuple(names) for folder, names in programs.items()}
     definitions = {}
     shared = {}
     python: dict[str, str] = {}
     for package in packages:
-        programs = list(regular_files(install / "lib" / package))
+        own = list(regular_files(install / "lib" / package))
         executables[package] = tuple(
-            sorted({path.name for path in programs if os.access(path, os.X_OK)})
+            sorted({path.name for path in own if os.access(path, os.X_OK)})
         )
-        python |= {path.relative_to(install).as_posix(): _hash(path) for path in programs}
+        python |= {path.relative_to(install).as_posix(): _hash(path) for path in own}
         share = install / "share" / package
         definitions[package] = tuple(_definitions(share))
         paths = list(islice(regular_files(share), _MOST_SHARED))
         digests = {str(path): _hash(path) for path in paths if path.suffix == ".py"}
-        own = match_files(digests, sources)
+        theirs = match_files(digests, sources)
         shared[package] = tuple(
-            (path.relative_to(share).as_posix(), own.get(str(path), "")) for path in paths
+            (path.relative_to(share).as_posix(), theirs.get(str(path), "")) for path in paths
         )
     entry_points = {}
     for site in site_packages(install):
