@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Iterable
+from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -234,7 +234,7 @@ def test_setup_py_does_not_see_the_callers_home_and_variables(
 class Starving(OwnTime):
     """The clock of a program that gets no CPU."""
 
-    def look(self, usages: Iterable[Usage], late_s: float) -> None:
+    def look(self, usages: Sequence[Usage], late_s: float) -> None:
         self.wall_s += 10_000
 
 

@@ -10,16 +10,13 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from grader.sandbox.usage import IdleCpu, OrphanCpu, Usage, states
 
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
-_PRESSURE = Path("/proc/pressure/io")
-_CGROUP = Path("/sys/fs/cgroup")
 _THROTTLED = re.compile(r"^throttled_(usec|time) (\d+)$", re.MULTILINE)
 _PER_S = {"usec": 1e6, "time": 1e9}
 _STALLED = re.compile(r"^some .*total=(\d+)$", re.MULTILINE)
@@ -47,7 +44,7 @@ class Look:
     throttled_s: float = 0.0
     stalled_s: float = 0.0
     late_s: float = 0.0
-    does: Sequence[str] | set[str] = ()
+    does: str = ""
 
 
 def taken_s(before: Look, after: Look, cpus: int) -> float:
@@ -81,44 +78,41 @@ class OwnTime:
         self._idle = IdleCpu()
         self._last = self._look((), 0.0)
 
-    def look(self, usages: Iterable[Usage], late_s: float) -> None:
+    def look(self, usages: Sequence[Usage], late_s: float) -> None:
         """Read it, with what the processes of the program take now."""
         now = self._look(usages, late_s)
         wall_s = now.time_s - self._last.time_s
         self.wall_s += wall_s
         self.own_s += wall_s - taken_s(self._last, now, self._idle.cpus)
-        self.computed_s = now.used_s
-        self._last = now
+        self.computed_s, self._last = now.used_s, now
 
-    def _look(self, usages: Iterable[Usage], late_s: float) -> Look:
-        there = list(usages)
-        used_s = self._cpu.used_s(there)
+    def _look(self, usages: Sequence[Usage], late_s: float) -> Look:
         return Look(
-            time.monotonic(),
-            used_s,
-            self._cpu.ended,
-            self._idle.ticks() / _TICKS_PER_S,
-            throttled_s(),
-            stalled_s(),
-            late_s,
-            states(there),
+            time_s=time.monotonic(),
+            used_s=self._cpu.used_s(usages),
+            unseen=self._cpu.ended,
+            idle_s=self._idle.ticks() / _TICKS_PER_S,
+            throttled_s=throttled_s(),
+            stalled_s=stalled_s(),
+            late_s=late_s,
+            does="".join(states(usages)),
         )
 
 
-def throttled_s(root: Path = _CGROUP) -> float:
+def throttled_s(root: Path = Path("/sys/fs/cgroup")) -> float:
     """Time in which the container of this process was kept from all CPUs, as far as it can see."""
-    for folder in (root, root / "cpu"):
-        with suppress(OSError):
-            found = _THROTTLED.search((folder / "cpu.stat").read_text())
-            if found:
-                return int(found[2]) / _PER_S[found[1]]
-    return 0.0
+    found = _THROTTLED.search(_text(root / "cpu.stat") or _text(root / "cpu/cpu.stat"))
+    return int(found[2]) / _PER_S[found[1]] if found else 0.0
 
 
-def stalled_s(file: Path = _PRESSURE) -> float:
+def stalled_s(file: Path = Path("/proc/pressure/io")) -> float:
     """Time in which something on this machine waited for a disk; 0 where it is not known."""
-    with suppress(OSError):
-        found = _STALLED.search(file.read_text())
-        if found:
-            return int(found[1]) / 1e6
-    return 0.0
+    found = _STALLED.search(_text(file))
+    return int(found[1]) / 1e6 if found else 0.0
+
+
+def _text(file: Path) -> str:
+    try:
+        return file.read_text()
+    except OSError:
+        return ""

@@ -5,17 +5,17 @@ A build file may print the same words; so what the log says is looked up on the 
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import importlib.util
 import os
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from pathlib import Path
 
 from grader.ros import RosInstallation
 from grader.submission.build.build_log import ROS
 from grader.submission.read.rosdistro import PACKAGES
+from grader.tree import listing
 
 _FILE = rf"(?P<file>{ROS}/[^\s:'\"]+)"
 _DAMAGE = tuple(
@@ -39,7 +39,8 @@ _DAMAGE = tuple(
 _OWNER = re.compile(
     r"/(?:include|share|site-packages)/([\w+-]+)|/lib/(?:lib)?([\w+-]+?)(?:__|\.|/)"
 )
-_BLOCKS = ("if", "foreach", "while", "function", "macro")
+_BLOCKS = ("(?:if|foreach|while|function|macro)", "end(?:if|foreach|while|function|macro)")
+_COMPILED = "/__pycache__/"
 
 
 def damaged(log: str, ros: RosInstallation, own: Collection[str]) -> set[str]:
@@ -57,10 +58,8 @@ def damage_in(log: str) -> set[str]:
     return {_name(found) for found in _found(log)}
 
 
-def _found(log: str) -> Iterator[dict[str, str | None]]:
-    for pattern in _DAMAGE:
-        for match in pattern.finditer(log):
-            yield match.groupdict()
+def _found(log: str) -> list[dict[str, str | None]]:
+    return [match.groupdict() for pattern in _DAMAGE for match in pattern.finditer(log)]
 
 
 def _name(found: dict[str, str | None]) -> str:
@@ -98,18 +97,11 @@ def _is_damaged(found: dict[str, str | None], ros: RosInstallation) -> bool:
 
 def _is_broken(file: Path) -> bool:
     """Whether a file is missing or was cut off: a library, or a file of CMake."""
-    try:
-        data = file.read_bytes()
-    except OSError:
-        return True
-    if file.suffix == ".cmake":
+    data = file.read_bytes() if file.is_file() else b""
+    if file.suffix == ".cmake" and data:
         text = data.decode(errors="replace")
-        ends = (
-            len(re.findall(rf"^\s*{word}\s*\(", text, re.MULTILINE | re.IGNORECASE))
-            == len(re.findall(rf"^\s*end{word}\s*\(", text, re.MULTILINE | re.IGNORECASE))
-            for word in _BLOCKS
-        )
-        return text.count("(") != text.count(")") or not all(ends)
+        begun, ended = (len(re.findall(rf"(?im)^\s*{word}\s*\(", text)) for word in _BLOCKS)
+        return text.count("(") != text.count(")") or begun != ended
     # Where the section headers begin, their size and number; elf(5), of 64 bits.
     begin, each, count = (
         int.from_bytes(data[at : at + size], "little") for at, size in ((40, 8), (58, 2), (60, 2))
@@ -121,15 +113,6 @@ def state_of(ros: RosInstallation) -> str:
     """What changes with any file of an installation that others look after."""
     if ros.source != "sourced":
         return ros.source
-    total = hashlib.sha256()
-    for prefix in ros.prefixes:
-        for parent, folders, names in os.walk(prefix):
-            # Python compiles whenever something is imported.
-            folders[:] = sorted(name for name in folders if name != "__pycache__")
-            for name in sorted(names):
-                path = os.path.join(parent, name)  # noqa: PTH118  often
-                with contextlib.suppress(OSError):
-                    status = os.lstat(path)
-                    line = f"{path}\0{status.st_size}\0{status.st_mtime_ns}\n"
-                    total.update(line.encode(errors="surrogateescape"))
-    return total.hexdigest()
+    # Python compiles whenever something is imported.
+    files = (name for prefix in ros.prefixes for name in listing(prefix) if _COMPILED not in name)
+    return hashlib.sha256(os.fsencode("\n".join(sorted(files)))).hexdigest()
