@@ -265,15 +265,13 @@ def why_lacking(submission: SubmissionRecord, name: str) -> Cause | None:
 
 
 def _not_here(lacking: list[str]) -> Cause:
-    found = {name: apt_package(name) for name in lacking}
-    named = " ".join(sorted(filter(None, found.values())))
-    ways = [f"`sudo apt install --reinstall {named}`"] if named else []
-    ways += [way for way in [ways_to_get(lacking)] if way]
+    named = " ".join(filter(None, map(apt_package, lacking)))
+    ways = (named and f"`sudo apt install --reinstall {named}`", ways_to_get(lacking))
     return Cause(
         f"it needs {codes(lacking)} to build: ROS 2 Jazzy has it, but it is missing or damaged on "
         "the machine that grades",
         "You lose no points for it. Tell your instructor that a full ROS 2 Jazzy builds it"
-        f"{''.join(f', or {way}' for way in ways)}.",
+        f"{''.join(f', or {way}' for way in ways if way)}.",
         ours=True,
     )
 

@@ -14,6 +14,7 @@ import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -133,7 +134,8 @@ class Builder(BuildSetting):
             )
         self.on_progress("looking for an earlier build")
         with self.cache.locked(key, wait_s=wall_s + COMPILE_S):
-            found = self.cache.find(key, self._state)
+            state = partial(state_of, self.ros)
+            found = self.cache.find(key, state)
             if found is not None:
                 return found
             parts = dict(self._parts(located, sources, standalone))
@@ -152,12 +154,8 @@ class Builder(BuildSetting):
                     wall_s=wall_s,
                 )
                 record, is_certain = self._run(colcon, sources, parts)
-                seen_with = None if record.succeeded else self._state() if is_certain else ""
+                seen_with = None if record.succeeded else state() if is_certain else ""
                 return self.cache.store(key, unfinished, record, seen_with)
-
-    def _state(self) -> str:
-        """What a failure is seen with, besides what is in the key."""
-        return state_of(self.ros)
 
     def _parts(
         self, located: Located, sources: Sources, names: Sequence[str]

@@ -27,10 +27,8 @@ class Look:
     """What is known of a program and its machine at one moment, in seconds.
 
     Attributes:
-        used_s: CPU time of its processes so far.
-        unseen: How many of them have ended since the look before, if some of what they took is not
-            known.
-        idle_s: In which CPUs had nothing to do.
+        unseen: How many processes have ended since the look before, if some of what they took is
+            not known.
         throttled_s: In which this container got no CPU, for it had had its share (cgroups(7)).
         stalled_s: In which something on the machine waited for a disk (PSI).
         late_s: How much later this look is than it was to be.
