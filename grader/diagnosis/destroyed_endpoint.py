@@ -7,8 +7,11 @@ from grader.diagnosis.process.process_exit import ended_early, exited
 from grader.findings.finding import Evidence, Moment
 from grader.findings.wording import code
 from grader.measure import declarations
-from grader.recording.model import Endpoint, Kind, Recording
+from grader.recording.interaction import Service, executor_services
+from grader.recording.model import NS, Endpoint, Kind, Recording
 
+# A program that is about to end may destroy what it has first.
+_LONG_NS = NS
 _HINT = (
     "Keep it and its node until rclpy.spin() returns. Look for destroy_publisher(), "
     "destroy_subscription(), destroy_service(), destroy() and destroy_node(), and for a node that "
@@ -37,7 +40,7 @@ def why_unpublished(recording: Recording, topic: str, seen: str) -> Cause | None
 
 
 def _why_destroyed(
-    recording: Recording, seen: str, what: str, found: tuple[Endpoint, ...]
+    recording: Recording, seen: str, what: str, found: tuple[Endpoint | Service, ...]
 ) -> Cause | None:
     """The cause if the student's code destroyed all of some endpoints.
 
@@ -46,9 +49,46 @@ def _why_destroyed(
     ends = [item.vanished_ns for item in found if item.vanished_ns is not None]
     if not found or len(ends) < len(found):
         return None
-    last_ns = max(ends)
-    for item in found:
-        process = declarations.process_of(recording, item.node)
+    return _destroyed_at(recording, seen, what, {item.node for item in found}, max(ends))
+
+
+def why_dropped(recording: Recording, kind: Kind, topic: str) -> Cause | None:
+    """The cause if the student's code lost its endpoints on a topic where it created them.
+
+    What the scenario asks for may make a node create and destroy endpoints, as a lifecycle node.
+    """
+    last_ns = declarations.dropped_ns(recording, kind, topic)
+    if last_ns is None or last_ns > recording.stop_ns - _LONG_NS:
+        return None
+    made = [one for one in recording.declared(kind.value) if one.data.get("topic") == topic]
+    nodes = {str(one.data.get("node")) for one in made}
+    own = {name for node in nodes for name in executor_services(node)}
+    asked = any(call.requested_ns < last_ns and call.service not in own for call in recording.calls)
+    spun_ns = min((one.time_ns for one in recording.declared("spin")), default=last_ns)
+    if spun_ns < last_ns and (asked or recording.goals or any(recording.sent.values())):
+        return None
+    what = f"the {kind.value} {'on' if kind is Kind.PUBLISHER else 'to'} {code(topic)}"
+    return _destroyed_at(recording, "it was there only for a moment", what, nodes, last_ns)
+
+
+def why_withdrawn(recording: Recording, what: str, found: tuple[Service, ...]) -> Cause | None:
+    """The cause if the student's code destroyed a server before it answered anything."""
+    names = {item.name for item in found}
+    own = {name for item in found for name in executor_services(item.node)}
+    used = any(call.answered_ns and call.service not in own for call in recording.calls)
+    used = used or any(goal.answered_ns and goal.action in names for goal in recording.goals)
+    ends = [item.vanished_ns for item in found if item.vanished_ns is not None]
+    if used or not ends or max(ends) > recording.stop_ns - _LONG_NS:
+        return None
+    return _why_destroyed(recording, "it was there only for a moment", what, found)
+
+
+def _destroyed_at(
+    recording: Recording, seen: str, what: str, nodes: set[str], last_ns: int
+) -> Cause | None:
+    """The cause, unless the process ended itself or the scenario did something to it."""
+    for node in nodes:
+        process = declarations.process_of(recording, node)
         if ended_early(recording, process) if process is not None else exited(recording):
             return None
         if any(
@@ -61,4 +101,5 @@ def _why_destroyed(
         f"{seen}: {what} was destroyed {when_s:.2f} s after launch, while the process still ran",
         _HINT,
         Evidence(moments=(Moment(f"{what.replace('`', '')} was destroyed", when_s),)),
+        concept="nodes",
     )

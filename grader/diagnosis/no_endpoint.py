@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.destroyed_endpoint import why_dropped, why_withdrawn
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import crashed, why_crashed
@@ -145,9 +146,11 @@ def is_offered(recording: Recording, word: Word, name: str, interface: str | Non
     type_ = f" of {code(interface)}" if interface else ""
     expected = f"{article} {word.noun} {code(name)}{type_}"
     cause = why_not_offered(recording, word, name, interface)
+    servers = offered(recording, word, name)
+    cause = cause or why_withdrawn(recording, f"the {word.noun} {code(name)}", servers)
     if cause is not None:
         return cause.finding(expected)
-    found = offered(recording, word, name)[0]
+    found = servers[0]
     when_s = recording.since_launch_s(found.appeared_ns)
     return Finding.passed(
         expected,
@@ -237,6 +240,13 @@ def misspelt_name(symptom: NoEndpoint) -> Cause | None:
 def process_crashed(symptom: NoEndpoint) -> Cause | None:
     """The process ended with a failure before it created it."""
     return why_crashed(symptom.recording)
+
+
+@explanation(NoEndpoint)
+def dropped(symptom: NoEndpoint) -> Cause | None:
+    """It ended with the constructor or the callback that created it."""
+    kind = {PUBLISHER: Kind.PUBLISHER, SUBSCRIPTION: Kind.SUBSCRIPTION}.get(symptom.word)
+    return why_dropped(symptom.recording, kind, symptom.name) if kind else None
 
 
 @explanation(NoEndpoint)

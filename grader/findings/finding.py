@@ -177,6 +177,7 @@ class Finding:
         remap: If wrong names are the only cause of the failure: the rules that correct them, such
             as ``/cmdvel:=/cmd_vel``. The other checks are then judged in a run with these rules.
         concept: The page of ``docs/concepts`` that explains the idea behind a failure.
+        stands_alone: Whether the checks that require this one can be judged although it failed.
     """
 
     status: Status
@@ -188,6 +189,7 @@ class Finding:
     disturbed: bool = False
     remap: str = ""
     concept: str = ""
+    stands_alone: bool = False
 
     @classmethod
     def passed(cls, expected: str, observed: str, evidence: Evidence | None = None) -> Finding:

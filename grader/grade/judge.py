@@ -54,9 +54,10 @@ def grade(
 ) -> Grade:
     """Judge a submission, with its names in the places of the assignment's variables.
 
-    A check whose requirement did not pass is skipped, unless that failed by a wrong name which the
-    runs put right. So is one that failed in a run whose parameters the node does not take, if a
-    check is about that. A check that raises an exception ends as an error and keeps the traceback.
+    A check whose requirement did not pass is skipped, unless that failed alone, such as by a wrong
+    name which the runs put right. So is one that failed in a run whose parameters the node does not
+    take, if a check is about that. A check that raises an exception ends as an error and keeps the
+    traceback.
 
     Args:
         recordings: By scenario id; empty where nothing could be launched.
@@ -120,12 +121,11 @@ def _counted(counts: Counts, findings: Sequence[Finding]) -> tuple[Status, float
 
 
 def _is_put_right(item: ScenarioFinding, recordings: Mapping[str, Recording]) -> bool:
-    """Whether no check has to wait for a finding: it passed, or the runs put the name right."""
+    """Whether no check has to wait for a finding: it passed, or the others do not need it."""
     rule = item.finding.remap
     runs = [run for name, run in recordings.items() if item.scenario in (None, name)]
-    return item.finding.status is Status.PASSED or (
-        bool(rule) and all(set(rule.split()) <= set(run.remaps) for run in runs)
-    )
+    goes_on = item.finding.status is Status.PASSED or item.finding.stands_alone
+    return goes_on or (bool(rule) and all(set(rule.split()) <= set(run.remaps) for run in runs))
 
 
 def _has_other_parameters(item: ScenarioFinding, recordings: Mapping[str, Recording]) -> bool:

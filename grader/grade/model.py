@@ -41,7 +41,8 @@ class CheckResult:
         scenarios: Ids of the scenarios that it judges; empty for the submission itself.
         findings: One per scenario in the assignment's order, at least one in all.
         credit: Share of the points in [0, 1].
-        put_right: It failed by a wrong name that the runs put right, so nothing waits for it.
+        put_right: It failed alone, such as by a wrong name that the runs put right, so nothing
+            waits for it.
     """
 
     id: str

@@ -134,7 +134,7 @@ def queues(recording: Recording, kind: Kind, topic: str) -> tuple[DeclaredQueue,
     where it kept others.
     """
     declared = _on(recording, kind, topic)
-    kept = [item for item in declared if not _was_destroyed(recording, item)]
+    kept = [item for item in declared if _destroyed(recording, item) is None]
     found = []
     for item in kept or declared:
         depth = _number(item.data, "depth")
@@ -147,16 +147,37 @@ def _on(recording: Recording, kind: Kind, topic: str) -> list[Declaration]:
     return [item for item in recording.declared(kind.value) if _text(item.data, "topic") == topic]
 
 
-def _was_destroyed(recording: Recording, made: Declaration) -> bool:
-    """Whether a process declared an endpoint destroyed while it was observed."""
+def dropped_ns(recording: Recording, kind: Kind, topic: str) -> int | None:
+    """When a process had lost the last of its endpoints on a topic as soon as they were made.
+
+    A constructor or a callback destroys what only its own variables hold when it returns. What was
+    made before the executor spun, and is destroyed afterwards, was kept and ended on purpose.
+    """
+    ends = []
+    for made in _on(recording, kind, topic):
+        end = _destroyed(recording, made)
+        spun = [one.time_ns for one in recording.declared("spin") if _same_process(one, made)]
+        # One that wait_for_message() makes and destroys.
+        if end is None or made.data.get("brief") or end.data.get("brief"):
+            return None
+        if any(made.time_ns < one < end.time_ns for one in spun[:1]):
+            return None
+        ends.append(end.time_ns)
+    return max(ends, default=None)
+
+
+def _destroyed(recording: Recording, made: Declaration) -> Declaration | None:
+    """What a process declared when it destroyed an endpoint, while it was observed."""
     number = made.data.get("number")
-    return number is not None and any(
-        item.process == made.process
-        and item.data.get("pid") == made.data.get("pid")
-        and item.data.get("number") == number
-        and item.time_ns < recording.stop_ns
-        for item in recording.declared("destroyed")
-    )
+    for item in recording.declared("destroyed") if number is not None else ():
+        is_it = _same_process(item, made) and item.data.get("number") == number
+        if is_it and item.time_ns < recording.stop_ns:
+            return item
+    return None
+
+
+def _same_process(one: Declaration, other: Declaration) -> bool:
+    return one.process == other.process and one.data.get("pid") == other.data.get("pid")
 
 
 def profiles(recording: Recording, kind: Kind, topic: str) -> tuple[tuple[str, Qos], ...]:
@@ -190,7 +211,7 @@ def left_open(recording: Recording, kind: Kind, topic: str, node: str) -> frozen
 
 
 def not_in_callback(recording: Recording, topic: str) -> bool:
-    """Whether no executor had called what published the newest message that was declared.
+    """Whether no executor had called what published the newest message, as older tracers declare.
 
     A last message that stops a robot may well be published by main() after Ctrl+C.
     """

@@ -5,11 +5,16 @@ from dataclasses import replace
 import pytest
 
 from grader.findings.finding import Status
+from grader.recording.event import Intervention
 from grader.recording.model import Ending, Kind, Owner
 from tests.checks.builder import (
+    BOT,
     NODE,
     TWIST,
+    at,
+    call,
     declarations,
+    declared,
     died,
     endpoint,
     failing,
@@ -38,6 +43,22 @@ def with_endpoints(*endpoints, **changes):
             **changes,
         }
     )
+
+
+def ended_at(
+    time_s, *more, kind=Kind.PUBLISHER, spun_s=0.6, number=7, brief="", processes=None, **changes
+):
+    """A run in which an endpoint on /cmd_vel was destroyed at a time; it was made at 0.3 s."""
+    about = {"node": NODE, "topic": "/cmd_vel", "depth": 10, "number": number}
+    told = (
+        declared("node", 0.25, node=NODE),
+        declared(kind.value, 0.3, **about, brief=brief == "made"),
+        declared("destroyed", time_s, number=number, brief=brief == "destroyed"),
+        declared("spin", spun_s, executor="SingleThreadedExecutor"),
+    )
+    gone = endpoint(kind=kind, vanished_ns=at(time_s))
+    more = {"declarations": (*told, *more), "processes": processes or (process(),), **changes}
+    return with_endpoints(gone, **more)
 
 
 class TestRemap:
@@ -88,6 +109,40 @@ class TestPublished:
         simulator = endpoint(node="/simulator", owner=Owner.PROBE)
         run = recording(endpoints=(simulator, reader()), declarations=())
         assert "created no publisher" in failing("topic.published", run, topic="/cmd_vel")
+
+    def test_one_that_ends_with_the_constructor_fails_this_check_alone(self):
+        finding = judge("topic.published", ended_at(0.4), topic="/cmd_vel")
+        assert finding.status is Status.FAILED and finding.stands_alone
+        assert "destroyed 0.40 s after launch, while the process still ran" in finding.observed
+
+    @pytest.mark.parametrize("spun_s", [0.2, 0.6])
+    def test_one_that_is_destroyed_where_it_was_made_is_found_before_and_after_spinning(
+        self, spun_s
+    ):
+        assert "only for a moment" in failing(
+            "topic.published", ended_at(0.4, spun_s=spun_s), topic="/cmd_vel"
+        )
+
+    @pytest.mark.parametrize(
+        "run",
+        [
+            # A callback destroys what the constructor kept.
+            lambda: ended_at(2.0),
+            # It destroys what it has, and ends.
+            lambda: ended_at(4.2, spun_s=4.4),
+            lambda: ended_at(0.4, processes=(died(0, 0.8),), ending=Ending.EXITED),
+            # Another is kept.
+            lambda: ended_at(0.4, declared("publisher", 0.5, topic="/cmd_vel", number=8)),
+            # A lifecycle node was asked to clean up.
+            lambda: ended_at(2.0, spun_s=0.1, calls=(call(1.0, of="/change"),)),
+            # The scenario ended it.
+            lambda: ended_at(0.4, interventions=(Intervention(at(0.3), BOT, "kill", "SIGKILL"),)),
+            # The tracer does not tell which one.
+            lambda: ended_at(0.4, number=None),
+        ],
+    )
+    def test_one_that_ends_on_purpose_was_there(self, run):
+        assert judge("topic.published", run(), topic="/cmd_vel").status is Status.PASSED
 
     def test_relative_names_are_refused_in_the_assignment(self):
         with pytest.raises(ValueError, match="'cmd_vel' is relative"):
@@ -184,6 +239,17 @@ class TestSubscribed:
     )
     def test_what_is_there_instead_is_reported(self, there, words):
         assert words in failing("topic.subscribed", with_endpoints(there), topic="/scan")
+
+    def test_one_that_ends_with_the_constructor_was_never_seen(self):
+        run = ended_at(0.4, kind=Kind.SUBSCRIPTION)
+        run = replace(run, endpoints=OWN)
+        found = failing("topic.subscribed", run, topic="/cmd_vel")
+        assert "the subscription to `/cmd_vel` was destroyed 0.40 s after launch" in found
+
+    @pytest.mark.parametrize("brief", ["made", "destroyed"])
+    def test_one_of_wait_for_message_is_brief_by_nature(self, brief):
+        run = ended_at(0.4, kind=Kind.SUBSCRIPTION, brief=brief)
+        assert judge("topic.subscribed", run, topic="/cmd_vel").status is Status.PASSED
 
     def test_messages_of_others_on_the_topic_prove_no_subscription(self):
         run = recording(endpoints=(reader(),))

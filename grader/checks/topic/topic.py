@@ -10,6 +10,7 @@ from pydantic import Field
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Recorded
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.destroyed_endpoint import why_dropped
 from grader.diagnosis.no_endpoint import misnamed, why_no_endpoint
 from grader.diagnosis.no_node import why_no_node
 from grader.findings.finding import Evidence, Finding, Status
@@ -44,7 +45,8 @@ class Published(Topic):
 def published(recording: Recording, parameters: Published) -> Finding:
     """The node publishes on the topic.
 
-    Judged by the ROS graph: the student's node had a publisher. Other checks judge its messages.
+    Judged by the ROS graph: the student's node had a publisher. One that ends with the constructor
+    that created it fails this check alone. Other checks judge its messages.
     """
     return _presence(recording, Kind.PUBLISHER, parameters)
 
@@ -59,7 +61,7 @@ class Subscribed(Topic):
 def subscribed(recording: Recording, parameters: Subscribed) -> Finding:
     """The node subscribes to the topic.
 
-    Judged by the ROS graph: the student's node had a subscription.
+    Judged by the ROS graph: the student's node had a subscription, and not only in its constructor.
     """
     return _presence(recording, Kind.SUBSCRIPTION, parameters)
 
@@ -72,6 +74,9 @@ def _presence(recording: Recording, kind: Kind, parameters: Topic) -> Finding:
     if not endpoints:
         seen = "messages came from one, but too briefly for the ROS graph"
         return Finding.passed(parameters.asked_for, seen)
+    dropped = why_dropped(recording, kind, parameters.topic)
+    if dropped is not None:
+        return replace(dropped.finding(parameters.asked_for), stands_alone=True)
     first = min(endpoints, key=lambda item: item.appeared_ns)
     nodes, when_s = {item.node for item in endpoints}, recording.since_launch_s(first.appeared_ns)
     return Finding.passed(
