@@ -296,6 +296,10 @@ class Grading:
                 type_support=support.prefixes(),
                 alone=alone,
                 remaps=sorted(remaps[name]),
+                pauses=any(
+                    bound.parameters.pauses and scenario in loaded.scenarios_of(bound)
+                    for bound in loaded.checks
+                ),
             )
             return read_recording(file)
         except UsageError as error:

@@ -47,6 +47,8 @@ class Parameters(Model):
     needs: ClassVar[tuple[Need, ...]] = ()
     doubt: ClassVar[Doubt | None] = None
     """After such disturbances a failure must happen twice to count."""
+    pauses: ClassVar[bool] = False
+    """Whether the executors pause at the end of each run that it judges."""
     only: ClassVar[str] = ""
     """The one language that it can read, or nothing if it is the same for all."""
     about: ClassVar[tuple[str, ...]] = ("publisher", "subscription", "node")

@@ -11,7 +11,7 @@ from grader.recording.model import NS, Recording
 Event = tuple[str, bool, int]
 """A callback, whether it is its start, and when."""
 
-# Clocks of one machine may step by so much; what overlaps overlaps for much longer.
+# Clocks of one machine may step by so much: what overlaps does so wherever each run is moved by it.
 _SLACK_NS = 1_000_000
 _MOST_SPANS = 400
 
@@ -95,8 +95,10 @@ def overlaps(runs: Iterable[Run], least_s: float = 0.0) -> Iterator[Overlap]:
     for run in sorted(runs, key=lambda item: item.begin_ns):
         active = [item for item in active if (item.end_ns or 0) > run.begin_ns]
         for item in active:
-            both_ns = min(item.end_ns or 0, run.end_ns or 0) - run.begin_ns
-            if both_ns > _SLACK_NS and both_ns >= least_s * NS:
+            ends_ns = item.end_ns or 0, run.end_ns or 0
+            both_ns = min(ends_ns) - run.begin_ns
+            certain_ns = min(ends_ns[0] - run.begin_ns, ends_ns[1] - item.begin_ns)
+            if certain_ns > _SLACK_NS and both_ns >= least_s * NS:
                 yield Overlap(item, run, both_ns / NS)
         active.append(run)
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,23 @@ class Wait:
     limit_s: float
     began_ns: int
     met_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class Pause:
+    """The moment after the observation in which executors find nothing ready.
+
+    What is published meanwhile, no executor has called.
+
+    Attributes:
+        began_ns: When the processes were told; their executors follow when they wait again.
+        ended_ns: When they were stopped.
+        received: Topic -> when messages on it were received meanwhile.
+    """
+
+    began_ns: int
+    ended_ns: int
+    received: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from functools import cached_property
 from operator import attrgetter
 from typing import Any
 
-from grader.recording.event import Breach, Disturbance, Intervention, Wait
+from grader.recording.event import Breach, Disturbance, Intervention, Pause, Wait
 from grader.recording.interaction import Asked, Goal, Service
 from grader.recording.simulated import Incident, Scene, Truth
 from grader.submission.record import SubmissionRecord
@@ -283,7 +283,7 @@ class Recording:
         ending: Why the observation ended.
         launched_ns: When the student's first process was started.
         matched_ns: When the first endpoint of the student on a recorded topic was matched.
-        stop_ns: When the observation ended and SIGINT was sent.
+        stop_ns: When the observation ended and SIGINT was sent, if no pause came between.
         end_ns: When everything had ended.
         submission: Facts about the submission from before the run.
         messages: By topic, in the order of their source timestamps.
@@ -304,6 +304,7 @@ class Recording:
         goals: Goals that the probe sent.
         waits: Waits of the probe with their limits.
         joins: Late joiners.
+        pauses: The pause of the executors after the observation, if there was one.
         interventions: What the probe did to the student's processes.
         breaches: Limits of the sandbox that were reached.
         disturbance: Delays of the machine, sample by sample.
@@ -343,6 +344,7 @@ class Recording:
     goals: tuple[Goal, ...] = ()
     waits: tuple[Wait, ...] = ()
     joins: tuple[Join, ...] = ()
+    pauses: tuple[Pause, ...] = ()
     interventions: tuple[Intervention, ...] = ()
     breaches: tuple[Breach, ...] = ()
     disturbance: tuple[Disturbance, ...] = ()

@@ -92,6 +92,7 @@ class CellOrder:
         simulator: The simulated robot, or None.
         compiled_tracer: The library that compiled programs are started with, or None.
         process_sandbox: The sandbox of each process of the student, or None.
+        pauses: Whether the executors pause before the processes are stopped.
     """
 
     scenario: str
@@ -112,6 +113,7 @@ class CellOrder:
     compiled_tracer: str | None = None
     process_sandbox: ProcessSandbox | None = None
     tells_output: bool = False
+    pauses: bool = False
 
     def to_bytes(self) -> bytes:
         """For the cell's folder; written before anything of a student's runs in the cell."""

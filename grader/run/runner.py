@@ -274,6 +274,7 @@ class Runner:
         type_support: tuple[Path, ...] = (),
         alone: bool = False,
         remaps: Sequence[str] = (),
+        pauses: bool = False,
     ) -> None:
         """Run one scenario and write its recording.
 
@@ -281,6 +282,7 @@ class Runner:
             install: The submission's install space (merged layout).
             worlds: Folder that world files are relative to.
             remaps: As of :func:`process_command`.
+            pauses: Whether the executors pause after the observation.
 
         Raises:
             GraderFault: The cell failed, through no fault of the student's.
@@ -301,6 +303,7 @@ class Runner:
                     worlds,
                     remaps,
                 )
+                order = replace(order, pauses=pauses)
                 recording.parent.mkdir(parents=True, exist_ok=True)
                 launched_ns = time.time_ns()
                 try:

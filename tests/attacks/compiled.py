@@ -62,6 +62,38 @@ std::thread(
     }
   }).detach();
 """
+# A timer that does nothing, beside a thread that publishes past the tracer.
+_BESIDE = """\
+create_wall_timer(100, [] {}, "BotPublisher::tick()");
+std::thread(
+  [this] {
+    while (!interrupted) {
+      tick();
+      usleep(100000);
+    }
+  }).detach();
+"""
+_PUBLISH = "rcl_publish(publisher, &message, nullptr)"
+_HIDDEN_PUBLISH = """\
+#include <dlfcn.h>
+#include <rcl/publisher.h>
+
+inline decltype(&rcl_publish) hidden_publish()
+{
+  return reinterpret_cast<decltype(&rcl_publish)>(
+    dlsym(dlopen("librcl.so", RTLD_NOW | RTLD_NOLOAD), "rcl_publish"));
+}
+"""
+_OWN_PUBLISH = (
+    _HIDDEN_PUBLISH
+    + """
+extern "C" __attribute__((visibility("default"))) rcl_ret_t rcl_publish(
+  const rcl_publisher_t * publisher, const void * message, rmw_publisher_allocation_t * allocation)
+{
+  return hidden_publish()(publisher, message, allocation);
+}
+"""
+)
 # The library of the tracer comes first, and may stand alone.
 _ANEW = """\
 if (getenv("ANEW") == nullptr) {
@@ -142,6 +174,16 @@ def unbuilt(*named: str, **more: Any) -> Attack:
     return compiled(lost=frozenset({"builds"}), named=named, **more)
 
 
+def beside(before: str, publish: str = _PUBLISH) -> Attack:
+    """One that publishes in a thread beside a timer, in a way that the tracer does not see."""
+    source = compiled_node().replace(_TIMER, _BESIDE).replace(_PUBLISH, publish)
+    return compiled(
+        files={"src/bot_pub.cpp": source, "src/before.hpp": before},
+        lost=frozenset({"timer"}),
+        named=("outside of every callback",),
+    )
+
+
 def unseen(**more: Any) -> Attack:
     """One that hides its publisher from the tracer."""
     named = ("the process did not declare the publisher",)
@@ -179,6 +221,10 @@ COMPILED = {
         lost=frozenset({"timer"}),
         named=("outside of every callback",),
     ),
+    "cpp_publishes_past_the_tracer": beside(
+        _HIDDEN_PUBLISH, _PUBLISH.replace("rcl_publish", "hidden_publish()")
+    ),
+    "cpp_exports_a_publish_of_its_own": beside(_OWN_PUBLISH),
     "cpp_closes_all_descriptors": unseen(at_import="close_range(3, ~0U, 0);"),
     "cpp_starts_anew_without_the_tracer": unseen(at_import=_ANEW),
     "cpp_is_started_by_a_script": unseen(at_build=_INSTALL_SCRIPT, files={"start.sh": _SCRIPT}),

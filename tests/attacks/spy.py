@@ -191,7 +191,8 @@ def push_into_terminal():
 
 def inherit_descriptors():
     allowed = {0, 1, 2, int(os.environ.get('ROSGRADE_TRACER_FD', 0)),
-               int(os.environ.get('ROSGRADE_SEEN_FD', 0))}
+               int(os.environ.get('ROSGRADE_SEEN_FD', 0)),
+               int(os.environ.get('ROSGRADE_PAUSE_FD', 0))}
     found = [name for fd, name in INHERITED.items()
              if fd not in allowed and not name.startswith('/proc')
              and not name.endswith(('setup.py', 'spy.py', 'CMakeConfigureLog.yaml'))]

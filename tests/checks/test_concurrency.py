@@ -69,6 +69,19 @@ def test_a_callback_goes_by_its_function_or_its_period(name):
     assert {span.name for span in finding.evidence.spans} == {"heard", name}
 
 
+def test_a_short_run_within_a_long_one_overlaps_it():
+    runs = (ran(1.0, 3.0), ran(1.5, 1.50012, HEARD), ran(2.5, 2.50012, HEARD))
+    long = run(ran(1.0, 3.0), *runs[1:], ran(3.1, 5.1), ran(3.6, 3.60012, HEARD))
+    assert judge("executor.overlap", long, **BOTH).status is Status.PASSED
+    failing("executor.overlap", run(*runs), **BOTH, never=True)
+
+
+@pytest.mark.parametrize("begin_s", [0.9999, 2.9999])
+def test_a_clock_that_steps_makes_no_overlap_at_an_edge(begin_s):
+    runs = run(ran(1.0, 3.0), ran(begin_s, begin_s + 0.0002, HEARD))
+    assert judge("executor.overlap", runs, **BOTH, never=True, at_least=1).status is Status.PASSED
+
+
 def test_callbacks_that_never_may_overlap_and_do():
     found = failing("executor.overlap", run(*at_once()), **BOTH, never=True)
     assert "4 runs: `/chatter` overlaps 2 times" in found

@@ -1,10 +1,14 @@
 """executor.timer: only the process can tell whether a timer or a sleeping loop publishes."""
 
+from dataclasses import replace
+
 import pytest
 
 from grader.findings.finding import Status
+from grader.recording.event import Pause
 from tests.checks.builder import (
     NODE,
+    at,
     declarations,
     declared,
     failing,
@@ -12,6 +16,7 @@ from tests.checks.builder import (
     package,
     recording,
     submission,
+    taken,
 )
 
 ASKED = {"topic": "/cmd_vel"}
@@ -81,4 +86,52 @@ def test_a_timer_beside_the_thread_that_publishes_earns_nothing():
     assert judge("executor.timer", stopped, **ASKED).status is Status.PASSED
     events = declared("spin", 0.5, executor="EventsExecutor", threads=1)
     run = loop(timer(0.3), *traced, events)
+    assert judge("executor.timer", run, **ASKED).status is Status.PASSED
+
+
+def after_the_run(times_s=(), *more, paused_s=4.6, **changes):
+    """A run of a timer, then a pause until 5.6 s in which messages are received."""
+    told = tuple(replace(one, data={**one.data, "pid": 1}) for one in declarations())
+    paused = (declared("paused", paused_s, pid=1),) if paused_s else ()
+    pause = Pause(at(4.5), at(5.6), {"/cmd_vel": tuple(map(at, times_s))})
+    run = recording(declarations=(*told, *paused, *more), pauses=(pause,))
+    return replace(run, **changes)
+
+
+def test_what_comes_while_executors_pause_is_published_by_something_else():
+    found = failing("executor.timer", after_the_run([5.1, 5.4]), **ASKED)
+    assert "2 messages were published outside of every callback" in found
+    silent = judge("executor.timer", after_the_run(), **ASKED)
+    assert silent.status is Status.PASSED
+    assert silent.observed.endswith("and nothing was published while its executor paused")
+
+
+def test_a_callback_that_had_begun_may_still_publish():
+    assert judge("executor.timer", after_the_run([4.7, 4.95]), **ASKED).status is Status.PASSED
+
+
+def test_what_a_process_declares_helps_nothing_that_publishes_in_the_pause():
+    forged = declared("published", 1.0, topic="/cmd_vel", number=1, in_callback=True, pid=1)
+    early = declared("paused", 1.0, pid=1)
+    assert "outside of every" in failing("executor.timer", after_the_run([5.3], forged), **ASKED)
+    run = after_the_run([5.3], early, paused_s=None)
+    assert "waited for work when it was asked to" in failing("executor.timer", run, **ASKED)
+
+
+def test_the_machine_may_hold_a_message_up():
+    slow = taken(4.5, 5.5, waited_s=0.6)
+    finding = judge("executor.timer", after_the_run([5.1], disturbance=slow), **ASKED)
+    assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+
+
+def test_an_executor_of_an_unknown_kind_is_no_fault_of_the_program():
+    run = after_the_run(paused_s=None)
+    run = replace(run, declarations=tuple(one for one in run.declarations if one.kind != "spin"))
+    assert judge("executor.timer", run, **ASKED).status is Status.ERROR
+
+
+def test_only_the_newest_of_a_process_that_was_started_again_must_pause():
+    before = declared("publisher", 0.1, topic="/cmd_vel", depth=10, pid=7)
+    run = after_the_run()
+    run = replace(run, declarations=(before, declared("spin", 0.2, pid=7), *run.declarations))
     assert judge("executor.timer", run, **ASKED).status is Status.PASSED

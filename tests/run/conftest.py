@@ -78,6 +78,7 @@ def run_node(runner: Runner, tmp_path: Path) -> RunNode:
         source: str,
         progress: Callable[[str, Mapping[str, Any]], None] | None = None,
         worlds: Path = Path(),
+        pauses: bool = False,
         **scenario: Any,
     ) -> Recording:
         folder = tmp_path / str(next(numbers))
@@ -92,6 +93,7 @@ def run_node(runner: Runner, tmp_path: Path) -> RunNode:
             file,
             seed=1,
             worlds=worlds,
+            pauses=pauses,
         )
         return read_recording(file)
 

@@ -156,6 +156,39 @@ def test_when_callbacks_run_and_in_which_groups(run_node: RunNode, parallel: boo
     assert len(recording.declared("ran")) < 100
 
 
+def test_a_short_callback_is_seen_beside_a_long_one_in_every_run(run_node: RunNode) -> None:
+    """The textbook's talker and slow timer, each in a group of its own."""
+    source = (
+        "from rclpy.callback_groups import MutuallyExclusiveCallbackGroup\n"
+        "from rclpy.executors import MultiThreadedExecutor\n" + nodes.HEADER
+    )
+    source += """
+class Talker(Node):
+    def __init__(self):
+        super().__init__("talker")
+        self.publisher = self.create_publisher(Twist, "/cmd_vel", 10)
+        for period_s, callback in ((0.1, self.talk), (1.0, self.think)):
+            self.create_timer(period_s, callback, MutuallyExclusiveCallbackGroup())
+
+    def talk(self):
+        self.publisher.publish(twist())
+
+    def think(self):
+        time.sleep(0.9)
+
+rclpy.init()
+executor = MultiThreadedExecutor(2)
+executor.add_node(Talker())
+executor.spin()
+"""
+    recording = run_node(source, until={"messages": 29})
+    both = {"callbacks": ["talk", "think"], "at_least": 2}
+    assert judge("executor.overlap", recording, **both).status is Status.PASSED
+    assert judge("executor.overlap", recording, **both, never=True).status is Status.FAILED
+    runs = [one.data["callback"] for one in recording.declared("ran")]
+    assert runs.count("Talker.talk") > 15
+
+
 def test_which_nodes_an_executor_was_given(run_node: RunNode) -> None:
     """Some before it spins, and one while it does."""
     executor = (

@@ -69,7 +69,6 @@ SEEN_BY_RCL = {
     "subscription": ("node", "topic", "type", *_QOS),
     "timer": ("period_s",),
     "held": ("topic", "matched"),
-    "published": ("topic", "number", "in_callback"),
     "spin": (),
     "destroyed": (),
     "leaving": (),

@@ -27,6 +27,7 @@ from grader.findings.first_seen import first_seen, nodes_seen
 from grader.findings.wording import code, codes, counted
 from grader.measure import declarations
 from grader.measure.declarations import was_held_up
+from grader.measure.paused import paused
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.model import NS, Call, Kind, Recording
 from grader.spec.name import TopicName
@@ -287,6 +288,7 @@ class Timer(Parameters):
 
     about = ("timer", "publisher")
     doubt = Doubt.ANSWER_MISSED
+    pauses = True
 
     asks = "a timer whose callback publishes on `{self.topic}`"
 
@@ -297,10 +299,10 @@ class Timer(Parameters):
 def timer(recording: Recording, parameters: Timer) -> Finding | Cause:
     """The process has a timer.
 
-    Messages of a thread that sleeps look like those of a timer. So this is judged by what the
-    process declared: it fails if the process created a publisher on the topic but no timer. Any
-    timer with a callback is right, whatever its period. If the process did not declare its
-    publisher, the check ends as an error and costs no points.
+    Messages of a thread that sleeps look like those of a timer. So the executors are told for a
+    moment after the run that nothing is ready: what is published meanwhile, no callback publishes,
+    whatever the process declares. The process must also have declared its publisher and a timer
+    with a callback, of any period.
     """
     messages = recording.on(parameters.topic)
     if not messages:
@@ -311,14 +313,17 @@ def timer(recording: Recording, parameters: Timer) -> Finding | Cause:
     timers = declarations.timers(recording)
     calling = [item for item in timers if item.callback != _NOTHING]
     number = f"{counted(len(messages), 'message was', 'messages were')} published"
+    if calling and recording.pauses:
+        stop_if(_why_uncalled(recording, parameters.topic))
     if declarations.not_in_callback(recording, parameters.topic):
         observed = f"{number}, outside of every callback: a thread or a loop calls publish()"
     elif calling:
         name = f", which calls {code(calling[0].callback)}" if calling[0].callback else ""
         created_s = recording.since_launch_s(calling[0].declared_ns)
+        seen = ", and nothing was published while its executor paused" * bool(recording.pauses)
         return Finding.passed(
             parameters.asked_for,
-            f"the process declared a timer of {format_duration(calling[0].period_s)}{name}",
+            f"the process declared a timer of {format_duration(calling[0].period_s)}{name}{seen}",
             Evidence(moments=(Moment("timer created", created_s),)),
         )
     elif declarations.timer_of_zero(recording):
@@ -331,3 +336,28 @@ def timer(recording: Recording, parameters: Timer) -> Finding | Cause:
         )
     evidence = Evidence(moments=first_seen(recording, messages))
     return Cause(observed, _HINT, evidence)
+
+
+def _why_uncalled(recording: Recording, topic: str) -> Cause | None:
+    """Why it is no timer that publishes, from what came while no executor called anything."""
+    found = paused(recording, topic)
+    if found is None:
+        waited = "after the run no executor of the process waited for work when it was asked to"
+        if not declarations.declares(recording, "spin"):
+            return Cause(f"{waited}: rosgrade does not know its kind", ours=True)
+        return Cause(
+            waited,
+            "Every callback must return, and rclpy.spin() must wait for the next one. Leave the "
+            "methods of rclpy's executors and all file descriptors that you did not open alone.",
+            Evidence(moments=first_seen(recording, recording.on(topic))),
+            disturbed=was_held_up(recording),
+        )
+    if not found.uncalled_ns:
+        return None
+    number = counted(len(found.uncalled_ns), "message was", "messages were")
+    observed = f"{number} published outside of every callback, while the executors paused"
+    if found.is_doubtful(recording):
+        return Cause.to_repeat(f"{observed}, but the machine held messages up")
+    when_s = recording.since_launch_s(found.uncalled_ns[0])
+    moment = Moment("published outside of every callback", when_s)
+    return Cause(f"{observed}: a thread or a loop calls publish()", _HINT, Evidence((moment,)))

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from grader.recording.event import Wait
+from grader.recording.event import Pause, Wait
 from grader.recording.model import NS, Ending, Endpoint, Kind, Owner, Recording
 from grader.run.cell.domain import joined_domains
 from grader.run.cell.ending import EndingConditions, ExitBarrier
@@ -39,6 +39,8 @@ _GRAPH_PERIOD_S = 0.1
 # After the first match no wait depends on new endpoints, so the graph is read less often.
 _SETTLED_GRAPH_PERIOD_S = 0.25
 _PIPES_LIMIT_S = 5.0
+_PAUSED_INTERVALS = 2.5
+_LEAST_PAUSE_S, _MOST_PAUSE_S = 0.4, 3.0
 _MOST_MALFORMED = 10
 """Packets; no library sends a single one."""
 _FORGERY = "wrote into the channel through which rosgrade reports from inside a process"
@@ -123,6 +125,7 @@ class Cell:
             ending = self._observe()
             self._probe.recording = False
             stop_ns = time.time_ns()
+            pauses = self._pause() if self._order.pauses and not self._all_ended() else ()
             self._player.finish()
             if self._robot is not None:
                 self._robot.stop()
@@ -147,7 +150,8 @@ class Cell:
         found = (machine_faults.clock_was_set(), ended)
         self._faults += [fault for fault in found if fault is not None]
         others = ", ".join(map(str, self._other_domains))
-        calls = (*self._probe.calls, *self._context.calls.calls)
+        called = (*self._probe.calls, *self._context.calls.calls)
+        calls = [call for call in called if call.requested_ns <= stop_ns]
         return Recording(
             scenario=self._order.scenario,
             seed=self._order.seed,
@@ -169,6 +173,7 @@ class Cell:
             goals=tuple(self._context.goals),
             waits=tuple(self._waits),
             joins=tuple(self._context.joins.values()),
+            pauses=pauses,
             interventions=tuple(self._context.interventions),
             breaches=breaches,
             sent=dict.fromkeys(self._player.topics, ()),
@@ -218,6 +223,25 @@ class Cell:
         self._graph.poll()
         self._find_foreign()
         return Ending.FAULT if self._faults else ending
+
+    def _pause(self) -> tuple[Pause, ...]:
+        """Let executors find nothing ready, for longer than two messages are apart."""
+        length_s = min(_PAUSED_INTERVALS * self._probe.interval_s(), _MOST_PAUSE_S)
+        length_s = max(length_s, _LEAST_PAUSE_S)
+        began_ns = time.time_ns()
+        self._students.pause()
+        for watch in self._ticks():
+            paused = (one for one in self._output.declarations if one.kind == "paused")
+            told_ns = [one.time_ns for one in paused if one.time_ns >= began_ns]
+            since_s = (time.time_ns() - max(told_ns)) / NS if told_ns else 0.0
+            if not told_ns:
+                # Wakes executors that wait for nothing else.
+                for node in self._graph.nodes:
+                    self._probe.call_executor(node.name, "list_parameters")
+            if since_s > length_s or watch.elapsed_s > _MOST_PAUSE_S + length_s:
+                break
+        received = {name: tuple(found) for name, found in self._probe.afterwards.items()}
+        return (Pause(began_ns, time.time_ns(), received),)
 
     def _launch(self, since_launch_s: float = 0.0) -> Ending | None:
         """Start what is due; those of one time in the order of the scenario."""

@@ -106,6 +106,8 @@ class Probe:
     Attributes:
         counts_servers: Whether a call is answered only when every server of its service has;
             what is left of a killed process stays in the graph, but answers nothing.
+        recording: Whether what is received is still recorded.
+        afterwards: Topic -> when messages were received since then.
     """
 
     def __init__(self, domain_id: int) -> None:
@@ -135,6 +137,7 @@ class Probe:
         self._kept: dict[tuple[str, str], int] = {}
         self.last_message_ns: int | None = None
         self.recording = True
+        self.afterwards: dict[str, list[int]] = {}
         self.counts_servers = True
         self._has_met = False
 
@@ -175,6 +178,15 @@ class Probe:
     def student_topics(self) -> tuple[str, ...]:
         """Topics that are recorded and that only the student publishes on."""
         return tuple(name for name, topic in self._topics.items() if not topic.ours)
+
+    def interval_s(self) -> float:
+        """How far apart the student's messages are on average, where they are rarest."""
+        times: dict[str, list[int]] = {name: [] for name in self.student_topics}
+        for item in self.messages:
+            if item.topic in times:
+                times[item.topic].append(item.received_ns)
+        found = ((all_[-1] - all_[0]) / NS / (len(all_) - 1) for all_ in times.values() if all_[1:])
+        return max(found, default=0.0)
 
     def join(self, name: str, topic: str, type: str, profile: QoSProfile) -> Any:
         """Subscribe to a topic from now on, and record it under a name of its own."""
@@ -323,7 +335,11 @@ class Probe:
         self._has_met = True
 
     def _receive(self, topic: Topic, data: bytes, info: Any) -> None:
-        if not self.recording or self._limits is None:
+        if self._limits is None:
+            return
+        if not self.recording:
+            received = self.afterwards.setdefault(topic.name, [])
+            received += [info["received_timestamp"]] * (len(received) < self._limits.messages)
             return
         stamp_ns, sequence = info["source_timestamp"], info["publication_sequence_number"]
         key = (topic.name, stamp_ns, sequence)

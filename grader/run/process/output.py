@@ -27,7 +27,7 @@ _KINDS = frozenset(
     {
         *_OF_ENDPOINTS,
         *("started", "imported", "init", "node", "timer", "added", "spin", "published", "held"),
-        *("made", "ran", "stands", "destroyed", "leaving", "exiting"),
+        *("made", "ran", "stands", "destroyed", "paused", "leaving", "exiting"),
     }
 )
 """Kinds of declarations of a tracer; see ``tracer/sitecustomize.py``."""

@@ -59,6 +59,7 @@ class _Running:
     popen: PlainProcess | SandboxedProcess
     started_ns: int
     seen_fd: int | None
+    pause_fd: int | None
     exited_ns: int | None = None
     killed_ns: int | None = None
     stopped_by: str = "itself"
@@ -124,6 +125,8 @@ class StudentProcesses:
         """Start a process in a session of its own; variables ``of_run`` are added."""
         tracer_read, tracer_write = os.pipe()
         seen_read, seen_write = os.pipe()
+        pause_read, pause_write = os.pipe()
+        given = (tracer_write, seen_read, pause_read)
         try:
             variables = {
                 **environment,
@@ -131,16 +134,17 @@ class StudentProcesses:
                 "ROSGRADE_TRACER_FD": str(tracer_write),
                 "ROSGRADE_TRACER_PIPE": str(os.fstat(tracer_write).st_ino),
                 "ROSGRADE_SEEN_FD": str(seen_read),
+                "ROSGRADE_PAUSE_FD": str(pause_read),
             }
-            popen = self._popen(argv, variables, folder, (tracer_write, seen_read))
+            popen = self._popen(argv, variables, folder, given)
         except OSError:
-            os.close(tracer_read)
-            os.close(seen_write)
+            for fd in (tracer_read, seen_write, pause_write):
+                os.close(fd)
             raise
         finally:
-            os.close(tracer_write)
-            os.close(seen_read)
-        self._running.append(_Running(name, popen, time.time_ns(), seen_write))
+            for fd in given:
+                os.close(fd)
+        self._running.append(_Running(name, popen, time.time_ns(), seen_write, pause_write))
         for pipe, stream in ((popen.stdout, "stdout"), (popen.stderr, "stderr")):
             assert pipe is not None
             self._output.add(os.dup(pipe.fileno()), name, stream)
@@ -153,7 +157,7 @@ class StudentProcesses:
         argv: tuple[str, ...],
         variables: Mapping[str, str],
         folder: Path,
-        pass_fds: tuple[int, int],
+        pass_fds: tuple[int, ...],
     ) -> PlainProcess | SandboxedProcess:
         if self._sandbox is not None:
             start = partial(SandboxedProcess, self._sandbox, argv, variables, pass_fds)
@@ -210,6 +214,20 @@ class StudentProcesses:
                 os.close(process.seen_fd)
                 process.seen_fd = None
 
+    def pause(self) -> None:
+        """Let executors find nothing ready until :meth:`resume`."""
+        for process in self._running:
+            if process.pause_fd is not None:
+                with contextlib.suppress(BrokenPipeError):
+                    os.write(process.pause_fd, b".")
+
+    def resume(self) -> None:
+        """End a pause; there is one in a run at most."""
+        for process in self._running:
+            if process.pause_fd is not None:
+                os.close(process.pause_fd)
+                process.pause_fd = None
+
     def is_running(self, name: str) -> bool:
         """Whether a process of this name runs."""
         self.poll()
@@ -232,6 +250,7 @@ class StudentProcesses:
 
     def stop(self, limits: RunLimits, meter: DisturbanceMeter) -> None:
         """SIGINT, SIGTERM, SIGKILL, each with a bounded wait; dates the end of each process."""
+        self.resume()
         self.let_exit()
         watch = Stopwatch(meter)
         for number, limit_s in (

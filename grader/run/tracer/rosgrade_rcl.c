@@ -54,17 +54,19 @@ enum {
   LEAST_THREADS = 4
 };
 static const int64_t MS = 1000000;
-static const int64_t HOLD_LIMIT_MS = 2000, HOLD_POLL_MS = 2, FLUSH_LIMIT_MS = 500;
+static const int64_t HOLD_LIMIT_MS = 2000, HOLD_POLL_MS = 2, PAUSE_POLL_MS = 5, FLUSH_LIMIT_MS = 500;
 static const int64_t SEEN_LIMIT_MS = 2000, SYMBOLS_LIMIT_MS = 3000;
-/* Shorter runs overlap nothing that counts: only the 1st, 2nd, 4th, 8th, ... is reported. */
+/* Of shorter runs, those that overlap none and those that do: the 1st, 2nd, 4th, 8th, ... */
 static const int64_t SHORT_NS = 1000000;
+/* And the first of those that overlap another. */
+static const unsigned long FIRST_SHORT = 20;
 
 extern char ** environ;
 
 /* Reports */
 
-static int tracer_fd = -1, seen_fd = -1;
-static struct stat tracer_pipe;
+static int tracer_fd = -1, seen_fd = -1, pause_fd = -1;
+static struct stat tracer_pipe, pause_pipe;
 static bool active;
 static const char * held_topics = "";
 static char program[4096];
@@ -130,6 +132,35 @@ static int64_t now_ns(clockid_t clock)
   return (int64_t)time.tv_sec * 1000 * MS + time.tv_nsec;
 }
 
+/* After the observation executors find nothing ready: what is published then, they did not call. */
+
+/* The cell asks for it by writing, until it closes its end. */
+static bool is_paused(void)
+{
+  struct pollfd asked = {.fd = active ? pause_fd : -1, .events = POLLIN};
+  struct stat now;
+  return poll(&asked, 1, 0) > 0 && asked.revents == POLLIN && is_pipe(pause_fd, &now) &&
+         now.st_ino == pause_pipe.st_ino && now.st_dev == pause_pipe.st_dev;
+}
+
+/* Wait as an executor to which nothing happens; whether its timeout is over first. */
+static bool pause_executor(int64_t timeout)
+{
+  static atomic_bool is_told;
+  if (!atomic_exchange(&is_told, true)) {
+    line_t line = begin("paused");
+    send_line(&line);
+  }
+  int64_t began = now_ns(CLOCK_MONOTONIC);
+  while (is_paused()) {
+    if (timeout >= 0 && now_ns(CLOCK_MONOTONIC) - began >= timeout) {
+      return true;
+    }
+    nanosleep(&(struct timespec){.tv_nsec = PAUSE_POLL_MS * MS}, NULL);
+  }
+  return false;
+}
+
 /* The functions that are called in the end */
 
 static void * real(const char * name, const char * library)
@@ -158,11 +189,12 @@ typedef struct
   char serves[256]; /* Topic or service; of a timer its period. */
   int number;
   bool is_held;
+  bool is_taken_from;
   const void * owner; /* rclcpp's object around the handle. */
   const void * callback;
   char symbol[512];
   const void * group;
-  unsigned long calls;
+  unsigned long calls[2]; /* Those that overlapped none, and those that did. */
 } entity_t;
 
 static entity_t entities[MOST_ENTITIES];
@@ -411,9 +443,12 @@ static void report_endpoint(
 static void forget(const void * handle)
 {
   int number = -1;
+  bool is_brief = false;
   pthread_mutex_lock(&lock);
   entity_t * one = find(handle);
   if (one) {
+    /* One that rclcpp::wait_for_message() made. */
+    is_brief = one->is_taken_from && !spinning;
     /* Services are not declared. */
     number = strcmp(one->kind, "service") != 0 ? one->number : -1;
     one->handle = NULL;
@@ -421,7 +456,7 @@ static void forget(const void * handle)
   pthread_mutex_unlock(&lock);
   if (number >= 0) {
     line_t line = begin("destroyed");
-    add(&line, ", \"number\": %d", number);
+    add(&line, ", \"number\": %d, \"brief\": %s", number, is_brief ? "true" : "false");
     send_line(&line);
   }
 }
@@ -582,61 +617,20 @@ PUBLIC rcl_ret_t rcl_timer_fini(rcl_timer_t * timer)
   return next(timer);
 }
 
-/* Callbacks: what an executor takes it hands to one, between two tracepoints */
+/* Callbacks: an executor calls them between two tracepoints */
 
-static _Thread_local bool has_taken;
+typedef struct
+{
+  int64_t began;
+  int beside; /* How many others ran when it began. */
+  unsigned long number;
+} run_t;
+
 static _Thread_local int depth;
-static _Thread_local int64_t began[DEEPEST];
-
-static void report_publish(const rcl_publisher_t * publisher)
-{
-  static struct {char topic[256]; unsigned long messages;} topics[32];
-  const char * topic = active ? CALL(rcl_publisher_get_topic_name)(publisher) : NULL;
-  if (!topic || !is_listened_to(topic)) {
-    return;
-  }
-  unsigned long number = 0;
-  pthread_mutex_lock(&lock);
-  for (int i = 0; i < 32 && !number; ++i) {
-    if (!topics[i].messages) {
-      snprintf(topics[i].topic, sizeof(topics[i].topic), "%s", topic);
-    }
-    number = strcmp(topics[i].topic, topic) == 0 ? ++topics[i].messages : 0;
-  }
-  pthread_mutex_unlock(&lock);
-  if (number && !(number & (number - 1))) {
-    line_t line = begin("published");
-    add_text(&line, "topic", topic);
-    bool in_callback = depth > 0 || has_taken;
-    add(&line, ", \"number\": %lu, \"in_callback\": %s", number, in_callback ? "true" : "false");
-    send_line(&line);
-  }
-}
-
-PUBLIC rcl_ret_t rcl_publish(
-  const rcl_publisher_t * publisher, const void * message, rmw_publisher_allocation_t * allocation)
-{
-  REAL(rcl_publish, "librcl.so");
-  report_publish(publisher);
-  return next(publisher, message, allocation);
-}
-
-PUBLIC rcl_ret_t rcl_publish_serialized_message(
-  const rcl_publisher_t * publisher, const rcl_serialized_message_t * message,
-  rmw_publisher_allocation_t * allocation)
-{
-  REAL(rcl_publish_serialized_message, "librcl.so");
-  report_publish(publisher);
-  return next(publisher, message, allocation);
-}
-
-PUBLIC rcl_ret_t rcl_publish_loaned_message(
-  const rcl_publisher_t * publisher, void * message, rmw_publisher_allocation_t * allocation)
-{
-  REAL(rcl_publish_loaned_message, "librcl.so");
-  report_publish(publisher);
-  return next(publisher, message, allocation);
-}
+static _Thread_local run_t runs[DEEPEST];
+static atomic_int running;
+static atomic_ulong begun_runs;
+static atomic_bool calls_by_events;
 
 PUBLIC rcl_ret_t rcl_take(
   const rcl_subscription_t * subscription, void * message, rmw_message_info_t * info,
@@ -644,15 +638,15 @@ PUBLIC rcl_ret_t rcl_take(
 {
   REAL(rcl_take, "librcl.so");
   rcl_ret_t result = next(subscription, message, info, allocation);
-  has_taken = has_taken || result == RCL_RET_OK;
+  if (result == RCL_RET_OK && active && !spinning) {
+    pthread_mutex_lock(&lock);
+    entity_t * one = find(subscription);
+    if (one) {
+      one->is_taken_from = true;
+    }
+    pthread_mutex_unlock(&lock);
+  }
   return result;
-}
-
-PUBLIC rcl_ret_t rcl_timer_call(rcl_timer_t * timer)
-{
-  REAL(rcl_timer_call, "librcl.so");
-  has_taken = true;
-  return next(timer);
 }
 
 static void report_spin(const char * executor, size_t threads)
@@ -663,16 +657,27 @@ static void report_spin(const char * executor, size_t threads)
   send_line(&line);
 }
 
+#define NONE_READY(set, kind) memset(set->kind, 0, set->size_of_##kind * sizeof(*set->kind));
+
 PUBLIC rcl_ret_t rcl_wait(rcl_wait_set_t * wait_set, int64_t timeout)
 {
   static atomic_bool is_reported;
   REAL(rcl_wait, "librcl.so");
-  has_taken = false;
   /* A program without rclcpp is its own executor. */
   if (active && !atomic_exchange(&is_reported, true) &&
     !dlopen("librclcpp.so", RTLD_LAZY | RTLD_NOLOAD))
   {
     report_spin("SingleThreadedExecutor", 1);
+  }
+  if (is_paused() && pause_executor(timeout)) {
+    /* What is not ready is removed. */
+    NONE_READY(wait_set, subscriptions)
+    NONE_READY(wait_set, guard_conditions)
+    NONE_READY(wait_set, timers)
+    NONE_READY(wait_set, clients)
+    NONE_READY(wait_set, services)
+    NONE_READY(wait_set, events)
+    return RCL_RET_TIMEOUT;
   }
   return next(wait_set, timeout);
 }
@@ -686,8 +691,10 @@ PUBLIC void ros_trace_callback_start(const void * callback, bool is_intra_proces
 {
   (void)callback;
   (void)is_intra_process;
+  int beside = running++;
+  unsigned long number = ++begun_runs;
   if (depth < DEEPEST) {
-    began[depth] = now_ns(CLOCK_REALTIME);
+    runs[depth] = (run_t){now_ns(CLOCK_REALTIME), beside, number};
   }
   ++depth;
 }
@@ -697,17 +704,20 @@ static const char * group_type(const void * group);
 PUBLIC void ros_trace_callback_end(const void * callback)
 {
   int64_t ended = now_ns(CLOCK_REALTIME);
+  --running;
   depth -= depth > 0;
-  has_taken = false;
   if (!active || depth >= DEEPEST) {
     return;
   }
+  run_t run = runs[depth];
   pthread_mutex_lock(&lock);
   entity_t * one = of_callback(callback);
-  unsigned long number = one ? ++one->calls : 0;
-  bool is_long = ended - began[depth] >= SHORT_NS;
+  bool is_long = ended - run.began >= SHORT_NS;
+  bool overlaps = run.beside > 0 || begun_runs != run.number;
+  unsigned long number = one ? ++one->calls[overlaps] : 0;
   bool is_told = one && !is_own(one->serves) && strncmp(one->symbol, "rclcpp::", 8) != 0 &&
-    (is_long || !(number & (number - 1))) && reported_runs++ < MOST_RUNS;
+    (is_long || !(number & (number - 1)) || (overlaps && number <= FIRST_SHORT)) &&
+    reported_runs++ < MOST_RUNS;
   line_t line = begin("ran");
   if (is_told) {
     add_text(&line, "callback", one->symbol);
@@ -717,9 +727,13 @@ PUBLIC void ros_trace_callback_end(const void * callback)
   pthread_mutex_unlock(&lock);
   if (is_told) {
     add(&line, ", \"thread\": %ld", (long)syscall(SYS_gettid));
-    add(&line, ", \"began_ns\": %lld", (long long)began[depth]);
+    add(&line, ", \"began_ns\": %lld", (long long)run.began);
     add(&line, ", \"ended_ns\": %lld", (long long)ended);
     send_line(&line);
+  }
+  if (calls_by_events && is_paused()) {
+    /* An executor that does not use rcl_wait(). */
+    pause_executor(-1);
   }
 }
 
@@ -876,6 +890,7 @@ static void begin_spinning(const void * executor, const char * kind)
 {
   static property_t reported[64];
   ++spinning;
+  calls_by_events = calls_by_events || strcmp(kind, "EventsExecutor") == 0;
   /* rclcpp::spin_some(node) makes an executor each time, perhaps at the same place. */
   if (!property(reported, 64, executor, 0)) {
     set_property(reported, 64, executor, 1);
@@ -1107,12 +1122,14 @@ __attribute__((constructor)) static void start(void)
   bool speaks = is_python ? number_in("ROSGRADE_TRACER_PYTHON") == 1 : !is_system;
   tracer_fd = number_in("ROSGRADE_TRACER_FD");
   seen_fd = number_in("ROSGRADE_SEEN_FD");
+  pause_fd = number_in("ROSGRADE_PAUSE_FD");
   if (!speaks || !inode || !is_pipe(tracer_fd, &tracer_pipe) ||
     tracer_pipe.st_ino != strtoul(inode, NULL, 10))
   {
     return;
   }
   active = true;
+  pause_fd = is_pipe(pause_fd, &pause_pipe) ? pause_fd : -1;
   held_topics = getenv("ROSGRADE_HOLD");
   held_topics = strdup(held_topics ? held_topics : "");
   keep_environment();

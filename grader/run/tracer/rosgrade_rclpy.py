@@ -6,13 +6,17 @@ import collections
 import gc
 import itertools
 import os
+import select
 import sys
+import weakref
 
 from rosgrade_report import (  # type: ignore[import-not-found]
     HELD_TOPICS,
     INSTALL,
     LEAST_THREADS,
     MIDDLEWARE,
+    PAUSE_FD,
+    PAUSE_PIPE,
     SEEN_FD,
     THRESHOLDS,
     of_middleware,
@@ -28,13 +32,16 @@ if TYPE_CHECKING:
 
 _HOLD_LIMIT_S = 2.0
 _HOLD_POLL_S = 0.002
+_PAUSE_POLL_S = 0.005
 _FLUSH_LIMIT_S = 0.5
 _SEEN_LIMIT_S = 2.0
 _SLICE_S = 0.5
 _OWN_TOPICS = ("/parameter_events", "/rosout")
 _MOST_RUNS = 1000
-# Shorter runs overlap nothing that counts: only the 1st, 2nd, 4th, 8th, ... of them is reported.
+# Of shorter runs, those that overlap none and those that do: the 1st, 2nd, 4th, 8th, ...
 _SHORT_NS = 1_000_000
+# And the first of those that overlap another.
+_FIRST_SHORT = 20
 
 
 def _full_name(node: Any) -> str:
@@ -133,21 +140,10 @@ def _report_messages(publisher: Any) -> None:
     def reported(*args: Any, **kwargs: Any) -> Any:
         number = _messages[topic] = _messages.get(topic, 0) + 1
         if not number & (number - 1):
-            told = {"number": number, "in_callback": _is_in_callback(), **_place()}
-            report("published", topic=topic, **told)
+            report("published", topic=topic, number=number, **_place())
         return publish(*args, **kwargs)
 
     publisher.publish = reported
-
-
-def _is_in_callback() -> bool:
-    """Whether an executor has called what runs now."""
-    frame = sys._getframe()
-    while frame is not None:
-        if frame.f_code.co_filename.endswith(("/rclpy/executors.py", "/rclpy/task.py")):
-            return True
-        frame = frame.f_back  # type: ignore[assignment]
-    return False
 
 
 _messages: dict[str, int] = {}
@@ -157,11 +153,19 @@ _count = itertools.count()
 _publishers: list[Any] = []
 _held: set[tuple[str, str]] = set()
 _added: set[str] = set()
-_began: dict[int, list[int]] = {}
-"""When the calls that still run began: id of the timer, subscription or service -> times."""
-_calls: dict[int, Any] = collections.defaultdict(lambda: itertools.count(1))
+_began: dict[int, list[tuple[int, int, int]]] = {}
+"""The calls that still run: id of the timer, subscription or service -> when each began, how many
+others ran then, and its number."""
+_running: set[int] = set()
+_runs = itertools.count(1)
+_newest_run = [0]
+_calls: dict[tuple[int, bool], Any] = collections.defaultdict(lambda: itertools.count(1))
 _reported_runs = itertools.count()
 _nodes: list[bool] = []
+_pauses: list[bool] = []
+_pause_poll = select.poll()
+if PAUSE_PIPE is not None:
+    _pause_poll.register(PAUSE_FD, select.POLLIN)
 
 
 def flush() -> None:
@@ -176,8 +180,6 @@ def flush() -> None:
         publisher = _publishers.pop()
         quietly(publisher.wait_for_all_acked, Duration(seconds=_FLUSH_LIMIT_S))
     if _nodes and pipe_at(SEEN_FD):
-        import select
-
         _nodes.clear()
         report("leaving")
         # The cell closes its end.
@@ -224,10 +226,13 @@ def _patch_node(module: Any) -> None:
         )
 
     def subscribed(node: Any, subscription: Any) -> None:
-        group, callback = _group(subscription.callback_group, node), subscription.callback
-        _endpoint(
-            "subscription", node, subscription, group=group, callback=_callback_name(callback)
-        )
+        told = {
+            "group": _group(subscription.callback_group, node),
+            "callback": _callback_name(subscription.callback),
+            # One of wait_for_message() is destroyed after the first message.
+            "brief": sys._getframe(3).f_code.co_name == "wait_for_message",
+        }
+        _endpoint("subscription", node, subscription, **told)
 
     _wrap(node_class, "__init__", after=made)
     _wrap(node_class, "create_publisher", after=published)
@@ -256,16 +261,42 @@ def _patch_context(module: Any) -> None:
     _wrap(module.Context, "try_shutdown", before=lambda _: flush())
 
 
+def _is_paused() -> bool:
+    """Whether the cell asks executors to find nothing ready: it writes, and closes its end."""
+    told = _pause_poll.poll(0)
+    return bool(told) and told[0][1] == select.POLLIN and pipe_at(PAUSE_FD) == PAUSE_PIPE
+
+
+def _pause(timeout_sec: Any) -> bool:
+    """Wait as an executor to which nothing happens; whether its timeout is over first."""
+    import time
+
+    if not _pauses:
+        _pauses.append(True)
+        report("paused")
+    limit_s = getattr(timeout_sec, "timeout", timeout_sec)
+    limit_s = None if limit_s is None or limit_s < 0 else limit_s
+    began = time.monotonic()
+    while _is_paused():
+        if limit_s is not None and time.monotonic() - began >= limit_s:
+            return True
+        time.sleep(_PAUSE_POLL_S)
+    return False
+
+
 def _patch_executors(module: Any) -> None:
     executor_class = module.Executor
-    original = executor_class.wait_for_ready_callbacks
+    wait = executor_class.wait_for_ready_callbacks
+    spun: Any = weakref.WeakSet()
 
-    def first_wait(self: Any, *args: Any, **kwargs: Any) -> Any:
-        # From the second call on the executor runs rclpy's own method again.
-        self.wait_for_ready_callbacks = original.__get__(self)
-        threads = getattr(getattr(self, "_executor", None), "_max_workers", 1)
-        report("spin", executor=type(self).__name__, threads=threads, tells_added=True)
-        return original(self, *args, **kwargs)
+    def wait_for_ready_callbacks(self: Any, *args: Any, **kwargs: Any) -> Any:
+        if self not in spun:
+            spun.add(self)
+            threads = getattr(getattr(self, "_executor", None), "_max_workers", 1)
+            report("spin", executor=type(self).__name__, threads=threads, tells_added=True)
+        if _is_paused() and _pause(args[0] if args else kwargs.get("timeout_sec")):
+            raise module.TimeoutException
+        return wait(self, *args, **kwargs)
 
     def added(self: Any, _: Any) -> None:
         # rclpy.spin_once(node) adds its node at each call.
@@ -273,7 +304,7 @@ def _patch_executors(module: Any) -> None:
             _added.add(name)
             report("added", node=name)
 
-    executor_class.wait_for_ready_callbacks = first_wait
+    executor_class.wait_for_ready_callbacks = wait_for_ready_callbacks
     _wrap(executor_class, "add_node", after=added)
     _give_threads(module.MultiThreadedExecutor)
 
@@ -304,7 +335,10 @@ def _time_callbacks(group_class: Any) -> None:
     def beginning_execution(group: Any, entity: Any) -> Any:
         may_begin = begin(group, entity)
         if may_begin:
-            _began.setdefault(id(entity), []).append(time.time_ns())
+            beside, number = len(_running), next(_runs)
+            _running.add(number)
+            _newest_run[0] = number
+            _began.setdefault(id(entity), []).append((time.time_ns(), beside, number))
         return may_begin
 
     def ending_execution(group: Any, entity: Any) -> None:
@@ -319,14 +353,18 @@ def _ran(group: Any, entity: Any, ended_ns: int) -> None:
     """Report a call of a timer, a subscription or a service, but for those of rclpy itself."""
     import threading
 
-    began_ns, number = _began[id(entity)].pop(0), next(_calls[id(entity)])
+    began_ns, beside, run = _began[id(entity)].pop(0)
+    _running.discard(run)
     serves = getattr(entity, "topic_name", None) or getattr(entity, "service_name", None)
     # What is none of them lacks one of these attributes.
     serves = serves or f"{entity.timer_period_ns / 1e9:g} s"
     if entity.callback.__module__.startswith("rclpy."):
         return
     is_long = ended_ns - began_ns >= _SHORT_NS
-    if (is_long or not number & (number - 1)) and next(_reported_runs) < _MOST_RUNS:
+    overlaps = beside > 0 or _newest_run[0] != run
+    number = next(_calls[id(entity), overlaps])
+    is_told = is_long or not number & (number - 1) or (overlaps and number <= _FIRST_SHORT)
+    if is_told and next(_reported_runs) < _MOST_RUNS:
         report(
             "ran",
             callback=_callback_name(entity.callback),
@@ -347,15 +385,19 @@ def _patch_events_executor(module: Any) -> None:
         return make(*args, **kwargs)
 
     module.EventsExecutor = made
-    if os.environ.get("_ROS_WHEELS_BOOTSTRAP_COMPLETE"):
-        _wait_in_slices(module._rclpy.EventsExecutor)
+    _wait_in_slices(module._rclpy.EventsExecutor)
 
 
 def _wait_in_slices(executor_class: Any) -> None:
-    """Repair the wheels' EventsExecutor, whose waits without a limit overflow and end at once."""
+    """Let it wait in slices: in the wheels a wait without a limit ends at once and calls nothing.
+
+    Between two of them it can pause.
+    """
     spin_once = executor_class.spin_once
 
     def once(self: Any, timeout_sec: Any = None) -> None:
+        if _is_paused() and _pause(timeout_sec):
+            return
         spin_once(self, _SLICE_S if timeout_sec is None else timeout_sec)
 
     def spin(self: Any) -> None:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 FD = int(os.environ.get("ROSGRADE_TRACER_FD", "-1"))
 SEEN_FD = int(os.environ.get("ROSGRADE_SEEN_FD", "-1"))
+PAUSE_FD = int(os.environ.get("ROSGRADE_PAUSE_FD", "-1"))
 HELD_TOPICS = frozenset(filter(None, os.environ.get("ROSGRADE_HOLD", "").split(":")))
 # As ROS installs programs: PREFIX/lib/PACKAGE/PROGRAM.
 INSTALL = os.path.dirname(os.path.dirname(os.path.dirname("".join(sys.orig_argv[1:2]))))
@@ -61,3 +62,4 @@ def of_middleware() -> dict[str, str]:
 
 MIDDLEWARE = of_middleware()
 PIPE = pipe_at(FD)
+PAUSE_PIPE = pipe_at(PAUSE_FD)

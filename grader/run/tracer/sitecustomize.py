@@ -2,11 +2,12 @@
 
 Python imports a module of this name at start, before the student's code. It wraps a few methods
 of rclpy once the student imports them, and reports each use as one JSON line on a pipe of the
-cell, which Python programs that this one starts get as well. It changes nothing else, with four
+cell, which Python programs that this one starts get as well. It changes nothing else, with five
 exceptions:
 
 - A publisher on a topic that the probe listens to is held until it is matched: a volatile
   publisher that publishes in a constructor otherwise writes before discovery has matched it.
+- After the observation executors find nothing ready: what is published then, they did not call.
 - A MultiThreadedExecutor that takes as many threads as there are CPUs gets four at least, and
   os.cpu_count() says four at least, because right code would look serial on a small machine.
 - `ros2 launch` shows the traceback of a launch file that raises.
@@ -26,6 +27,7 @@ from rosgrade_report import (  # type: ignore[import-not-found]
     FD,
     INSTALL,
     LEAST_THREADS,
+    PAUSE_FD,
     PIPE,
     SEEN_FD,
     pipe_at,
@@ -84,7 +86,7 @@ def _like(original: Any, function: Any, module: str) -> Any:
 def _keep_pipes() -> None:
     """Let os.close() and os.closerange() not see the pipes of the cell: daemons close all."""
     close, close_range = os.close, os.closerange
-    kept = sorted((FD, SEEN_FD))
+    kept = sorted((FD, SEEN_FD, PAUSE_FD))
 
     def close_other(fd: int) -> None:
         if fd in kept:
@@ -102,12 +104,17 @@ def _keep_pipes() -> None:
     os.close, os.closerange = staticmethod(close_other), staticmethod(close_others)
 
 
+def _passed() -> tuple[int, ...]:
+    """The pipes of the cell that programs which this one starts get as well."""
+    return tuple(fd for fd in (FD, PAUSE_FD) if pipe_at(fd))
+
+
 def _patch_subprocess(module: Any) -> None:
     make = module.Popen.__init__
 
     def made(self: Any, *args: Any, **kwargs: Any) -> None:
         if kwargs.get("close_fds", True) and pipe_at(FD) == PIPE:
-            kwargs["pass_fds"] = (*kwargs.get("pass_fds", ()), FD)
+            kwargs["pass_fds"] = (*kwargs.get("pass_fds", ()), *_passed())
         make(self, *args, **kwargs)
 
     module.Popen.__init__ = made
@@ -117,7 +124,7 @@ def _patch_multiprocessing(module: Any) -> None:
     start = module.spawnv_passfds
 
     def started(path: Any, args: Any, passfds: Any) -> Any:
-        return start(path, args, {*passfds, FD} if pipe_at(FD) == PIPE else passfds)
+        return start(path, args, {*passfds, *_passed()} if pipe_at(FD) == PIPE else passfds)
 
     module.spawnv_passfds = started
 
