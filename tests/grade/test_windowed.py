@@ -290,7 +290,7 @@ class TestEvents:
 
 def test_all_that_happens_outside_of_a_window_is_cut_and_facts_stay() -> None:
     stays = {"scenario", "seed", "launched_ns", "end_ns", "submission", "answers", "joined"}
-    stays |= {"joins", "unreadable", "nodes", "endpoints", "processes", "declarations"}
+    stays |= {"joins", "pauses", "unreadable", "nodes", "endpoints", "processes", "declarations"}
     stays |= {"services", "clients", "waits", "interventions", "breaches", "disturbance"}
     stays |= {"faults", "scene", "values", "environment"}
     moment = SimpleNamespace(

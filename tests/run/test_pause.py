@@ -179,4 +179,7 @@ def test_a_timer_that_publishes_is_right_in_any_style(style: str, run_node: RunN
 def test_what_publishes_beside_a_timer_shows_from_outside(trick: str, run_node: RunNode) -> None:
     finding = judged(run_node, WRONG[trick])
     assert finding.status is Status.FAILED, finding
-    assert "published outside of every callback, while the executors paused" in finding.observed
+    assert (
+        "published outside of every callback, while rosgrade let the executor call nothing"
+        in finding.observed
+    )

@@ -320,7 +320,9 @@ def timer(recording: Recording, parameters: Timer) -> Finding | Cause:
     elif calling:
         name = f", which calls {code(calling[0].callback)}" if calling[0].callback else ""
         created_s = recording.since_launch_s(calling[0].declared_ns)
-        seen = ", and nothing was published while its executor paused" * bool(recording.pauses)
+        seen = ", and nothing was published while rosgrade let the executor call nothing" * bool(
+            recording.pauses
+        )
         return Finding.passed(
             parameters.asked_for,
             f"the process declared a timer of {format_duration(calling[0].period_s)}{name}{seen}",
@@ -347,15 +349,15 @@ def _why_uncalled(recording: Recording, topic: str) -> Cause | None:
             return Cause(f"{waited}: rosgrade does not know its kind", ours=True)
         return Cause(
             waited,
-            "Every callback must return, and rclpy.spin() must wait for the next one. Leave the "
-            "methods of rclpy's executors and all file descriptors that you did not open alone.",
+            "Every callback must return, and rclpy.spin() must wait for the next one. Do not replace "
+            "the executor's methods, and close only the file descriptors that you opened.",
             Evidence(moments=first_seen(recording, recording.on(topic))),
             disturbed=was_held_up(recording),
         )
     if not found.uncalled_ns:
         return None
     number = counted(len(found.uncalled_ns), "message was", "messages were")
-    observed = f"{number} published outside of every callback, while the executors paused"
+    observed = f"{number} published outside of every callback, while rosgrade let the executor call nothing"
     if found.is_doubtful(recording):
         return Cause.to_repeat(f"{observed}, but the machine held messages up")
     when_s = recording.since_launch_s(found.uncalled_ns[0])

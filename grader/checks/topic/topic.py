@@ -70,13 +70,13 @@ def _presence(recording: Recording, kind: Kind, parameters: Topic) -> Finding:
     absent = _absence(recording, kind, parameters)
     if absent is not None:
         return absent
+    dropped = why_dropped(recording, kind, parameters.topic)
+    if dropped is not None:
+        return replace(dropped.finding(parameters.asked_for), stands_alone=True)
     endpoints = recording.student_endpoints(kind, parameters.topic)
     if not endpoints:
         seen = "messages came from one, but too briefly for the ROS graph"
         return Finding.passed(parameters.asked_for, seen)
-    dropped = why_dropped(recording, kind, parameters.topic)
-    if dropped is not None:
-        return replace(dropped.finding(parameters.asked_for), stands_alone=True)
     first = min(endpoints, key=lambda item: item.appeared_ns)
     nodes, when_s = {item.node for item in endpoints}, recording.since_launch_s(first.appeared_ns)
     return Finding.passed(

@@ -98,6 +98,9 @@ def _endpoint(kind: str, node: Any, endpoint: Any, **more: Any) -> None:
 
 def _patch_endpoint(endpoint_class: Any) -> None:
     def destroyed(endpoint: Any) -> None:
+        if not _spun:
+            # Nothing waits for its work yet, and it may be gone before it is seen.
+            flush()
         number, _kind, _topic = _endpoints.pop(id(endpoint))
         report("destroyed", number=number)
 
@@ -162,6 +165,7 @@ _newest_run = [0]
 _calls: dict[tuple[int, bool], Any] = collections.defaultdict(lambda: itertools.count(1))
 _reported_runs = itertools.count()
 _nodes: list[bool] = []
+_spun: Any = weakref.WeakSet()
 _pauses: list[bool] = []
 _pause_poll = select.poll()
 if PAUSE_PIPE is not None:
@@ -287,11 +291,10 @@ def _pause(timeout_sec: Any) -> bool:
 def _patch_executors(module: Any) -> None:
     executor_class = module.Executor
     wait = executor_class.wait_for_ready_callbacks
-    spun: Any = weakref.WeakSet()
 
     def wait_for_ready_callbacks(self: Any, *args: Any, **kwargs: Any) -> Any:
-        if self not in spun:
-            spun.add(self)
+        if self not in _spun:
+            _spun.add(self)
             threads = getattr(getattr(self, "_executor", None), "_max_workers", 1)
             report("spin", executor=type(self).__name__, threads=threads, tells_added=True)
         if _is_paused() and _pause(args[0] if args else kwargs.get("timeout_sec")):
