@@ -41,6 +41,7 @@ _MOST_HELD_NS = 3 * NS
 """Longer than the tracer holds a publisher; a process could declare any time."""
 # How the tracer names a callback that is None: create_rate() makes a timer that calls nothing.
 _NOTHING = "NoneType"
+_CALLED_NOTHING = "rosgrade let the executor call nothing"
 _HINT = (
     "A thread or a loop that sleeps adds what its work takes to every period, and goes on where "
     "the executor has stopped. Create a timer in the constructor, "
@@ -320,9 +321,8 @@ def timer(recording: Recording, parameters: Timer) -> Finding | Cause:
     elif calling:
         name = f", which calls {code(calling[0].callback)}" if calling[0].callback else ""
         created_s = recording.since_launch_s(calling[0].declared_ns)
-        seen = ", and nothing was published while rosgrade let the executor call nothing" * bool(
-            recording.pauses
-        )
+        rest = f", and nothing was published while {_CALLED_NOTHING}"
+        seen = rest if recording.pauses else ""
         return Finding.passed(
             parameters.asked_for,
             f"the process declared a timer of {format_duration(calling[0].period_s)}{name}{seen}",
@@ -349,15 +349,15 @@ def _why_uncalled(recording: Recording, topic: str) -> Cause | None:
             return Cause(f"{waited}: rosgrade does not know its kind", ours=True)
         return Cause(
             waited,
-            "Every callback must return, and rclpy.spin() must wait for the next one. Do not replace "
-            "the executor's methods, and close only the file descriptors that you opened.",
+            "Every callback must return, and rclpy.spin() must wait for the next one. Do not "
+            "replace the executor's methods, and close only the file descriptors that you opened.",
             Evidence(moments=first_seen(recording, recording.on(topic))),
             disturbed=was_held_up(recording),
         )
     if not found.uncalled_ns:
         return None
     number = counted(len(found.uncalled_ns), "message was", "messages were")
-    observed = f"{number} published outside of every callback, while rosgrade let the executor call nothing"
+    observed = f"{number} published outside of every callback, while {_CALLED_NOTHING}"
     if found.is_doubtful(recording):
         return Cause.to_repeat(f"{observed}, but the machine held messages up")
     when_s = recording.since_launch_s(found.uncalled_ns[0])

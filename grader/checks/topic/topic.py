@@ -45,8 +45,8 @@ class Published(Topic):
 def published(recording: Recording, parameters: Published) -> Finding:
     """The node publishes on the topic.
 
-    Judged by the ROS graph: the student's node had a publisher. One that ends with the constructor
-    that created it fails this check alone. Other checks judge its messages.
+    Judged by the ROS graph: the student's node had a publisher, and not only in its constructor.
+    Other checks judge its messages.
     """
     return _presence(recording, Kind.PUBLISHER, parameters)
 
@@ -72,7 +72,9 @@ def _presence(recording: Recording, kind: Kind, parameters: Topic) -> Finding:
         return absent
     dropped = why_dropped(recording, kind, parameters.topic)
     if dropped is not None:
-        return replace(dropped.finding(parameters.asked_for), stands_alone=True)
+        # What it published can be judged.
+        heard = kind is Kind.PUBLISHER and bool(recording.on(parameters.topic))
+        return replace(dropped.finding(parameters.asked_for), stands_alone=heard)
     endpoints = recording.student_endpoints(kind, parameters.topic)
     if not endpoints:
         seen = "messages came from one, but too briefly for the ROS graph"
