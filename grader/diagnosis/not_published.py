@@ -190,7 +190,7 @@ def publishing_stopped(symptom: FewMessages) -> Cause:
     if not period_s:
         return Cause(
             symptom.seen,
-            "Publish from the callback of a timer, which goes on as long as the node spins.",
+            "Publish as long as the node runs: look for a counter or a condition that ends it.",
             evidence,
         )
     is_slow = symptom.needed * min(period_s) > symptom.watched_s

@@ -8,7 +8,7 @@ from typing import ClassVar
 from pydantic import Field
 
 from grader.checks.check import Parameters
-from grader.findings.finding import Evidence, Moment
+from grader.findings.finding import Evidence, Moment, Table
 from grader.checks.need import Need, Recorded
 from grader.findings.wording import code, codes, counted, value_text
 from grader.diagnosis.cause import Cause
@@ -58,10 +58,11 @@ def why_reports_are_missing(
     missing = [name for name in callbacks if len(reports.ended([name])) < at_least]
     if not missing:
         return None
+    rows = tuple((str(message.value.get("data")),) for message in messages[:5])
     evidence = Evidence(
         moments=(Moment("first message", recording.since_launch_s(messages[0].stamp_ns)),),
         spans=spans(recording, reports),
-        log=tuple(str(message.value.get("data")) for message in messages[:5]),
+        tables=(Table(f"First messages on {topic}", ("data",), rows),),
     )
     name = missing[0]
     if reports.strange and not reports.runs:

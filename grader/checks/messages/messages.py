@@ -131,9 +131,9 @@ def count(recording: Recording, parameters: Count) -> Finding | Cause:
     if per:
         hint = "Publish once in each call of the callback: look for a second publish()."
     elif high == 1:
-        hint = "Publish once, in the constructor. Create no timer, and call publish() nowhere else."
+        hint = "Publish once, in the constructor: call publish() nowhere else, and in no loop."
     else:
-        hint = "Look for a second timer, a second publish() or a loop around it."
+        hint = "Look for a second publish() or a loop around it, and for what calls it too often."
     return Cause(observed, hint, evidence)
 
 
