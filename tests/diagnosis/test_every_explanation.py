@@ -144,6 +144,11 @@ def crashing(raised: str, **changes: Any) -> Recording:
 
 
 CRASH = {"processes": (died(1),), **EXITED, "log": output(traceback("KeyError: 'x'"))}
+BAD_PARAMETERS = (
+    "rclpy._rclpy_pybind11.RCLError: failed to initialize rcl: Couldn't parse params file: "
+    "'--params-file /install/share/bot/config/bot.yaml'. Error: Cannot have a value before "
+    "ros__parameters at line 3, at /project/src/parse.c:806, at /project/src/rcl/arguments.c:415"
+)
 COUNT = {"topic": "/cmd_vel", "at_least": 5}
 EXPECTED = {"topic": "/cmd_vel", "value": {"linear": {"x": 1.0}, "angular": {"z": 0.5}}}
 LOGS = {"topic": "/chatter", "fields": ["data"], "at_least": 4}
@@ -172,6 +177,7 @@ CASES: list[Group] = [
             "ProcessExit.machine_lacks_it": crashing(
                 "ModuleNotFoundError: No module named 'tf_transformations'"
             ),
+            "ProcessExit.parameter_file_unreadable": crashing(BAD_PARAMETERS),
             "Raised.not_imported": crashing("NameError: name 'Twist' is not defined"),
             "ProcessExit.hides_what_node_has": crashing(
                 "TypeError: 'method' object does not support the context manager protocol",
@@ -510,3 +516,14 @@ def test_every_explanation_has_a_case() -> None:
     texts = [file.read_text() for file in Path(__file__).parent.glob("test_*.py")]
     for name in catalogue - named:
         assert any(name.partition(".")[2] in text for text in texts), f"{name} has no case"
+
+
+def test_a_parameter_file_that_ros_cannot_read_is_named_with_its_line() -> None:
+    handed_in = submission(package(), files=("src/bot/config/bot.yaml", "src/bot/bot.yaml"))
+    run = crashing(BAD_PARAMETERS, submission=handed_in)
+    finding = judge("node.exists", run, **NAMED)
+    assert "cannot read the parameter file `src/bot/config/bot.yaml`" in finding.observed
+    assert "with two underscores" in finding.hint
+    assert [(place.file, place.line) for place in finding.evidence.places] == [
+        ("src/bot/config/bot.yaml", 3)
+    ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import signal
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
@@ -25,6 +25,11 @@ _LOG_LINES = 15
 # What a failure ends a compiled program by.
 _CRASHES = ("SIGSEGV", "SIGABRT", "SIGFPE", "SIGILL", "SIGBUS")
 # As `ros2 launch` says it.
+# What rcl says of a file that it is given by --params-file.
+_PARAMETER_FILE = re.compile(
+    r"Couldn't parse params file: '--params-file (?P<file>[^']+)'\. Error: "
+    r"(?P<why>.+?)(?: at line (?P<line>\d{1,6}))?, at \S+:\d+"
+)
 _NO_LAUNCH_FILE = re.compile(
     r"file '(?P<file>[^']+)' was not found in the share directory of package '(?P<package>[^']+)'"
 )
@@ -216,6 +221,30 @@ def launch_file_not_installed(symptom: ProcessExit) -> Cause | None:
         f"('share/{package}/launch', glob('launch/*')) in data_files of setup.py, or "
         "install(DIRECTORY launch DESTINATION share/${PROJECT_NAME}) in CMakeLists.txt.",
         symptom.evidence,
+    )
+
+
+@explanation(ProcessExit)
+def parameter_file_unreadable(symptom: ProcessExit) -> Cause | None:
+    """ROS cannot read a parameter file, such as one with `ros_parameters` for `ros__parameters`."""
+    lines = (_PARAMETER_FILE.search(line) for line in symptom.evidence.log)
+    found = next(filter(None, lines), None)
+    if found is None:
+        return None
+    parts, line = PurePosixPath(found["file"]).parts, int(found["line"] or 0) or None
+    own = [PurePosixPath(path) for path in symptom.recording.submission.files]
+    alike = [path for path in own if path.parts[-2:] == parts[-2:]]
+    file = str(alike[0]) if alike else parts[-1]
+    hint = "Correct the file at this line, or above it."
+    if "ros__parameters" in found["why"]:
+        hint = (
+            "Write `ros__parameters:`, with two underscores, below the node's name, and indent the "
+            "parameters below it."
+        )
+    return Cause(
+        f"{symptom.seen}: ROS cannot read the parameter file {code(file)}: {found['why']}",
+        hint,
+        replace(symptom.evidence, places=(SourceError(file, line, found["why"]),)),
     )
 
 
