@@ -178,7 +178,8 @@
     else if (target.matches(".place")) {
       const at = target.dataset.file ? target.dataset : entry.dataset;
       if (files && [...files.options].some((option) => option.value === at.file)) { files.value = at.file; show("source", at.line); }
-    } else if (target.matches(".take")) change({ do: "take", index: Number(entry.dataset.index) });
+    } else if (target.matches(".settle")) change({ do: "settle" });
+    else if (target.matches(".take")) change({ do: "take", index: Number(entry.dataset.index) });
     else if (target.matches(".remove")) change({ do: "uncomment", index: Number(entry.dataset.index) });
     else if (target.matches(".edit")) {
       const { file, line, index } = entry.dataset;

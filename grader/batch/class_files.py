@@ -14,6 +14,7 @@ from grader.batch.ledger import BATCH_FILE, Entry, Ledger
 from grader.errors import UsageError
 from grader.findings.finding import Status
 from grader.findings.wording import listing
+from grader.grade.model import total
 from grader.report.files import write_whole
 from grader.report.formats.gradebook import grades_csv
 from grader.report.html.overview import render_overview
@@ -22,6 +23,7 @@ from grader.report.model.class_row import ClassRow
 from grader.report.model.cluster import clusters
 from grader.report.model.result import read_result
 from grader.report.model.result_model import Result
+from grader.report.text.words import counted_points
 from grader.review.store import ReviewStore
 from grader.safe_text import one_line
 
@@ -62,7 +64,8 @@ def _note(done: Done, same: Sequence[Entry]) -> str:
         parts.append(done.result.submission.problem)
     if done.result is not None and not done.result.graded:
         errors = (one.observed for one in done.result.checks if one.status is Status.ERROR)
-        parts.append(f"not graded: {one_line(next(errors, ''))}")
+        still = counted_points(total(one.max_points for one in done.result.open))
+        parts.append(f"not graded, {still} open: {one_line(next(errors, ''))}")
     return "; ".join(part for part in parts if part)
 
 

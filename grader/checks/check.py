@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import wraps
@@ -121,6 +121,19 @@ def stop_if(reason: Reason | None) -> None:
     """End a check here if there is a reason: its finding says what is expected, and the reason."""
     if reason is not None:
         raise Unmet(reason)
+
+
+def stop_if_any(reasons: Iterable[Reason | None]) -> None:
+    """End a check here by the first of some reasons, one for each case, that is the student's.
+
+    Only where there is none, by one of the machine: an undisturbed case decides without the others.
+    """
+    undecided = None
+    for reason in reasons:
+        if reason is not None and reason.finding("").status is not Status.ERROR:
+            stop_if(reason)
+        undecided = undecided or reason
+    stop_if(undecided)
 
 
 def check(

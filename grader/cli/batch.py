@@ -224,7 +224,7 @@ def _summary(done: Sequence[Done], wall_s: float) -> str:
     counts = {
         "wait for a person (rosgrade review)": count[RowStatus.WAITING],
         "the same as another": copies(done),
-        "could not be graded (again with --retry errors)": count[RowStatus.NOT_GRADED],
+        "could not be graded (see --retry errors, and review)": count[RowStatus.NOT_GRADED],
         "unreadable, without a score": count[RowStatus.UNREADABLE],
         "handed in nothing": count[RowStatus.MISSING],
     }

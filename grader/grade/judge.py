@@ -112,11 +112,20 @@ def grade(
 
 
 def _counted(counts: Counts, findings: Sequence[Finding]) -> tuple[Status, float]:
-    """Status and credit of a check that judged several scenarios."""
+    """Status and credit of a check that judged several scenarios.
+
+    Those that could not be judged leave it open only where they matter: a check that failed
+    elsewhere is worth no more.
+    """
     worst = min((finding.status for finding in findings), key=SEVERITY.index)
-    if worst in (Status.ERROR, Status.SKIPPED):
+    if worst is Status.SKIPPED:
         return worst, 0.0
-    credit = _CREDIT[counts]([finding.credit for finding in findings])
+    least, credit = (
+        _CREDIT[counts]([open_ if one.status is Status.ERROR else one.credit for one in findings])
+        for open_ in (0.0, 1.0)
+    )
+    if least < credit:
+        return Status.ERROR, 0.0
     return (Status.PASSED if credit == 1.0 else Status.FAILED), credit
 
 

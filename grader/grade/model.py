@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
 from typing import Any
@@ -86,7 +86,7 @@ class Grade:
     @property
     def graded(self) -> bool:
         """Whether every check with points could be judged. If not, the score means nothing yet."""
-        return every_point_judged(self.results)
+        return not still_open(self.results)
 
     @property
     def score(self) -> float:
@@ -144,19 +144,30 @@ class Grade:
             item.scenario
             for result in self.results
             for item in result.findings
-            if item.finding.status is status and item.finding.disturbed
+            if item.finding.status is status
+            and item.finding.disturbed
+            # What could not be judged in one scenario does not matter where the others decide.
+            and not (status is Status.ERROR and result.status is not status)
         }
         return tuple(
             scenario.id for scenario in self.assignment.scenarios if scenario.id in disturbed
         )
 
 
-def every_point_judged(checks: Iterable[Any]) -> bool:
-    """Whether no check with points ended as an error, or waits for one that did."""
+def still_open(checks: Iterable[Any], settled: Collection[str | None] = ()) -> tuple[Any, ...]:
+    """Checks with points that ended as an error, or wait for one that did.
+
+    Args:
+        settled: Ids of checks for which a person has given points: those are not open any more.
+    """
     checks = tuple(checks)
     errors = {check.id for check in checks if check.status is Status.ERROR}
-    return not any(
-        check.max_points and not errors.isdisjoint((check.id, *check.waits_for)) for check in checks
+    return tuple(
+        check
+        for check in checks
+        if check.max_points
+        and check.id not in settled
+        and not errors.isdisjoint((check.id, *check.waits_for))
     )
 
 

@@ -122,6 +122,13 @@ def _irregular(deviations: Sequence[float], allowed_s: float) -> tuple[int, ...]
     return tuple(found)
 
 
+def undisturbed(recording: Recording, measured: Sequence[Interval]) -> list[float]:
+    """The intervals in seconds during and before which the host took nothing."""
+    return [
+        item.seconds for item in measured if not recording.stolen_s(item.before_ns, item.end_ns)
+    ]
+
+
 def forgiven(
     recording: Recording, measured: Sequence[Interval], limits: PeriodLimits
 ) -> tuple[float, ...]:

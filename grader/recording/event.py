@@ -63,6 +63,10 @@ class Breach:
         return f"its processes {self.violation}"
 
 
+LONGEST_STRETCH = 8.0
+"""A limit without delays of the machine is over after so many times as long, whatever it took."""
+
+
 @dataclass(frozen=True)
 class Wait:
     """A bounded wait of the probe and how it ended.
@@ -107,7 +111,8 @@ class Disturbance:
         waited_ns: How long the worst thread of the student waited for a CPU while it was ready
             to run (the kernel's run delay, /proc/PID/schedstat).
 
-    Both without the time that the student's own processes took from each other.
+    Both without the time that the student's own processes took from each other. What held up both
+    at once is in one of them.
     """
 
     time_ns: int

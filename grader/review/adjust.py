@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 
 from grader.errors import UsageError
 from grader.findings.finding import Status
-from grader.grade.model import points_for, total
+from grader.grade.model import points_for, still_open, total
 from grader.report.model.cause import cause
 from grader.report.model.result_model import AdjustmentPart, CommentPart, Result
 from grader.review.model import ClassReview, Given, ManualScore, StudentReview
@@ -20,9 +20,10 @@ def adjusted(
 ) -> Result:
     """A result with the points, comments and deductions as they are written down now.
 
-    They replace those that the result has, so doing it twice is the same as once; ``score`` and
-    the checks stay as they are. The manual items are those of the result: what a review says of
-    an item that the assignment does not have any more is left out.
+    They replace those that the result has, so doing it twice is the same as once; the checks stay
+    as they are. Where each that could not be judged got points from a person, there is a score.
+    The manual items are those of the result: what a review says of an item that the assignment
+    does not have any more is left out.
 
     A forgiven check gets back what it lost itself. A check that waited for it gets nothing: it was
     never judged, and would perhaps have failed.
@@ -46,14 +47,20 @@ def adjusted(
     checks = (one.model_copy(update={"cause": causes.get(one.id, "")}) for one in result.checks)
     result = result.model_copy(update={"checks": tuple(checks)})
     points = (*manual, *_forgiven(result, of_class), *_given(result, written.given))
+    if still_open(result.checks):
+        graded = not still_open(result.checks, [one.check for one in written.given])
+        score = total(check.points for check in result.checks) if graded else None
+        result = result.model_copy(update={"graded": graded, "score": score})
     return result.model_copy(update={"adjustments": points, "comments": tuple(comments)})
 
 
 def _given(result: Result, given: Collection[Given]) -> Iterator[AdjustmentPart]:
     titles = {check.id: check.title for check in result.checks}
+    left = {check.id for check in still_open(result.checks)}
     for one in given:
         title = titles.get(one.check or "", "Points by a person")
-        yield AdjustmentPart(kind="given", title=title, **one.model_dump())
+        if one.check in left or not one.instead:
+            yield AdjustmentPart(kind="given", title=title, **one.model_dump(exclude={"instead"}))
 
 
 def _scored(item: AdjustmentPart, score: ManualScore | None, key: str) -> AdjustmentPart:

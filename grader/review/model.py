@@ -40,6 +40,9 @@ class Given(Model):
     reason: Text
     by: Initials
     check: Id | None = Field(None, description="The check that they are about, if any.")
+    instead: bool = Field(
+        False, description="Only as long as the check could not be judged: they stand for it."
+    )
 
 
 class AttemptReview(Model):

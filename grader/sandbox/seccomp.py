@@ -36,10 +36,14 @@ _ENDING = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTSTP, signal.SIGTTIN, signa
 # RLIMIT_CPU and F_SETSIG: asm-generic/resource.h, linux/fcntl.h. A program may also end with the
 # status by which a shell tells of a signal.
 _RLIMIT_CPU, _F_SETSIG, _SIGNALLED = 0, 10, 128
+# TIOCSPTLCK and TIOCGPTPEER: asm-generic/ioctls.h
+_TERMINAL = (0x40045431, 0x5441)
 _WAYS: tuple[tuple[str, int, tuple[int, ...], int], ...] = (
     *((name, place, _ENDING, _INT) for name, place in _SIGNALLING.items()),
     ("pidfd_send_signal", 1, _ENDING, _INT),
     ("fcntl", 1, (_F_SETSIG,), _INT),
+    # The keys of a terminal stop what runs there. A new one is locked, or its other end opened.
+    ("ioctl", 1, _TERMINAL, _INT),
     # At the end of its CPU time the kernel kills a process.
     ("setrlimit", 0, (_RLIMIT_CPU,), _INT),
     ("prlimit64", 1, (_RLIMIT_CPU,), _INT),
@@ -52,7 +56,7 @@ _WAYS: tuple[tuple[str, int, tuple[int, ...], int], ...] = (
 )
 """Ways to kill or to stop a process within a sandbox, or to pretend that: a call, the index of an
 argument, its values, and the bits of it that count."""
-_LEADER = 2
+LEADER = 2
 """What a sandbox is started with; of a build that is colcon."""
 INIT = 1
 """The first process of a sandbox, the only one in it that is not the student's."""
@@ -115,7 +119,7 @@ def student_filter(*, one_session: bool = False, guarded: bool = False) -> bytes
         _add(rules, refuse, "clone", seccomp.Arg(0, seccomp.MASKED_EQ, flag, flag))
     # Its flags are in memory, where a filter cannot look; libc then uses clone.
     _add(rules, seccomp.ERRNO(errno.ENOSYS), "clone3")
-    for target in (0, -1, INIT, -INIT, _LEADER, -_LEADER) if one_session else ():
+    for target in (0, -1, INIT, -INIT, LEADER, -LEADER) if one_session else ():
         at_leader = seccomp.Arg(0, seccomp.MASKED_EQ, _INT, target & _INT)
         for name in (*_SIGNALLING, "pidfd_open"):
             _add(rules, refuse, name, at_leader)

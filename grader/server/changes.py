@@ -34,7 +34,10 @@ def change_student(reviewed: ReviewedClass, row: ReviewedRow, sent: Any) -> None
         store.undo(key, sent["version"])
         return
     review = store.student(key).content
-    if sent["do"] == "notes":
+    if sent["do"] == "settle":
+        given = (*review.of(row.attempt).given, *_settled(row, reviewed.by))
+        changed = review.about(row.attempt, given=given)
+    elif sent["do"] == "notes":
         changed = review.model_copy(update={"notes": str(sent["notes"])})
     elif sent["do"] == "score":
         now = review.of(row.counts)
@@ -44,6 +47,13 @@ def change_student(reviewed: ReviewedClass, row: ReviewedRow, sent: Any) -> None
     store.save(changed, sent["version"])
     if sent["do"] == "comment" and sent.get("index") is None:
         _count(reviewed, sent["text"])
+
+
+def _settled(row: ReviewedRow, by: str) -> Iterator[Given]:
+    """The points of what could not be judged, so that there is a grade without it."""
+    for check in row.row.result.open if row.row.result else ():
+        reason = "could not be judged, through no fault of yours"
+        yield Given(points=check.max_points, reason=reason, by=by, check=check.id, instead=True)
 
 
 def _update(review: AttemptReview, sent: Any, by: str) -> dict[str, Any]:

@@ -29,6 +29,7 @@ NAMES = ("right", "misnamed", "stops_too_early", "crashes", "does_unusual_things
 HOARDS = {name: attack for name, attack in ATTACKS.items() if "hoards" in name}
 HOARDS |= {f"hoards_{number}": ATTACKS["hoards_descriptors_in_flight"] for number in range(4)}
 HOARDS |= {"writes_into_the_init": ATTACKS["writes_into_the_init"]}
+HOARDS |= {name: attack for name, attack in ATTACKS.items() if name.startswith("is_stopped")}
 
 
 def bound() -> None:

@@ -337,6 +337,38 @@ raise RuntimeError('<script>alert(2)</script><img src=x onerror=alert(3)>\\x1b[3
 """
 
 
+# The kernel stops a child when its parent ends: PR_SET_PDEATHSIG, in prctl(2).
+STOPPED_BY_AN_END = """\
+import ctypes
+if os.fork() == 0:
+    if os.fork() == 0:
+        ctypes.CDLL(None).prctl(1, signal.SIGSTOP)
+        while True:
+            time.sleep(1)
+    time.sleep(.5)
+    os._exit(0)
+time.sleep(60)
+"""
+# A terminal of its own, at which Ctrl-Z is typed.
+STOPPED_BY_A_TERMINAL = """\
+keys, terminal = os.openpty()
+name = os.ttyname(terminal)
+if os.fork() == 0:
+    os.setsid()
+    os.open(name, os.O_RDWR)
+    job = os.fork()
+    if job == 0:
+        while True:
+            time.sleep(1)
+    os.setpgid(job, job)
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)
+    os.tcsetpgrp(terminal, job)
+    os.write(keys, b'\\x1a')
+    while True:
+        time.sleep(1)
+"""
+
+
 def ended(attack: str, *named: str) -> Attack:
     """One that ends the node, or for which it is ended."""
     return Attack(attack, lost=ALIVE, named=named)
@@ -440,6 +472,13 @@ ATTACKS = {
         named=("with a name that ROS does not allow",),
     ),
     "stops_itself": ended("os.kill(os.getpid(), signal.SIGSTOP)", "SIGSTOP"),
+    "is_stopped_by_the_end_of_its_parent": ended(STOPPED_BY_AN_END, "with SIGSTOP"),
+    "is_stopped_at_its_own_terminal": Attack(
+        STOPPED_BY_A_TERMINAL,
+        lost=frozenset({"alive"}),
+        maybe=frozenset({"messages"}),
+        named=("with SIGSTOP",),
+    ),
     "sleeps": unstarted("time.sleep(1000)"),
     "leaves_at_once": unstarted("os._exit(0)"),
     "another_domain": unstarted("os.environ['ROS_DOMAIN_ID'] = '5'", "joined ROS domain 5"),

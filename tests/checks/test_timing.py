@@ -232,7 +232,16 @@ class TestFailures:
         run = recording(
             messages=messages(times), disturbance=taken(times[5], times[6], waited_s=0.9)
         )
-        assert period(run).status is Status.ERROR
+        assert period(run).status is Status.PASSED
+        assert "the machine took time in" in period(run).observed
+        # Where it took time all along, it cannot be told.
+        waits = [
+            one
+            for number, begin_s in enumerate(times)
+            for one in taken(begin_s, begin_s + 0.1, waited_s=0.9 if number == 5 else 0.01)
+        ]
+        busy = recording(messages=messages(times), disturbance=tuple(waits))
+        assert (period(busy).status, period(busy).disturbed) == (Status.ERROR, True)
 
     def test_the_worst_interval_is_a_moment(self):
         times = after([0.3] * 6 + [0.9, 0.7] + [0.3] * 3)

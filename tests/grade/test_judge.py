@@ -171,9 +171,29 @@ class TestScenarios:
         assert reaches.decisive.scenario == shown
 
     def test_the_best_of_runs_is_not_known_while_one_could_not_be_judged(self):
-        says = {"drive_1": PASS, "drive_2": Finding.error("", "")}
+        says = {"drive_1": FAIL, "drive_2": Finding.error("", "")}
         result = judge(Told("reaches", says, counts="best"), scenarios=tuple(says))
         assert result.result("reaches").status is Status.ERROR
+
+    @pytest.mark.parametrize(
+        ("counts", "says", "status"),
+        [
+            ("worst", (PASS, FAIL), Status.FAILED),
+            ("worst", (PASS, PASS), Status.ERROR),
+            ("best", (PASS, FAIL), Status.PASSED),
+            ("median", (FAIL, FAIL), Status.FAILED),
+            ("mean", (FAIL, FAIL), Status.ERROR),
+        ],
+    )
+    def test_a_run_that_could_not_be_judged_leaves_open_only_what_it_can_change(
+        self, counts, says, status
+    ):
+        error = Finding.to_repeat("", "the machine took time")
+        findings = dict(zip(("a", "b", "c"), (*says, error), strict=True))
+        result = judge(Told("reaches", findings, counts=counts), scenarios=tuple(findings))
+        assert result.result("reaches").status is status
+        again = ("c",) if status is Status.ERROR else ()
+        assert result.disturbed_scenarios(Status.ERROR) == again
 
     def test_a_check_judges_only_the_scenarios_that_it_names(self):
         told = Told("node", scenarios=("renamed",))

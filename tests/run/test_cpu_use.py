@@ -19,9 +19,13 @@ from grader.run.host.disturbance import (
     CpuTimes,
     DisturbanceMeter,
     Interval,
+    Scheduled,
+    Waits,
+    beyond,
     interval,
     others_share,
-    run_delays,
+    scheduled,
+    uncounted,
 )
 from grader.run.process.descendants import Family
 from grader.sandbox.usage import idle_ticks
@@ -42,7 +46,8 @@ def samples(*others_ms: float, length_ms: int = 100) -> list[Interval]:
     [
         pytest.param(75, 100, 200, 0, 0, id="eight busy processes of the student's on two CPUs"),
         pytest.param(90, 100, 10, 0, 90, id="others keep both CPUs busy"),
-        pytest.param(60, 100, 195, 0, 5, id="two busy threads of the student's, and the probe"),
+        pytest.param(60, 100, 195, 0, 0, id="two busy threads of the student's, and the probe"),
+        pytest.param(95, 100, 100, 0, 0, id="its children keep one CPU busy, others the other"),
         pytest.param(25, 100, 160, 40, 0, id="four threads that meet on one CPU"),
         pytest.param(900, 1000, 20, 180, 900, id="a virtual machine that stood still"),
     ],
@@ -88,19 +93,19 @@ class PretendedCpus(CpuMeter):
         return CpuTimes(self._now_ns, int(self._student * 2 * self._now_ns), 0)
 
 
-@pytest.mark.parametrize(("student", "counted_ms"), [(1.0, 0), (0.0, 75), (0.95, 20)])
+@pytest.mark.parametrize(("student", "counted_ms"), [(1.0, 0), (0.0, 75), (0.45, 20)])
 def test_a_wait_is_a_disturbance_only_as_far_as_others_had_the_cpus(
     student: float, counted_ms: int
 ) -> None:
     waits, enough = count(step=75 * MS), threading.Event()
 
-    def delays(pid: int) -> dict[int, int]:
+    def threads(pid: int) -> dict[int, Scheduled]:
         waited_ns = next(waits)
         if waited_ns > 5 * 75 * MS:
             enough.set()
-        return {pid: waited_ns}
+        return {pid: Scheduled(0, waited_ns)}
 
-    meter = DisturbanceMeter(lambda: (1,), PretendedCpus(student), delays)
+    meter = DisturbanceMeter(lambda: (1,), PretendedCpus(student), threads)
     meter.start()
     assert enough.wait(30)
     third = meter.stop()[3]
@@ -108,16 +113,16 @@ def test_a_wait_is_a_disturbance_only_as_far_as_others_had_the_cpus(
     assert third.waited_ns == pytest.approx(counted_ms * MS, abs=1000)
 
 
-@pytest.mark.parametrize(("own_ms", "others_ms"), [(20, 100), (60, 100), (90, 10)])
+@pytest.mark.parametrize(("own_ms", "others_ms"), [(20, 90), (40, 75), (60, 55), (90, 25)])
 def test_a_cell_that_is_flooded_is_no_disturbance(own_ms: int, others_ms: int) -> None:
-    """The student has one of two CPUs, and others have the other one."""
-    after = CpuTimes(100 * MS, 100 * MS, 0, own_ns=own_ms * MS)
+    """The student has a tenth of a CPU, and the cell more than a quarter of one."""
+    after = CpuTimes(100 * MS, 10 * MS, 0, own_ns=own_ms * MS)
     assert interval(CpuTimes(0, 0, 0), after, cpus=2).others_ns == others_ms * MS
 
 
 def test_a_process_that_takes_its_time_with_it_adds_to_no_account() -> None:
     ended = interval(CpuTimes(0, 500 * MS, 0), CpuTimes(100 * MS, 0, 0), cpus=2)
-    assert ended.others_ns == 200 * MS
+    assert ended.others_ns == 100 * MS
 
 
 @pytest.mark.parametrize("cpus", [2, 4])
@@ -125,7 +130,9 @@ def test_what_is_hidden_is_not_taken_for_the_machine_s(cpus: int) -> None:
     """Two processes were there, and ended without a parent that waited for them."""
     after = CpuTimes(100 * MS, 40 * MS, 0, orphans=2)
     others_ms = interval(CpuTimes(0, 0, 0), after, cpus).others_ns / MS
-    assert others_ms == max(0, cpus * 100 - 40 - 2 * 100)
+    assert others_ms == 0
+    seen = CpuTimes(100 * MS, 40 * MS, 0)
+    assert interval(CpuTimes(0, 0, 0), seen, cpus).others_ns == 60 * MS
 
 
 def test_a_relay_of_processes_without_a_parent_s_wait_is_no_disturbance() -> None:
@@ -163,12 +170,12 @@ def test_idle_time_is_read_of_the_cpus_that_may_be_used() -> None:
     stat = (
         "cpu  10 0 10 300 30 0 0 0 0 0\n"
         "cpu0 5 0 5 100 10 0 0 0 0 0\n"
-        "cpu1 5 0 5 200 20 0 0 0 0 0\n"
+        "cpu1 5 0 5 200 20 0 7 0 0 0\n"
         "cpu10 5 0 5 7 7 0 0 0 0 0\n"
         "intr 5 0 0 0 0 0\n"
     )
     assert idle_ticks(stat, {0}) == 110
-    assert idle_ticks(stat, {0, 1}) == 330
+    assert idle_ticks(stat, {0, 1}) == 337
     with pytest.raises(IndexError):
         idle_ticks("cpu0 5\n", {0})
 
@@ -199,6 +206,48 @@ input()
 """
 
 
+def test_threads_that_wait_at_once_lose_the_time_once() -> None:
+    samples: list[tuple[int, int, int]] = []
+    for number in range(1, 21):
+        # In each of them the wait of another thread ends, which began 300 ms before.
+        waited_ns = uncounted(300 * MS, number * 100 * MS, samples)
+        samples.append(((number - 1) * 100 * MS, number * 100 * MS, waited_ns))
+    assert sum(waited for _, _, waited in samples) <= (20 * 100 + 300) * MS
+    # One thread waits again and again, never twice at once.
+    assert uncounted(
+        40 * MS, 300 * MS, [(0, 100 * MS, 40 * MS), (100 * MS, 200 * MS, 40 * MS)]
+    ) == (40 * MS)
+
+
+@pytest.mark.parametrize(("hogs", "last_ms"), [(8, 20), (2, 90)])
+def test_more_hogs_than_cpus_explain_no_delay_once_they_have_started(
+    hogs: int, last_ms: int
+) -> None:
+    """A node waits for 20 ms of 100, and what it has started for 90; others keep the CPUs busy."""
+    waits, found = Waits(cpus=2), []
+    for second in range(100):
+        threads = {0: Scheduled(second * 30 * MS, second * 200 * MS)}
+        for number in range(1, hogs + 1):
+            threads[number] = Scheduled(second * 100 * MS, second * 900 * MS)
+        found.append(waits.longest_ns(second * 1000 * MS, threads) // (10 * MS))
+    assert found[1] == 90
+    assert found[-1] == last_ms
+
+
+@pytest.mark.parametrize(
+    ("late_ms", "waited_ms", "length_ms", "more_ms"),
+    [
+        pytest.param(400, 400, 420, 20, id="the machine stood still"),
+        pytest.param(30, 40, 100, 30, id="one after the other"),
+        pytest.param(280, 300, 100, 0, id="a long wait is booked at its end"),
+    ],
+)
+def test_what_holds_up_student_and_probe_at_once_is_one_delay(
+    late_ms: int, waited_ms: int, length_ms: int, more_ms: int
+) -> None:
+    assert beyond(late_ms, waited_ms, length_ms) == more_ms
+
+
 def test_threads_that_share_one_cpu_wait_for_it() -> None:
     command = [sys.executable, "-S", "-c", BURN, str(min(os.sched_getaffinity(0)))]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
@@ -207,8 +256,8 @@ def test_threads_that_share_one_cpu_wait_for_it() -> None:
         for process in both:
             assert process.stdout is not None and process.stdout.readline()
         # Each had 0.2 s of the same CPU: one of them waited for most of the other's.
-        assert max(run_delays(process.pid)[process.pid] for process in both) > 50 * MS
+        assert max(scheduled(process.pid)[process.pid].waited_ns for process in both) > 50 * MS
     finally:
         for process in both:
             process.communicate()
-    assert run_delays(both[0].pid) == {}
+    assert scheduled(both[0].pid) == {}

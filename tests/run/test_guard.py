@@ -122,6 +122,12 @@ def test_every_way_to_kill_a_process_from_within_is_noted(
     assert guard.can_have_ended(()) is told
 
 
+def test_a_terminal_of_its_own_is_a_way_to_stop_a_process(guard: Guard) -> None:
+    assert run(guard, "import os; print(len(os.openpty()))").split() == ["2"]
+    assert guard.can_have_ended(())
+    assert guard.violations == ()
+
+
 def test_a_program_may_use_any_timer(guard: Guard) -> None:
     source = (
         "import ctypes\n"

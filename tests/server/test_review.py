@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import html
+import json
 import re
 from pathlib import Path
 from urllib.parse import quote
@@ -11,11 +12,14 @@ from urllib.parse import quote
 import pytest
 
 from grader.assignment.load import load_assignment
+from grader.batch.adjusting import ClassAdjustments
 from grader.batch.class_files import all_standing, read_class
 from grader.batch.files import RESULT_FILE
+from grader.batch.ledger import Ledger
 from grader.batch.rendering import bring_up_to_date
 from grader.report.files import folder_name
 from grader.report.model.result import read_result
+from grader.report.text.explanation import headline
 from grader.review.store import ReviewStore
 from grader.server.review import ReviewServer
 from tests.server.conftest import Answer, Client
@@ -183,6 +187,41 @@ def test_a_forgiven_cause_gives_points_back_until_that_is_taken_back(
     back = {**cluster(client, 0.5), "do": "take back"}
     assert client.post("/clusters", back).status == 200
     assert not ReviewStore(out).of_class().content.forgiven
+
+
+def leave_open(out: Path, key: str, check: str) -> None:
+    """Have a check end as an error, as on a machine that is too busy."""
+    file = out / "submissions" / key / RESULT_FILE
+    result = json.loads(file.read_text(encoding="utf-8"))
+    result |= {"graded": False, "score": None}
+    for one in result["checks"]:
+        if one["id"] == check:
+            one |= {"status": "error", "points": 0.0}
+    file.write_text(json.dumps(result), encoding="utf-8")
+
+
+def test_a_click_grades_without_a_check_that_could_not_be_judged(out: Path, client: Client) -> None:
+    leave_open(out, "ana", "print")
+    text = client.get(page("ana")).text
+    assert "5 of 6 points so far, 1 open" in text and "Give 1 point, grade without" in text
+    assert "--retry" in text
+    assert change(client, "ana", do="settle").status == 200
+    row = next(row for row in read_class(out) if row.id == "ana")
+    assert row.result is not None and row.result.graded and not row.result.open
+    assert (row.result.score, row.result.known_score) == (5.0, 6.0)
+    assert headline(row.result) == "2 of 3 checks passed; 1 check could not be judged."
+    assert "grade without" not in client.get(page("ana")).text
+    # It is judged in the end: these points were only in place of it.
+    judged = row.result.model_copy(
+        update={
+            "checks": tuple(
+                one.model_copy(update={"status": "passed"}) for one in row.result.checks
+            )
+        }
+    )
+    assert ClassAdjustments(Ledger(out))(judged).known_score == 5.0
+    assert change(client, "ana", do="take", index=0).status == 200
+    assert "1 open" in client.get(page("ana")).text
 
 
 def test_one_comment_reaches_all_who_made_the_mistake_once(out: Path, client: Client) -> None:

@@ -7,7 +7,15 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if, toleranced
+from grader.checks.check import (
+    NamedFields,
+    Parameters,
+    Subject,
+    check,
+    stop_if,
+    stop_if_any,
+    toleranced,
+)
 from grader.checks.need import Doubt, GoalSent
 from grader.checks.requests import judged_requests, timeline, why_other_fields
 from grader.diagnosis.cause import Cause
@@ -190,11 +198,13 @@ def feedback(recording: Recording, parameters: FeedbackOf) -> Finding:
     preempted: number, mean rate, and fields of the first and the last feedback.
     """
     goals = answered_goals(recording, parameters, is_undisturbed)
-    for goal in goals:
-        stop_if(why_rejected(recording, goal))
-        stop_if(_why_little_feedback(recording, goal, parameters))
-        stop_if(_why_other_rate(recording, goal, parameters))
-        stop_if(_why_other_feedback(recording, goal, parameters))
+    stop_if_any(
+        why_rejected(recording, goal)
+        or _why_little_feedback(recording, goal, parameters)
+        or _why_other_rate(recording, goal, parameters)
+        or _why_other_feedback(recording, goal, parameters)
+        for goal in goals
+    )
     number = min(len(goal.feedback) for goal in goals)
     at = f" at {_rate_hz(goals[0]):.3g} Hz" if len(goals[0].feedback) > 1 else ""
     shown = evidence(recording, goals[0])
@@ -284,11 +294,13 @@ def result(recording: Recording, parameters: Result) -> Finding:
     is_canceled = parameters.status == "canceled"
     is_judged = _is_to_cancel if is_canceled else is_undisturbed
     goals = answered_goals(recording, parameters, is_judged)
-    for goal in goals:
-        stop_if(why_rejected(recording, goal))
-        stop_if(_why_no_result(recording, goal, parameters.within))
-        stop_if(_why_other_status(recording, goal, parameters))
-        stop_if(_why_other_result(recording, goal, parameters))
+    stop_if_any(
+        why_rejected(recording, goal)
+        or _why_no_result(recording, goal, parameters.within)
+        or _why_other_status(recording, goal, parameters)
+        or _why_other_result(recording, goal, parameters)
+        for goal in goals
+    )
     observed = f"{goals[0].status}: {words(goals[0].result or {})}"
     return Finding.passed(parameters.asked_for, observed, evidence(recording, goals[0]))
 

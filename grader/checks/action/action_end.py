@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from grader.checks.action.action import OfGoals, answered_goals, evidence, why_rejected
-from grader.checks.check import Subject, check, stop_if
+from grader.checks.check import Subject, check, stop_if, stop_if_any
 from grader.checks.need import GoalSent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_late
@@ -41,11 +41,12 @@ def cancels(recording: Recording, parameters: Cancels) -> Finding:
     the goal ends as canceled in time.
     """
     goals = answered_goals(recording, parameters, lambda goal: goal.cancel_after_s is not None)
-    for goal in goals:
-        stop_if(why_rejected(recording, goal))
-        stop_if(_why_not_asked(recording, goal))
-        shown = evidence(recording, goal)
-        stop_if(why_not_canceled(recording, goal, parameters.within, shown))
+    stop_if_any(
+        why_rejected(recording, goal)
+        or _why_not_asked(recording, goal)
+        or why_not_canceled(recording, goal, parameters.within, evidence(recording, goal))
+        for goal in goals
+    )
     took_s = ((goals[0].result_ns or 0) - (goals[0].canceled_ns or 0)) / NS
     observed = f"canceled {format_duration(took_s)} after it was asked"
     return Finding.passed(parameters.asked_for, observed, evidence(recording, goals[0]))

@@ -113,17 +113,28 @@ def overlap(recording: Recording, parameters: Overlap) -> Finding | Cause:
     evidence = Evidence((Moment("one runs", begin_s),), spans=spans(recording, runs, wrong))
     if not found if never else min(numbers.values()) >= least:
         return Finding.passed(parameters.asked_for, observed, evidence)
-    prevented = sum(_was_held_up(recording, one, other) for one, other in pairwise(runs))
-    if not never and min(numbers.values()) + prevented >= least:
+    followed = [pair for pair in pairwise(runs) if _half_s(*pair) > _gap_s(*pair) > -_half_s(*pair)]
+    prevented = sum(_was_held_up(recording, *pair) for pair in pairwise(runs))
+    kept_apart = sum(not _was_held_up(recording, *pair) for pair in followed)
+    # Where one waited for the other, and the machine took nothing, they were kept apart.
+    if not never and prevented > kept_apart and min(numbers.values()) + prevented >= least:
         return Cause.to_repeat(f"{observed}, but the machine held callbacks up")
     return Cause(observed, _hint(recording, runs, together=not never), evidence)
 
 
 def _was_held_up(recording: Recording, one: Run, other: Run) -> bool:
     """Whether the machine may have kept a run from overlapping one before by half its duration."""
-    half_s = min(one.seconds or 0.0, other.seconds or 0.0) / 2
-    lacking_s = (other.begin_ns - (one.end_ns or 0)) / NS + half_s
+    lacking_s = _gap_s(one, other) + _half_s(one, other)
     return recording.stolen_s(one.begin_ns, other.begin_ns) > lacking_s > 0.0
+
+
+def _gap_s(one: Run, other: Run) -> float:
+    """How long after one run the other began; negative where they overlap."""
+    return (other.begin_ns - (one.end_ns or 0)) / NS
+
+
+def _half_s(one: Run, other: Run) -> float:
+    return min(one.seconds or 0.0, other.seconds or 0.0) / 2
 
 
 def _why_missing(

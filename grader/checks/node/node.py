@@ -9,6 +9,7 @@ from pydantic import Field
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
+from grader.diagnosis.process.blocked_executor import left_s
 from grader.diagnosis.process.process_exit import (
     ended_early,
     exited,
@@ -20,6 +21,7 @@ from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen
 from grader.findings.wording import code, codes, counted
 from grader.measure import declarations
+from grader.recording.event import LONGEST_STRETCH
 from grader.recording.model import NS, Kind, Node, Owner, Process, Recording
 from grader.spec.name import QualifiedNodeName, TopicName
 from grader.spec.quantity import Duration
@@ -194,8 +196,8 @@ class Ends(Parameters):
 def ends(recording: Recording, parameters: Ends) -> Finding | Cause:
     """The process ends by itself after Ctrl-C.
 
-    Judged by the process: after SIGINT it must end in time and leave no process behind. Its exit
-    status and a traceback of KeyboardInterrupt do not matter.
+    Judged by the process: after SIGINT it must end in time and leave no process behind. Delays by
+    the machine are taken off. Its exit status and a traceback of KeyboardInterrupt do not matter.
     """
     if not recording.processes:
         stop_if(why_no_node(recording) or Cause("nothing was launched"))
@@ -208,7 +210,7 @@ def ends(recording: Recording, parameters: Ends) -> Finding | Cause:
     asked = [process for process in processes if not _was_killed(recording, process)]
     slow = [process for process in asked if not _in_time(process, parameters)]
     if slow:
-        stop_if(_why_slow(recording, max(slow, key=took_s), parameters))
+        stop_if(_why_slow(recording, max(slow, key=took_s)))
     for process in processes:
         if process.survivors:
             number = counted(len(process.survivors), "process", "processes")
@@ -248,14 +250,16 @@ def _stop_s(recording: Recording, process: Process) -> float:
     return max(((process.exited_ns or recording.end_ns) - recording.stop_ns) / NS, 0.0)
 
 
-def _why_slow(recording: Recording, process: Process, parameters: Ends) -> Cause:
+def _why_slow(recording: Recording, process: Process) -> Cause:
     took_s = _stop_s(recording, process)
     seen = f"{code(process.name)} did not end after SIGINT; {process.stopped_by} was needed"
     if process.stopped_by == "SIGINT":
         seen = f"{code(process.name)} needed {format_duration(took_s)} to end after SIGINT"
-    stolen_s = recording.stolen_s(recording.stop_ns, process.exited_ns or recording.end_ns)
-    if stolen_s > 0.0 and took_s - stolen_s <= parameters.within:
-        return Cause.held_up(seen, stolen_s)
+    # What the machine took is off already, but for a rest that ends a wait on any machine.
+    ended_ns = process.exited_ns or recording.end_ns
+    wall_s = (ended_ns - recording.stop_ns) / NS
+    if left_s(recording, recording.stop_ns, ended_ns) < wall_s / LONGEST_STRETCH:
+        return Cause.held_up(seen, recording.stolen_s(recording.stop_ns, ended_ns))
     lines = [
         line.text
         for line in recording.log

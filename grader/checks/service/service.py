@@ -9,7 +9,15 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if, toleranced
+from grader.checks.check import (
+    NamedFields,
+    Parameters,
+    Subject,
+    check,
+    stop_if,
+    stop_if_any,
+    toleranced,
+)
 from grader.checks.need import Called, Doubt
 from grader.checks.requests import judged_requests, why_other_fields
 from grader.diagnosis.cause import Cause
@@ -212,8 +220,7 @@ def concurrent(recording: Recording, parameters: Concurrent) -> Finding | Cause:
         return Cause(text, ours=True)
     # Time enough for the slower of both, one after the other.
     stop_if(why_slow(recording, calls, 2.0 * len(calls) * parameters.takes))
-    for pair in pairs:
-        stop_if(_why_other_order(recording, parameters, pair))
+    stop_if_any(_why_other_order(recording, parameters, pair) for pair in pairs)
     observed = f"the answers came {format_duration(max(map(_gap_s, pairs)))} apart"
     return Finding.passed(parameters.asked_for, observed, _evidence(recording, calls))
 
@@ -233,13 +240,18 @@ def _why_other_order(
     seen = f"the answers to two calls at once came {format_duration(gap_s)} apart"
     ended_ns = max(call.answered_ns or 0 for call in pair)
     stolen_s = recording.stolen_s(pair[0].requested_ns, ended_ns)
-    in_doubt = side_by_side and gap_s - stolen_s <= _TOGETHER * takes_s
-    if in_doubt or not (together or far_apart):
+    # The machine may have held up the second answer, or the first one.
+    if side_by_side:
+        in_doubt = gap_s - stolen_s <= _TOGETHER * takes_s
+    else:
+        in_doubt = gap_s + stolen_s >= _APART * takes_s
+    if in_doubt:
+        return Cause.held_up(seen, stolen_s)
+    if not (together or far_apart):
         return Cause(
-            f"{seen}, so it cannot be judged how they were processed",
+            f"{seen}: neither together nor one processing time apart",
             f"Each call should take {format_duration(takes_s)}.",
-            ours=stolen_s > 0.0,
-            disturbed=stolen_s > 0.0,
+            _evidence(recording, pair),
         )
     executors = sorted({str(item.data.get("executor")) for item in recording.declared("spin")})
     declared = f"; the process declared a {codes(executors)}" if executors else ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Sequence
+from itertools import zip_longest
 from statistics import median
 
 from pydantic import Field, model_validator
@@ -117,7 +118,8 @@ def latency(recording: Recording, parameters: Latency) -> Finding | Cause:
         last_ns = missing[-1 - parameters.unanswered]
         stop_if(why_unsubscribed(recording, parameters.stimulus, observed, last_ns))
     own_s = [max(0.0, left_s(recording, *wait)) for wait in waits]
-    unexcused = sum(recording.stolen_s(at, at + within_ns) <= 0.0 for at in missing)
+    excused = _excused(recording, [one.stamp_ns for one in sent], answers, within_ns)
+    unexcused = len(set(missing) - excused)
     if unexcused <= parameters.unanswered and not parameters.is_too_slow(own_s):
         stolen_s = recording.stolen_s(sent[0].stamp_ns, recording.stop_ns)
         return Cause.held_up(figures, stolen_s)
@@ -133,6 +135,24 @@ def latency(recording: Recording, parameters: Latency) -> Finding | Cause:
     )
     observed += f"; of the others {figures}" if times else ""
     return Cause(observed, hint, evidence)
+
+
+def _excused(
+    recording: Recording, sent: Sequence[int], answers: Sequence[Message], within_ns: int
+) -> set[int]:
+    """Those of the sent messages whose answer may be late, or not there, because of the machine.
+
+    It can be late by what the machine took. It can be missing only where the machine took so long
+    that the next message came before this one was taken out of its queue.
+    """
+    found = set()
+    for at, next_ns in zip_longest(sent, sent[1:], fillvalue=recording.stop_ns):
+        limit_ns = at + within_ns
+        stolen_ns = round(recording.stolen_s(at, limit_ns) * NS)
+        late = any(limit_ns < one.stamp_ns <= limit_ns + stolen_ns for one in answers)
+        if stolen_ns and (late or stolen_ns >= min(next_ns, recording.stop_ns - within_ns) - at):
+            found.add(at)
+    return found
 
 
 def _figures(times_s: Sequence[float]) -> str:

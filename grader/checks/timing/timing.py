@@ -31,6 +31,7 @@ from grader.measure.period import (
     forgiven,
     intervals,
     judge,
+    undisturbed,
 )
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
@@ -121,7 +122,17 @@ def period(recording: Recording, parameters: Period) -> Finding | Cause:
     verdict = judge([item.seconds for item in measured], limits)
     observed = _figures(measured, verdict)
     evidence = _evidence(recording, parameters, measured, verdict)
-    if verdict.good:
+    forgivable = verdict.period_good or not _is_declared(recording, verdict, limits)
+    is_excused = not verdict.good and (
+        forgivable and judge(forgiven(recording, measured, limits), limits).good
+    )
+    if is_excused:
+        calm = undisturbed(recording, measured)
+        if len(calm) < max(parameters.at_least, len(measured) / 2) or not judge(calm, limits).good:
+            stolen_s = recording.stolen_s(measured[0].begin_ns, measured[-1].end_ns)
+            return Cause.held_up(observed, stolen_s)
+        observed += f"; the machine took time in {len(measured) - len(calm)}, which do not count"
+    if verdict.good or is_excused:
         last_ns = messages[-1].stamp_ns
         silent = why_paused(
             recording,
@@ -133,10 +144,6 @@ def period(recording: Recording, parameters: Period) -> Finding | Cause:
             ENDED_HINT,
         )
         return silent or Finding.passed(parameters.asked_for, observed, evidence)
-    forgivable = verdict.period_good or not _is_declared(recording, verdict, limits)
-    if forgivable and judge(forgiven(recording, measured, limits), limits).good:
-        stolen_s = recording.stolen_s(measured[0].begin_ns, measured[-1].end_ns)
-        return Cause.held_up(observed, stolen_s)
     if verdict.period_good:
         number = len(verdict.irregular)
         observed += (

@@ -30,6 +30,8 @@ from grader.recording.model import NS, Recording
 from grader.spec.unit import format_duration
 
 _STILL = "the robot never moved"
+_SHORT_S = 0.2
+"""In so little time a robot does not get far enough to be seen."""
 
 
 def why_not_judged(recording: Recording) -> Cause | None:
@@ -193,7 +195,7 @@ def moves_too_late(symptom: NotMoved) -> Cause:
     left_s = (recording.truth[-1].time_ns - first.time_ns) / NS
     begin_ns = recording.truth[0].time_ns
     lost_s = stolen_s(recording, begin_ns, recording.truth[-1].time_ns)
-    if left_s < 0.2 and lost_s > 0.0:
+    if left_s < _SHORT_S <= left_s + lost_s:
         return Cause.held_up(f"{_STILL} until the end", lost_s)
     return Cause(
         f"{_STILL}: the first command to move, {speed(first.twist.linear_m_s)} ahead, came "

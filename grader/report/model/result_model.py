@@ -18,7 +18,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from grader.findings.finding import Evidence, Status
-from grader.grade.model import total
+from grader.grade.model import still_open, total
 from grader.safe_text import encodable
 from grader.submission.record import BuildRecord
 
@@ -261,6 +261,16 @@ class Result(_Part):
     def final_max_score(self) -> float:
         """Points that can be had, with those that a person gives."""
         return total((self.max_score, *(one.max_points for one in self.adjustments)))
+
+    @property
+    def settled(self) -> frozenset[str | None]:
+        """Checks for which a person has given points, whether or not they could be judged."""
+        return frozenset(one.check for one in self.adjustments if one.kind == "given")
+
+    @property
+    def open(self) -> tuple[CheckPart, ...]:
+        """Checks with points without which there is no score: they could not be judged."""
+        return () if self.graded else still_open(self.checks, self.settled)
 
     @property
     def known_score(self) -> float | None:

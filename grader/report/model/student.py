@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from grader.assignment.model import Visibility
-from grader.grade.model import every_point_judged, total
+from grader.grade.model import still_open, total
 from grader.report.model.mistakes import first_to_fix
 from grader.report.model.result_model import AdjustmentPart, CheckPart, Result, WithheldPart
 
@@ -28,7 +28,7 @@ def for_student(result: Result, shown: frozenset[str] = VISIBLE_ONLY) -> Result:
     if not hidden:
         return result
     judged = {item.scenario for check in visible for item in check.findings}
-    graded = every_point_judged(visible)
+    graded = not still_open(visible, result.settled)
     copy = result.model_copy(
         update={
             "score": total(check.points for check in visible) if graded else None,

@@ -181,17 +181,24 @@ def headline(result: Result) -> str:
     full = "Full points for the checks" if result.adjustments else "Full points"
     if not result.graded:
         text = "Something failed in the grader or the machine; no points are lost"
+        left = total(check.max_points for check in result.open)
+        if left:
+            earned = number(total(check.points for check in result.checks))
+            text += f": {earned} of {number(result.max_score)} points so far, {number(left)} open"
     elif result.score == result.max_score > 0 or passed == every:
         text = f"{passed} of {every} visible checks passed" if withheld.checks else full
         if failed:
             text += f"; {counted(failed, 'check')} without points failed"
     else:
         text = f"{counted(failed, 'check')} failed"
-        if skipped:
+        if not failed:
+            text = f"{passed} of {counted(every, 'check')} passed"
+        elif skipped:
             verb = "waits" if skipped == 1 else "wait"
             text += f", {counted(skipped, 'other')} {verb} for {'it' if failed == 1 else 'them'}"
     if result.graded and errors:
-        text += f"; {counted(errors, 'check')} without points could not be judged"
+        which = "" if result.settled else " without points"
+        text += f"; {counted(errors, 'check')}{which} could not be judged"
     if withheld.checks:
         verb = "runs" if withheld.checks == 1 else "run"
         text += f"; {counted(withheld.checks, 'hidden check')}, "

@@ -188,7 +188,8 @@ def _conclude(console: Console, result: Result, before: Result | None = None) ->
             text = f"“{first.title}”{where}. {explanation.waiting(result, first)}".rstrip()
             console.print(Text.assemble(("Fix this first: ", "bold"), _line(console, text)))
     if not result.graded:
-        text = f"Not graded. {explanation.headline(result)}"
+        again = "It can be graded again without changes."
+        text = f"Not graded. {explanation.headline(result)} {again}"
         console.print(Text(text, "bold magenta"))
         return
     for one in result.adjustments:

@@ -70,7 +70,8 @@ class Cell:
         self._ports = bound_ports() if packets is not None else frozenset()
         on_line = LineTeller() if order.tells_output else None
         self._output = OutputReader(order.limits.output_bytes, on_line)
-        self._students = StudentProcesses(self._output, order.process_sandbox)
+        self._meter = DisturbanceMeter(Family(os.getpid()).look)
+        self._students = StudentProcesses(self._output, self._meter, order.process_sandbox)
         self._other_domains: tuple[int, ...] = ()
         self._graph = GraphObserver(
             probe.node,
@@ -86,7 +87,6 @@ class Cell:
                 lambda: self._output.written_bytes,
                 self._violations,
             )
-        self._meter = DisturbanceMeter(Family(os.getpid()).look)
         self._exit_barrier = ExitBarrier(self._output, self._graph, self._students)
         self._waits: list[Wait] = []
         self._robot: SimulatedRobot | None = None
@@ -130,7 +130,7 @@ class Cell:
             if self._robot is not None:
                 self._robot.stop()
             tell("stopping")
-            self._students.stop(self._order.limits, self._meter)
+            self._students.stop(self._order.limits)
         finally:
             self._students.clean_up()
             self._faults += self._students.faults()

@@ -4,7 +4,9 @@ Two instruments: a metronome, a thread that asks to be woken every 20 ms and not
 and the time that each thread of the student was ready to run but had no CPU (its run delay).
 
 A thread waits for a CPU because another one runs on it. Where that is one of the student's, the
-wait is the submission's; only what others took, also rosgrade, is a disturbance.
+wait is the submission's; only what others took, also rosgrade, is a disturbance. And a submission
+that had a whole CPU lacked none: what it starts besides it cannot make a delay of the machine.
+So this is measured here once. Nobody takes any of it off, or gives it back, a second time.
 """
 
 from __future__ import annotations
@@ -16,22 +18,23 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from grader.recording.event import Disturbance
+from grader.recording.event import LONGEST_STRETCH, Disturbance
 from grader.recording.model import NS
 from grader.sandbox.usage import IdleCpu, OrphanCpu, Process, Taken, usage_at
 
 _TICK_NS = NS // os.sysconf("SC_CLK_TCK")
 # Of a CPU. With a robot in it a cell and the student's process took 0.12 of one together (the
 # references of bot_controller and p_controller); what makes it take more is what it is sent.
-_FLOODED = 0.7
+_OWN_SHARE = 0.25
 # CPUCLOCK_SCHED: the running time of a whole process; linux/posix-timers_types.h.
 _PROCESS_CLOCK = 2
 
 
 @dataclass(frozen=True)
 class Interval:
-    """CPU time in an interval that was neither idle nor the student's, of all CPUs together."""
+    """CPU time in an interval that others can have taken from the student, at most."""
 
     begin_ns: int
     end_ns: int
@@ -76,16 +79,15 @@ class CpuTimes:
 
 def interval(before: CpuTimes, after: CpuTimes, cpus: int) -> Interval:
     """What happened between two moments."""
-    all_ns = cpus * (after.time_ns - before.time_ns)
     # A process that has just ended takes its time with it until its parent is looked at.
     student_ns = max(0, after.student_ns - before.student_ns)
-    own_ns = after.own_ns - before.own_ns
-    if own_ns > _FLOODED * (after.time_ns - before.time_ns):
-        student_ns += own_ns
+    length_ns = after.time_ns - before.time_ns
+    student_ns += max(0, after.own_ns - before.own_ns - round(_OWN_SHARE * length_ns))
     # What they took since they were seen last is unknown: it does not count as the machine's.
-    student_ns += after.orphans * (after.time_ns - before.time_ns)
+    student_ns += after.orphans * length_ns
     idle_ns = max(0, after.idle_ns - before.idle_ns)
-    return Interval(before.time_ns, after.time_ns, max(0, all_ns - student_ns - idle_ns))
+    others_ns = min(cpus * length_ns - idle_ns, length_ns) - student_ns
+    return Interval(before.time_ns, after.time_ns, max(0, others_ns))
 
 
 class CpuMeter:
@@ -126,25 +128,89 @@ _STARTING = 3
 _SAMPLES_PER_LOOK = 10
 """New processes are looked for in the first samples, then in one of so many, and whenever a known
 one had to wait."""
+_COMPUTES = 0.9
+"""Share of its life that a thread runs or waits for a CPU, if all it does is to compute."""
+_START_NS = 2 * NS
+"""CPU time that programs need to start: 0.4 s for a node, to import rclpy and to make it."""
 _TRIFLE_NS = 2_000_000
 """A wait in one sample that needs no explanation."""
-_LONGEST_STRETCH = 8.0
 _KEPT = 100
 """Samples of CPU times that are kept, for waits that were long."""
 
 
-def run_delays(pid: int) -> dict[int, int]:
-    """Run delay of each thread of a process so far, from schedstat: thread id -> nanoseconds."""
-    found: dict[int, int] = {}
+class Scheduled(NamedTuple):
+    """How long a thread ran so far, and how long it waited for a CPU while it was ready to run."""
+
+    ran_ns: int
+    waited_ns: int
+
+
+def scheduled(pid: int) -> dict[int, Scheduled]:
+    """Each thread of a process by its id, from schedstat (the kernel's sched-stats.rst)."""
+    found: dict[int, Scheduled] = {}
     # It may end meanwhile.
     with contextlib.suppress(OSError):
         for name in os.listdir(f"/proc/{pid}/task"):  # noqa: PTH208  often
             with (
-                contextlib.suppress(OSError, IndexError),
+                contextlib.suppress(OSError, IndexError, ValueError),
                 open(f"/proc/{pid}/task/{name}/schedstat", "rb") as file,  # noqa: PTH123
             ):
-                found[int(name)] = int(file.read().split()[1])
+                ran_ns, waited_ns, _ = map(int, file.read().split())
+                found[int(name)] = Scheduled(ran_ns, waited_ns)
     return found
+
+
+class Waits:
+    """How long threads of the submission wait for a CPU.
+
+    Those that do nothing but compute, more of them than there are CPUs, would wait on any machine.
+    Once they have had more than a start needs, they explain no delay.
+    """
+
+    def __init__(self, cpus: int) -> None:
+        self._cpus = cpus
+        self._born_ns: dict[int, int] = {}
+        self._waited_ns: dict[int, int] = {}
+
+    def longest_ns(self, now_ns: int, threads: Mapping[int, Scheduled]) -> int:
+        """The longest wait since the look before."""
+        for thread, one in threads.items():
+            self._born_ns.setdefault(thread, now_ns - sum(one))
+        computing = {
+            thread
+            for thread, one in threads.items()
+            if sum(one) >= _COMPUTES * (now_ns - self._born_ns[thread])
+        }
+        had_ns = sum(threads[thread].ran_ns for thread in computing)
+        left_out = len(computing) > self._cpus and had_ns > _START_NS
+        longest_ns = 0
+        for thread, one in threads.items():
+            before_ns = self._waited_ns.get(thread, 0)
+            self._waited_ns[thread] = one.waited_ns
+            if not (left_out and thread in computing):
+                longest_ns = max(longest_ns, one.waited_ns - before_ns)
+        return longest_ns
+
+
+def uncounted(waited_ns: int, end_ns: int, samples: Iterable[tuple[int, int, int]]) -> int:
+    """How much of a wait that ended now no other thread's wait has counted for.
+
+    Threads wait at the same time, but the time is lost once.
+
+    Args:
+        samples: Begin, end and counted wait of the samples before.
+    """
+    begin_ns = end_ns - waited_ns
+    known = (min(counted, max(0, to - max(at, begin_ns))) for at, to, counted in samples)
+    return max(0, waited_ns - sum(known))
+
+
+def beyond(late_ns: int, waited_ns: int, length_ns: int) -> int:
+    """How late the probe was beyond what the student waited, in a sample of some length.
+
+    A machine that stands still holds up both at once, and that is one delay.
+    """
+    return min(late_ns, max(length_ns, waited_ns, late_ns) - waited_ns)
 
 
 class DisturbanceMeter:
@@ -154,16 +220,18 @@ class DisturbanceMeter:
         self,
         pids: Callable[[], Iterable[int]],
         cpu: CpuMeter | None = None,
-        delays: Callable[[int], Mapping[int, int]] = run_delays,
+        threads: Callable[[int], Mapping[int, Scheduled]] = scheduled,
     ) -> None:
-        self._run_delays = delays
+        self._threads = threads
         self._pids = pids
         self._known: tuple[int, ...] = ()
         self._number = 0
-        self._delays: dict[int, int] = {}
         self._samples: list[Disturbance] = []
         self._taken_ns = 0
+        self._sampled_ns = 0
+        self._counted: deque[tuple[int, int, int]] = deque(maxlen=_KEPT)
         self._cpu = cpu or CpuMeter()
+        self._waits = Waits(self._cpu.cpus)
         self._times: CpuTimes | None = None
         self._intervals: deque[Interval] = deque(maxlen=_KEPT)
         self._stop = threading.Event()
@@ -172,6 +240,7 @@ class DisturbanceMeter:
     def start(self) -> None:
         """Begin to measure."""
         self._times = self._cpu.read(self._pids())
+        self._sampled_ns = time.monotonic_ns()
         self._thread.start()
 
     def stop(self) -> tuple[Disturbance, ...]:
@@ -207,18 +276,20 @@ class DisturbanceMeter:
         self._number += 1
         if looks:
             self._known = tuple(self._pids())
-        waited_ns = 0
+        threads: dict[int, Scheduled] = {}
         for pid in self._known:
-            for thread, delay_ns in self._run_delays(pid).items():
-                before_ns = self._delays.get(thread, 0)
-                self._delays[thread] = delay_ns
-                waited_ns = max(waited_ns, delay_ns - before_ns)
+            threads |= self._threads(pid)
+        waited_ns = self._waits.longest_ns(time.monotonic_ns(), threads)
         if looks or waited_ns + late_ns > _TRIFLE_NS:
             if not looks:
                 self._known = tuple(self._pids())
             self._read_cpu_times()
             waited_ns = others_share(waited_ns, self._intervals)
             late_ns = others_share(late_ns, self._intervals)
+        before_ns, self._sampled_ns = self._sampled_ns, time.monotonic_ns()
+        waited_ns = uncounted(waited_ns, self._sampled_ns, self._counted)
+        self._counted.append((before_ns, self._sampled_ns, waited_ns))
+        late_ns = beyond(late_ns, waited_ns, self._sampled_ns - before_ns)
         self._taken_ns += waited_ns + late_ns
         self._samples.append(Disturbance(time.time_ns(), late_ns, waited_ns))
 
@@ -241,4 +312,4 @@ class Stopwatch:
     def elapsed_s(self) -> float:
         """Undisturbed seconds; at least an eighth of the wall time, so that every wait ends."""
         wall_s = time.monotonic() - self._wall_s
-        return max(wall_s - (self._meter.stolen_s - self._stolen_s), wall_s / _LONGEST_STRETCH)
+        return max(wall_s - (self._meter.stolen_s - self._stolen_s), wall_s / LONGEST_STRETCH)

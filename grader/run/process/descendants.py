@@ -97,14 +97,14 @@ def command_line(pid: int) -> str:
         return f"process {pid}"
 
 
-def is_init(pid: int) -> bool:
-    """Whether a process is the first one of a PID namespace below this one (proc(5), NSpid)."""
+def pid_within(pid: int) -> int | None:
+    """Id of a process in the PID namespace that it is in, below this one (proc(5), NSpid)."""
     try:
         status = (_PROC / str(pid) / "status").read_text(errors="replace")
     except OSError:
-        return False
+        return None
     numbers = status.partition("NSpid:")[2].partition("\n")[0].split()
-    return len(numbers) > 1 and numbers[-1] == "1"
+    return int(numbers[-1]) if len(numbers) > 1 else None
 
 
 def kill_descendants(of: int, *, limit_s: float = 5.0) -> dict[int, str]:

@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -18,16 +18,17 @@ from grader.run.host.disturbance import DisturbanceMeter, Stopwatch
 from grader.run.order import RunLimits
 from grader.run.process.descendants import (
     descendant_pids,
-    is_init,
     is_stopped,
     kill_descendants,
     kill_tree,
+    pid_within,
     reap,
     remove_orphaned_segments,
 )
 from grader.run.process.guard import Guard
 from grader.run.process.output import OutputReader
 from grader.run.process.process_sandbox import ProcessSandbox, SandboxedProcess
+from grader.sandbox.seccomp import INIT, LEADER
 
 _AFTERMATH_S = 0.5
 _STOP_TICK_S = 0.005
@@ -61,26 +62,30 @@ class _Running:
     seen_fd: int | None
     pause_fd: int | None
     exited_ns: int | None = None
-    killed_ns: int | None = None
+    asked: Stopwatch | None = None
+    """Since it was sent the first signal to end."""
     stopped_by: str = "itself"
     stop_s: float | None = None
     suspended_ns: int | None = None
-    is_ended: bool = False
+    stopped: Collection[int | None] = ()
+    """What was killed because a signal had stopped it: ids in the sandbox, INIT for itself."""
 
     def end_if_suspended(self) -> None:
         """Kill it if a signal such as SIGSTOP stopped it some time ago: it would wait for ever."""
         init = self.popen.init
         own = (self.popen.pid, *([] if init is None else (init, *descendant_pids(init))))
-        if not any(map(is_stopped, own)):
+        stopped = list(filter(is_stopped, own))
+        if not stopped:
             self.suspended_ns = None
         elif self.suspended_ns is None:
             self.suspended_ns = time.time_ns()
         elif time.time_ns() - self.suspended_ns > _SUSPENDED_NS:
-            self.is_ended = True
+            self.stopped = {INIT if pid == self.popen.pid else pid_within(pid) for pid in stopped}
             kill_tree(self.popen.pid)
 
-    def signal(self, number: signal.Signals) -> None:
+    def signal(self, number: signal.Signals, meter: DisturbanceMeter) -> None:
         """Send a signal to its process group, if that is still there."""
+        self.asked = self.asked or Stopwatch(meter)
         with contextlib.suppress(ProcessLookupError):
             self.stopped_by = number.name
             self.popen.signal_group(number)
@@ -88,7 +93,7 @@ class _Running:
     @property
     def exit_code(self) -> int | None:
         """As in :mod:`subprocess`; of a process that was stopped, SIGSTOP ended it."""
-        return -signal.SIGSTOP if self.is_ended else self.popen.exit_code
+        return -signal.SIGSTOP if self.stopped else self.popen.exit_code
 
 
 class StudentProcesses:
@@ -97,9 +102,11 @@ class StudentProcesses:
     def __init__(
         self,
         output: OutputReader,
+        meter: DisturbanceMeter,
         process_sandbox: ProcessSandbox | None = None,
     ) -> None:
         self._output = output
+        self._meter = meter
         self._sandbox = process_sandbox
         self._guard: Guard | None = None
         if process_sandbox is not None:
@@ -203,8 +210,8 @@ class StudentProcesses:
                 process.end_if_suspended()
             if process.exited_ns is None and process.popen.poll() is not None:
                 process.exited_ns = time.time_ns()
-                if process.killed_ns is not None:
-                    process.stop_s = (process.exited_ns - process.killed_ns) / NS
+                if process.asked is not None:
+                    process.stop_s = process.asked.elapsed_s
         return any(process.exited_ns is None for process in self._running)
 
     def let_exit(self, name: str | None = None) -> None:
@@ -236,7 +243,7 @@ class StudentProcesses:
     def was_killed(self, name: str) -> bool:
         """Whether the newest process of this name was ended by :meth:`kill`."""
         named = [item for item in self._running if item.name == name]
-        return bool(named) and named[-1].killed_ns is not None
+        return bool(named) and named[-1].asked is not None
 
     def kill(self, name: str, number: signal.Signals) -> bool:
         """Send a signal to the process group of one process, in the middle of the run."""
@@ -244,15 +251,13 @@ class StudentProcesses:
         running = self.is_running(name)
         for process in self._running:
             if process.name == name and process.exited_ns is None:
-                process.killed_ns = process.killed_ns or time.time_ns()
-                process.signal(number)
+                process.signal(number, self._meter)
         return running
 
-    def stop(self, limits: RunLimits, meter: DisturbanceMeter) -> None:
+    def stop(self, limits: RunLimits) -> None:
         """SIGINT, SIGTERM, SIGKILL, each with a bounded wait; dates the end of each process."""
         self.resume()
         self.let_exit()
-        watch = Stopwatch(meter)
         for number, limit_s in (
             (signal.SIGINT, limits.shutdown_s),
             (signal.SIGTERM, limits.terminate_s),
@@ -262,19 +267,10 @@ class StudentProcesses:
                 break
             for process in self._running:
                 if process.exited_ns is None:
-                    process.signal(number)
-            step = Stopwatch(meter)
+                    process.signal(number, self._meter)
+            step = Stopwatch(self._meter)
             while self.poll() and step.elapsed_s <= limit_s:
                 time.sleep(_STOP_TICK_S)
-                self._note_stop(watch.elapsed_s)
-            self._note_stop(watch.elapsed_s)
-
-    def _note_stop(self, stop_s: float) -> None:
-        self.poll()
-        for process in self._running:
-            ended = process.exited_ns is not None
-            if ended and process.stopped_by != "itself" and process.stop_s is None:
-                process.stop_s = stop_s
 
     def clean_up(self) -> None:
         """Kill all remaining processes and remove what they left in shared memory."""
@@ -282,7 +278,7 @@ class StudentProcesses:
         deadline = time.monotonic() + _AFTERMATH_S
         while not self.poll() and descendant_pids(os.getpid()) and time.monotonic() < deadline:
             time.sleep(0.01)
-        inits = {pid for pid in descendant_pids(os.getpid()) if is_init(pid)}
+        inits = {pid for pid in descendant_pids(os.getpid()) if pid_within(pid) == INIT}
         self._survivors = tuple(
             command
             for pid, command in kill_descendants(os.getpid()).items()
@@ -301,22 +297,26 @@ class StudentProcesses:
             f"{' '.join(self._output.tail(process.name, 'stderr', 1)) or 'no message'}"
             for process in self._running
             if process.stopped_by == "itself"
-            and not process.is_ended
+            and not process.stopped
             and not process.popen.was_set_up
         )
 
     def ended_from_outside(self, breaches: Sequence[Breach]) -> str | None:
         """A sentence if something outside of its sandbox killed or stopped a process, or None.
 
-        Within one only its own processes can send a signal, and the guard sees that.
+        From within none can stop what holds the sandbox. What was started in it can be stopped in
+        ways that the guard sees, and what that has started in others too: by a terminal of its
+        own, or by the end of its parent.
         """
+        if breaches or self._guard is None:
+            return None
         # A sandbox's own processes end with the status of what was started in it.
         sandboxes = {pid for one in self._running for pid in (one.popen.pid, one.popen.init)}
-        if breaches or self._guard is None or self._guard.can_have_ended(sandboxes):
-            return None
+        outside = {INIT} if self._guard.can_have_ended(sandboxes) else {INIT, LEADER}
         for process in self._running:
             code = process.exit_code
-            if process.stopped_by == "itself" and code in (-signal.SIGKILL, -signal.SIGSTOP):
+            ended = {LEADER} if code == -signal.SIGKILL else set(process.stopped)
+            if process.stopped_by == "itself" and code is not None and outside & ended:
                 name = signal.Signals(-code).name
                 return f"{process.name} got {name} from outside its sandbox during the run"
         return None

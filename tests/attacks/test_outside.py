@@ -1,0 +1,47 @@
+"""A signal that comes from outside of a sandbox is the machine's, whatever it hits."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from pathlib import Path
+
+import pytest
+
+from grader.batch.grading import Grading
+from grader.run.process.descendants import descendants
+from grader.run.process.process_sandbox import WORKSPACE
+from tests.attacks.submissions import write_submission
+
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize(
+    ("number", "hits_sandbox"), [(signal.SIGKILL, False), (signal.SIGSTOP, True)]
+)
+def test_a_signal_from_outside_costs_no_points(
+    grading: Grading, tmp_path: Path, number: signal.Signals, hits_sandbox: bool
+) -> None:
+    over = threading.Event()
+
+    def strike() -> None:
+        while not over.wait(0.1):
+            for pid, line in descendants(os.getpid()).items():
+                # Where it is built, there is no such place.
+                runs = f" {WORKSPACE}/" in line and line.endswith("/bot_pub")
+                if runs and line.startswith("bwrap") is hits_sandbox:
+                    os.kill(pid, number)
+
+    thread = threading.Thread(target=strike)
+    thread.start()
+    try:
+        graded = grading.grade(write_submission(tmp_path / "ana"), tmp_path / "out")
+    finally:
+        over.set()
+        thread.join()
+    assert graded.recordings, graded.prepared.record.build
+    assert not graded.grade.graded
+    (fault,) = graded.recordings["run"].faults
+    assert fault.endswith(f"got {number.name} from outside its sandbox during the run")
