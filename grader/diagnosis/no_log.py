@@ -295,8 +295,8 @@ def wrong_sign_or_unit(symptom: NotLogged) -> Cause | None:
     return Cause(
         f"log lines follow messages on {code(symptom.topic)}, but {code(path)} in them {words}: "
         f"{quote(line.text)}",
-        f"Log the value as it is in the message: {code(f'msg.{path}')} is in metres, radians and "
-        "seconds (REP-103).",
+        f"Log {code(f'msg.{path}')} as it is in the message: ROS has metres, seconds and radians "
+        "(REP-103).",
         symptom.evidence(line),
     )
 
