@@ -17,7 +17,7 @@ from grader.submission.prepare import Prepared, prepare
 from tests.checks.builder import judge
 from tests.submission.samples import MANIFEST, Tree
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(600)]
 
 FOLDER = "src/bot_publisher"
 CMAKE = """\

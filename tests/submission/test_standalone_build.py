@@ -162,6 +162,7 @@ for place in os.environ['PYTHONPATH'].split(':'):
 """
 
 
+@pytest.mark.timeout(600)
 @pytest.mark.compiles
 @pytest.mark.ros
 @pytest.mark.slow
