@@ -199,3 +199,11 @@ def test_a_server_that_ends_is_the_cause_even_on_a_busy_machine(check, run, word
     found = failing(f"action.{check}", run, **(RESULT if check == "result" else FIB))
     assert words in found
     assert "SIGABRT (abort)" in found
+
+
+def test_an_action_that_is_gone_before_it_took_a_goal_is_not_offered():
+    gone = (replace(action(), vanished_ns=at(0.9)),)
+    found = failing("action.exists", acting(services=gone), **FIB)
+    assert "the action `/fibonacci` was destroyed 0.90 s after launch" in found
+    used = acting(goal(time_s=0.5), services=gone)
+    assert judge("action.exists", used, **FIB).status is Status.PASSED

@@ -1,5 +1,7 @@
 """service.*: there, answering as it must, and during slow calls."""
 
+from dataclasses import replace
+
 import pytest
 
 from grader.findings.finding import Status
@@ -7,6 +9,7 @@ from grader.recording.model import Ending
 from tests.checks.builder import (
     NODE,
     SOURCE,
+    at,
     call,
     declared,
     died,
@@ -49,6 +52,20 @@ class TestExists:
         found = failing("service.exists", run, service="/enable", type=SET_BOOL)
         assert "has the type `std_srvs/srv/Trigger`" in found
         assert "`from std_srvs.srv import SetBool`" in found
+
+    def test_one_that_is_gone_before_it_answered_anything_is_not_offered(self):
+        gone = {"services": (replace(service(), vanished_ns=at(0.9)),)}
+        unanswered = asked(answer_s=None, error="no server")
+        found = failing("service.exists", serving(unanswered, **gone), **ENABLE)
+        assert "the service `/enable` was destroyed 0.90 s after launch" in found
+        # A lifecycle node may be asked to destroy it, and what ends with its process is no loss.
+        for run in (
+            serving(asked(0.5), **gone),
+            serving(asked(0.5, name="/bot_publisher/change_state"), **gone),
+            serving(**gone, processes=(died(0, 0.9),), ending=Ending.EXITED),
+            serving(services=(replace(service(), vanished_ns=at(4.2)),)),
+        ):
+            assert judge("service.exists", run, **ENABLE).status is Status.PASSED
 
     def test_parameter_services_are_not_offered_as_what_there_is(self):
         run = serving(services=(service("/bot_publisher/get_parameters"),))
