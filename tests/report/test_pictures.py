@@ -28,7 +28,7 @@ from grader.report.html.report import Gallery, build_lines
 from grader.report.model.target import targets
 from grader.submission.record import BuildRecord, SourceError
 from sim.motion import Pose
-from tests.checks.builder import drive, endpoint, node, on_odometry, reader, recording
+from tests.checks.builder import drive, endpoint, node, on_odometry, output, reader, recording
 from tests.report.gallery import CALLS, CASES, DEFINITION, ahead_until
 from tests.report.page import description, is_finite, marks, of_class, words
 from tests.report.sample import at, make_run
@@ -144,6 +144,14 @@ class TestTimeline:
         assert "SIGKILL from the scenario 1.50 s" in shown
         assert "to /chatter 4 messages sent" in shown
         assert "limits of the sandbox reached: memory" in shown
+
+    def test_a_traceback_after_our_own_ctrl_c_is_no_cross(self):
+        shown = {}
+        for time_s in (1.5, 1.9):
+            log = output("Traceback (most recent call last):\nKeyboardInterrupt", time_s=time_s)
+            run = recording(log=log, stop_s=1.8, end_s=2.0)
+            shown[time_s] = words(draw_timeline(run, (), "t").wide)
+        assert "2 lines, 1 error" in shown[1.5] and "error" not in shown[1.9]
 
     def test_errors_in_the_output_are_crosses(self, stopped):
         svg = draw_timeline(stopped, (), "t").wide
