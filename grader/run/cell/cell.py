@@ -125,8 +125,8 @@ class Cell:
             ending = self._observe()
             self._probe.recording = False
             stop_ns = time.time_ns()
-            pauses = self._pause() if self._order.pauses and not self._all_ended() else ()
             self._player.finish()
+            pauses = self._pause() if self._order.pauses and not self._all_ended() else ()
             if self._robot is not None:
                 self._robot.stop()
             tell("stopping")
@@ -150,8 +150,8 @@ class Cell:
         found = (machine_faults.clock_was_set(), ended)
         self._faults += [fault for fault in found if fault is not None]
         others = ", ".join(map(str, self._other_domains))
-        called = (*self._probe.calls, *self._context.calls.calls)
-        calls = [call for call in called if call.requested_ns <= stop_ns]
+        calls = [call for call in self._probe.calls if call.requested_ns <= stop_ns]
+        calls += self._context.calls.calls
         return Recording(
             scenario=self._order.scenario,
             seed=self._order.seed,
@@ -401,6 +401,8 @@ class Cell:
                 self._find_foreign()
                 _raise_if_abandoned()
             self._exit_barrier.give()
+            if not self._probe.recording:
+                continue
             self._player.tick()
             if self._later:
                 self._launch((time.time_ns() - self._launched_ns) / NS)
