@@ -74,6 +74,7 @@ def a_recording(**changes: object) -> Recording:
         stop_ns=9_000,
         end_ns=9_500,
         submission=SubmissionRecord(
+            bags=(),
             id="ada",
             sha256="ab" * 32,
             packages=(PACKAGE,),
