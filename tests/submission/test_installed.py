@@ -128,6 +128,7 @@ def test_links_to_the_sources_or_to_nothing_go_and_cost_nothing(tmp_path: Path) 
     (install / "lib/x.yaml").symlink_to(sources / "x.yaml")
     (install / "lib/gone.yaml").symlink_to("/home/student/ros2_ws/src/gone.yaml")
     (install / "lib/nothing.sh").symlink_to("nothing")
+    (install / "lib/long.sh").symlink_to("a" * 300)
     assert tidy(install, sources, most_bytes=10**6, most_files=10) is None
     assert list((install / "lib").iterdir()) == []
 

@@ -106,3 +106,13 @@ def test_a_missing_comma_between_entry_points_is_found_with_its_line() -> None:
 def test_an_empty_setup_py_is_called_empty() -> None:
     (error,) = read_setup(b"\n", "bot").refused
     assert str(error) == "bot/setup.py: the file is empty"
+
+
+@pytest.mark.parametrize(
+    "scripts",
+    ["['', 'talk = bot.talk:main']", "'talk = bot.talk:main\\n# more\\nhear = bot.hear:main'"],
+)
+def test_what_setuptools_takes_is_not_refused(scripts: str) -> None:
+    found = setup(f"setup(entry_points={{'console_scripts': {scripts}}})")
+    assert not found.refused
+    assert found.entry_points[0].name == "talk"

@@ -14,8 +14,9 @@ FD = int(os.environ.get("ROSGRADE_TRACER_FD", "-1"))
 SEEN_FD = int(os.environ.get("ROSGRADE_SEEN_FD", "-1"))
 PAUSE_FD = int(os.environ.get("ROSGRADE_PAUSE_FD", "-1"))
 HELD_TOPICS = frozenset(filter(None, os.environ.get("ROSGRADE_HOLD", "").split(":")))
-# As ROS installs programs: PREFIX/lib/PACKAGE/PROGRAM.
-INSTALL = os.path.dirname(os.path.dirname(os.path.dirname("".join(sys.orig_argv[1:2]))))
+# As ROS installs programs: PREFIX/lib/PACKAGE/PROGRAM. `ros2` itself is PREFIX/bin/ros2.
+_LIB = os.path.dirname(os.path.dirname("".join(sys.orig_argv[1:2])))
+INSTALL = os.path.dirname(_LIB) if _LIB.endswith("/lib") else ""
 LEAST_THREADS = 4
 THRESHOLDS = gc.get_threshold()
 _PREFIXES = ("ROS_", "RMW_", "FASTDDS_", "FASTRTPS_", "CYCLONEDDS_")

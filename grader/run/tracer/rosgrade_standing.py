@@ -37,6 +37,10 @@ class _Since:
         self.began_ns = now_ns
         self.next_ns = now_ns + _LONG_NS
 
+    def __call__(self, *_: object) -> _Since:
+        """Let a debugger of the program's, which calls it at each line, go on."""
+        return self
+
 
 def watch() -> None:
     """Begin to look, once in a process; a child of it has no such thread."""
@@ -68,7 +72,11 @@ def _tell(innermost: FrameType) -> None:
         frames.insert(0, frame)
         frame = frame.f_back
     files = [one.f_code.co_filename for one in frames]
-    own = [n for n, file in enumerate(files) if file.startswith(f"{INSTALL}/")]
+    own = [
+        n
+        for n, file in enumerate(files)
+        if file.startswith(f"{INSTALL}/") and "/rclpy/" not in file
+    ]
     by_ros = next((n for n, file in enumerate(files) if "/rclpy/" in file), len(files))
     called = [n for n in own if n > by_ros]
     spins = own and any(file.endswith("/rclpy/executors.py") for file in files[own[-1] :])
@@ -77,7 +85,7 @@ def _tell(innermost: FrameType) -> None:
     path = [frames[n] for n in called or own]
     call, now_ns = path[0] if called else _looping(path)[0], time.time_ns()
     if call.f_trace is None:
-        call.f_trace = _Since(now_ns)  # type: ignore[assignment]
+        call.f_trace = _Since(now_ns)
     since = call.f_trace
     if not isinstance(since, _Since) or now_ns < since.next_ns:
         return

@@ -132,11 +132,11 @@ def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> s
             if stat.S_ISLNK(status.st_mode):
                 end = os.path.realpath(path)
                 if not f"{end}/".startswith(f"{base}/"):
-                    if Path(end).exists() and not f"{end}/".startswith(f"{own}/"):
+                    if _exists(end) and not f"{end}/".startswith(f"{own}/"):
                         target = str(path.readlink())
                         planted.append(f"{_named(path, install)}, a link out to {target!r}")
                     path.unlink()
-                elif not Path(end).exists():
+                elif not _exists(end):
                     path.unlink()
                 elif path.readlink().is_absolute():
                     path.unlink()
@@ -153,6 +153,14 @@ def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> s
         shutil.rmtree(install)
         return f"the build installed {min(planted)}"
     return None
+
+
+def _exists(path: str) -> bool:
+    """Whether a path leads to something; it may be one that no file system can have."""
+    try:
+        return Path(path).exists()
+    except OSError:
+        return False
 
 
 def _named(path: Path, install: Path) -> str:

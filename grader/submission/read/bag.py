@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 from pydantic import TypeAdapter
 
 from grader.errors import GraderFault
+from grader.out_of_memory import oom_kills
 from grader.ros import RosInstallation
 from grader.sandbox.limits import BUILD, size_words
 from grader.sandbox.usage import Usage, folder_usage
@@ -69,6 +70,7 @@ def _read(root: Path, folder: str, ros: RosInstallation, sandbox: Sandbox | None
     path = shown(folder)
     scratch = root.with_name("bag")
     scratch.mkdir()
+    kills = oom_kills()
     try:
         outcome = _run(root, root / folder, scratch, ros, sandbox)
     finally:
@@ -77,7 +79,10 @@ def _read(root: Path, folder: str, ros: RosInstallation, sandbox: Sandbox | None
         raise GraderFault(f"the bag {path} was not read within {_WALL_S:.0f} s")
     if outcome.ended_by_us:
         return BagRecord(path, f"it cannot be read: {outcome.ended_by_us}")
-    if outcome.status in (-signal.SIGXCPU, -signal.SIGKILL):
+    # bubblewrap ends as a shell does: 128 and the signal.
+    if abs(outcome.status or 0) % 128 in (signal.SIGXCPU, signal.SIGKILL):
+        if kills != oom_kills():
+            raise GraderFault(f"this machine ran out of memory while the bag {path} was read")
         return BagRecord(path, f"it cannot be read within {_CPU_S} s of CPU time")
     try:
         found = _RECORD.validate_python({"path": path, **json.loads(outcome.output)})

@@ -82,15 +82,23 @@ def read_setup(
             keywords = {}
     groups = keywords.get("entry_points")
     scripts = groups.get(_GROUP) if isinstance(groups, dict) else None
-    texts = [one for one in scripts if isinstance(one, _Text)] if isinstance(scripts, list) else []
-    entries = [parse_entry_point(one, file, one.line) for one in texts]
+    # setuptools takes lines of a text as well, leaves out empty ones and comments.
+    texts = scripts if isinstance(scripts, list) else [scripts]
+    lines = [
+        (line.strip(), text.line)
+        for text in texts
+        if isinstance(text, _Text)
+        for line in text.splitlines()
+        if line.strip() and not line.strip().startswith("#")
+    ]
+    entries = [parse_entry_point(line, file, number) for line, number in lines]
     name = keywords.get("name")
     return Setup(
         str(name) if isinstance(name, _Text) else None,
         tuple(entry for entry in entries if entry is not None),
         tuple(
-            SourceError(file, text.line, _refusal(text))
-            for text, entry in zip(texts, entries, strict=True)
+            SourceError(file, number, _refusal(line))
+            for (line, number), entry in zip(lines, entries, strict=True)
             if entry is None
         ),
     )
