@@ -154,7 +154,7 @@ def test_a_fault_of_the_student_is_not_run_again(grade: Grade) -> None:
 
 
 def test_a_disturbed_run_is_repeated_alone(grade: Grade) -> None:
-    disturbed = recording(stop_s=2.5, stolen_s=3.0)
+    disturbed = recording(stop_s=2.5, stolen_s=4.6)
     graded, runner = grade(disturbed, recording())
     assert graded.grade.full_points
     assert runner.alone == [False, True]
@@ -300,7 +300,7 @@ def test_a_failure_of_a_robot_that_the_host_held_up_counts_if_it_happens_again(
 
 
 def test_after_three_disturbed_runs_it_is_not_graded_and_costs_nothing(grade: Grade) -> None:
-    disturbed = recording(stop_s=2.5, stolen_s=3.0)
+    disturbed = recording(stop_s=2.5, stolen_s=4.6)
     graded, runner = grade(disturbed, disturbed, disturbed)
     assert not graded.grade.graded
     assert graded.grade.result("ends").status is Status.ERROR
