@@ -97,6 +97,11 @@ def test_a_contact_is_recorded_and_ends_the_run(run_node: RunNode, world: str) -
     assert (recording.truth[-1].time_ns - first.time_ns) / NS == pytest.approx(1.0, abs=0.5)
 
 
+def test_the_robot_stands_before_executors_pause(run_node: RunNode, world: str) -> None:
+    run = run_node(driver(), pauses=True, world=world, until={"elapsed": "1 s"}, timeout="15 s")
+    assert run.truth[-1].time_ns <= run.pauses[0].began_ns
+
+
 def test_commands_that_are_no_numbers_are_refused_and_noted(run_node: RunNode, world: str) -> None:
     recording = run_node(
         driver(speed="float('nan')"),

@@ -126,9 +126,10 @@ class Cell:
             self._probe.recording = False
             stop_ns = time.time_ns()
             self._player.finish()
-            pauses = self._pause() if self._order.pauses and not self._all_ended() else ()
             if self._robot is not None:
+                # With its last command it would drive on while nothing steers it.
                 self._robot.stop()
+            pauses = self._pause() if self._order.pauses and not self._all_ended() else ()
             tell("stopping")
             self._students.stop(self._order.limits)
         finally:
