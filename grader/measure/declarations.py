@@ -134,7 +134,7 @@ def queues(recording: Recording, kind: Kind, topic: str) -> tuple[DeclaredQueue,
     where it kept others.
     """
     declared = _on(recording, kind, topic)
-    kept = [item for item in declared if _destroyed(recording, item) is None]
+    kept = [item for item in declared if destroyed(recording, item) is None]
     found = []
     for item in kept or declared:
         depth = _number(item.data, "depth")
@@ -155,7 +155,7 @@ def dropped_ns(recording: Recording, kind: Kind, topic: str) -> int | None:
     """
     ends = []
     for made in _on(recording, kind, topic):
-        end = _destroyed(recording, made)
+        end = destroyed(recording, made)
         spun = [one.time_ns for one in recording.declared("spin") if _same_process(one, made)]
         # One that wait_for_message() makes and destroys.
         if end is None or made.data.get("brief") or end.data.get("brief"):
@@ -166,7 +166,7 @@ def dropped_ns(recording: Recording, kind: Kind, topic: str) -> int | None:
     return max(ends, default=None)
 
 
-def _destroyed(recording: Recording, made: Declaration) -> Declaration | None:
+def destroyed(recording: Recording, made: Declaration) -> Declaration | None:
     """What a process declared when it destroyed an endpoint, while it was observed."""
     number = made.data.get("number")
     for item in recording.declared("destroyed") if number is not None else ():

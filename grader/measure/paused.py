@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from grader.measure.declarations import destroyed
 from grader.recording.model import NS, Declaration, Recording
 
 # A callback that runs when the pause begins may still publish: in the first interval of 2.5.
@@ -28,8 +29,7 @@ def paused(recording: Recording, topic: str) -> Paused | None:
     """How the processes with a publisher on a topic paused, or None where one did not."""
     pause = recording.pauses[-1]
     # Of a process that was started again, the newest counts.
-    publishers = [one for one in recording.declared("publisher") if one.data.get("topic") == topic]
-    publish = {one.process: _who(one) for one in publishers}
+    publish = {one.process: _who(one) for one in _publishers(recording, topic)}
     began = {
         _who(one): one.time_ns
         for one in recording.declared("paused")
@@ -43,6 +43,27 @@ def paused(recording: Recording, topic: str) -> Paused | None:
     from_ns = began_ns + _GRACE * (pause.ended_ns - began_ns)
     times = pause.received.get(topic, ())
     return Paused(began_ns, pause.ended_ns, tuple(one for one in times if one > from_ns))
+
+
+def _publishers(recording: Recording, topic: str) -> list[Declaration]:
+    """Publishers on a topic of the processes that ran when the pause began.
+
+    Those that were destroyed before are left out where others are left.
+    """
+    began_ns = recording.pauses[-1].began_ns
+    left = {_who(one) for one in recording.declared("exiting") if one.time_ns < began_ns}
+    ran = {
+        one.name
+        for one in recording.processes
+        if one.exited_ns is None or one.exited_ns >= began_ns
+    }
+    found = [
+        one
+        for one in recording.declared("publisher")
+        if one.data.get("topic") == topic and one.process in ran and _who(one) not in left
+    ]
+    kept = [one for one in found if destroyed(recording, one) is None]
+    return kept or found
 
 
 def _who(declared: Declaration) -> tuple[str, str]:

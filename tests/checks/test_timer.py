@@ -11,9 +11,11 @@ from tests.checks.builder import (
     at,
     declarations,
     declared,
+    died,
     failing,
     judge,
     package,
+    process,
     recording,
     submission,
     taken,
@@ -135,3 +137,23 @@ def test_only_the_newest_of_a_process_that_was_started_again_must_pause():
     run = after_the_run()
     run = replace(run, declarations=(before, declared("spin", 0.2, pid=7), *run.declarations))
     assert judge("executor.timer", run, **ASKED).status is Status.PASSED
+
+
+@pytest.mark.parametrize(
+    ("ended", "processes"),
+    [
+        (declared("destroyed", 1.0, "helper/helper", number=9, pid=7), ()),
+        (declared("exiting", 1.0, "helper/helper", pid=7), ()),
+        (declared("exiting", 1.0, pid=7), ()),
+        (None, (died(-9, 1.0, "helper/helper"),)),
+    ],
+)
+def test_a_helper_that_ended_before_the_pause_need_not_pause(ended, processes):
+    name = ended.process if ended else "helper/helper"
+    about = {"topic": "/cmd_vel", "depth": 10, "number": 9, "pid": 7}
+    helper = (declared("publisher", 0.6, name, **about), declared("spin", 0.7, name, pid=7))
+    processes = (process(), *(processes or (process("helper/helper"),)))
+    run = after_the_run((), *helper, *filter(None, [ended]), processes=processes)
+    assert judge("executor.timer", run, **ASKED).status is Status.PASSED
+    still = after_the_run((), *helper, processes=(process(), process(name)))
+    assert "no executor of the process waited" in failing("executor.timer", still, **ASKED)

@@ -31,7 +31,7 @@ _KINDS = frozenset(
     }
 )
 """Kinds of declarations of a tracer; see ``tracer/sitecustomize.py``."""
-_OF_PROCESS = frozenset({"started", "leaving", "exiting"})
+_OF_PROCESS = frozenset({"started", "leaving"})
 """Kinds that count only for the process that was launched, not for those that it starts."""
 
 
