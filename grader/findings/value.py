@@ -287,8 +287,12 @@ def same(
     Raises:
         NoSuchField: The text asks nothing of a number, or names what the message does not have.
     """
-    if isinstance(wanted, Mapping):
-        return isinstance(observed, str) and says(observed, **wanted)
+    if isinstance(observed, str) and is_asked_of_text(wanted):
+        return says(observed, **wanted)
+    if isinstance(wanted, Mapping) and isinstance(observed, Mapping):
+        return wanted.keys() == observed.keys() and all(
+            same(item, observed[name], tolerance, message) for name, item in wanted.items()
+        )
     wanted_items, observed_items = _items(wanted), _items(observed)
     if wanted_items is not None and observed_items is not None:
         return len(wanted_items) == len(observed_items) and all(

@@ -140,3 +140,22 @@ def test_a_range_from_high_to_low_is_refused() -> None:
     with pytest.raises(ValueError, match="is above the highest"):
         unlike(message(), {"x": "5 .. 1"}, EXACT)
     assert not is_comparison("5 .. 1")
+
+
+@pytest.mark.parametrize(
+    ("expected", "right"),
+    [
+        ({"points": [{"x": 0.0, "y": 1}, {"x": 0.1, "y": "> 1"}]}, True),
+        ({"points": [{"x": 0.0, "y": 1.0}, {"x": 0.2, "y": 2.0}]}, False),
+        ({"points": [{"x": 0.0, "y": 1.0}]}, False),
+        ({"words": ["hello", {"contains": "WORLD"}]}, True),
+        ({"words": ["hello", {"contains": "moon"}]}, False),
+        ({"words": ["hello", {"x": 0.0}]}, False),
+    ],
+)
+def test_an_array_of_messages_or_texts_is_compared_item_by_item(
+    expected: dict[str, Any], right: bool
+) -> None:
+    points = [{"x": 0.0, "y": 1.0}, {"x": float32(0.1), "y": 2.0}]
+    observed = {"points": points, "words": ["hello", "the world"]}
+    assert (not unlike(observed, expected, EXACT)) is right
