@@ -72,20 +72,32 @@ class StudentReview(AttemptReview):
 
     def others_than(self, shown: AttemptReview, before: Collection[str]) -> list[AttemptReview]:
         """What is written about the attempts before, by their hashes, first to last."""
-        found = {id(one): one for one in map(self.of, before) if len(_content(one)) > 1}
+        found = {id(one): one for one in map(self.of, before) if one.attempt and _is_written(one)}
         found.pop(id(shown), None)
-        return list(found.values())
+        # What was about every attempt is in each that something was written about since.
+        return [
+            one.model_copy(
+                update={"comments": tuple(x for x in one.comments if x not in shown.comments)}
+            )
+            for one in found.values()
+        ]
 
     def about(self, attempt: str, **update: object) -> StudentReview:
         """The review with another text about one attempt; what is about others stays beside it."""
         now = self.of(attempt)
         changed = AttemptReview(**_content(now) | {"attempt": attempt[:_LONG_ENOUGH]} | update)
-        others = tuple(one for one in self.others if one is not now)
-        if len(others) < len(self.others):
+        others = tuple(one for one in self.others if one is not now or not one.attempt)
+        if any(one is now for one in self.others):
             return self.model_copy(update={"others": (*others, changed)})
-        if now is not self and _content(self) != {"attempt": self.attempt}:
+        # What is about every attempt stays so for the others.
+        if (now is not self or not self.attempt) and _is_written(self):
             others = (*others, AttemptReview(**_content(self)))
         return self.model_copy(update={**dict(changed), "others": others})
+
+
+def _is_written(review: AttemptReview) -> bool:
+    """Whether something is written down about an attempt."""
+    return len(_content(review)) > 1
 
 
 def _content(review: AttemptReview) -> dict[str, Any]:
