@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -74,6 +75,20 @@ def timed(recording: Recording) -> list[Run]:
         if isinstance(begin_ns, int) and isinstance(end_ns, int) and begin_ns <= end_ns:
             found.append(Run(begin_ns=begin_ns, end_ns=end_ns, **texts))
     return sorted(found, key=lambda run: run.begin_ns)
+
+
+def publishes(recording: Recording, topic: str) -> bool:
+    """Whether most of the timed runs of one callback published on a topic.
+
+    Of short runs only some are told.
+    """
+    stamps_ns = sorted(one.stamp_ns for one in recording.on(topic))
+    within: dict[tuple[str, str], list[bool]] = {}
+    for run in timed(recording):
+        if run.end_ns is not None and run.end_ns < recording.stop_ns:
+            number = bisect_right(stamps_ns, run.end_ns) - bisect_left(stamps_ns, run.begin_ns)
+            within.setdefault((run.callback, run.serves), []).append(number > 0)
+    return any(2 * sum(found) > len(found) for found in within.values())
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,12 @@ class Paused:
     ended_ns: int
     uncalled_ns: tuple[int, ...]
 
+    def covers(self, recording: Recording, topic: str) -> bool:
+        """Whether it was long enough for a message of what publishes in the rhythm of the run."""
+        times_ns = [one.received_ns for one in recording.on(topic)]
+        judged_ns = (1.0 - _GRACE) * (self.ended_ns - self.began_ns)
+        return judged_ns * max(len(times_ns) - 1, 1) >= max(times_ns) - min(times_ns)
+
     def is_doubtful(self, recording: Recording) -> bool:
         """Whether the machine may have kept a message for so long that it came too late."""
         lasted_s = (self.ended_ns - self.began_ns) / NS
@@ -29,7 +35,7 @@ def paused(recording: Recording, topic: str) -> Paused | None:
     """How the processes with a publisher on a topic paused, or None where one did not."""
     pause = recording.pauses[-1]
     # Of a process that was started again, the newest counts.
-    publish = {one.process: _who(one) for one in _publishers(recording, topic)}
+    publish = {one.process: _who(one) for one in publishers(recording, topic)}
     began = {
         _who(one): one.time_ns
         for one in recording.declared("paused")
@@ -45,7 +51,7 @@ def paused(recording: Recording, topic: str) -> Paused | None:
     return Paused(began_ns, pause.ended_ns, tuple(one for one in times if one > from_ns))
 
 
-def _publishers(recording: Recording, topic: str) -> list[Declaration]:
+def publishers(recording: Recording, topic: str) -> list[Declaration]:
     """Publishers on a topic of the processes that ran when the pause began.
 
     Those that were destroyed before are left out where others are left.

@@ -92,7 +92,7 @@ class Pause:
 
     Attributes:
         began_ns: When the processes were told; their executors follow when they wait again.
-        ended_ns: When they were stopped.
+        ended_ns: When they were stopped; no later where all had ended by themselves.
         received: Topic -> when messages on it were received meanwhile.
     """
 

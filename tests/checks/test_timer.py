@@ -14,6 +14,7 @@ from tests.checks.builder import (
     died,
     failing,
     judge,
+    messages,
     package,
     process,
     recording,
@@ -126,10 +127,66 @@ def test_the_machine_may_hold_a_message_up():
     assert (finding.status, finding.disturbed) == (Status.ERROR, True)
 
 
-def test_an_executor_of_an_unknown_kind_is_no_fault_of_the_program():
-    run = after_the_run(paused_s=None)
-    run = replace(run, declarations=tuple(one for one in run.declarations if one.kind != "spin"))
+def never_spun(run):
+    return replace(run, declarations=tuple(one for one in run.declarations if one.kind != "spin"))
+
+
+@pytest.mark.parametrize(
+    ("more", "changes"),
+    [((), {"submission": COMPILED}), ((declared("started", 0.05, language="C++"),), {})],
+)
+def test_a_compiled_executor_of_an_unknown_kind_is_no_fault_of_the_program(more, changes):
+    run = never_spun(after_the_run((), *more, paused_s=None))
+    told = tuple(one for one in run.declarations if more or one.kind != "started")
+    run = replace(run, declarations=told, **changes)
     assert judge("executor.timer", run, **ASKED).status is Status.ERROR
+
+
+def test_an_executor_in_python_that_rosgrade_does_not_know_is_none_either():
+    run = never_spun(after_the_run((), ran(1.0), paused_s=None))
+    assert judge("executor.timer", run, **ASKED).status is Status.ERROR
+
+
+def test_an_unused_timer_of_a_program_that_never_spins_earns_nothing():
+    found = failing("executor.timer", never_spun(after_the_run(paused_s=None)), **ASKED)
+    assert "rclpy.spin() was never called" in found
+
+
+def ran(began_s, lasted_s=0.01, callback="tick"):
+    times = {"began_ns": at(began_s), "ended_ns": at(began_s + lasted_s)}
+    return declared("ran", began_s, callback=callback, serves="0.3 s", pid=1, **times)
+
+
+def ended(*more):
+    """A run of a program that ended by itself, so no executor paused."""
+    pause = Pause(at(4.5), at(4.5))
+    return after_the_run((), *more, paused_s=None, processes=(died(0, 4.4),), pauses=(pause,))
+
+
+def test_a_program_that_ends_by_itself_and_never_spins_earns_nothing():
+    found = failing("executor.timer", never_spun(ended()), **ASKED)
+    assert "the program ended: rclpy.spin() was never called" in found
+
+
+def test_a_program_that_ends_by_itself_passes_where_its_callback_published():
+    run = ended(*(ran(began_s) for began_s in (0.695, 0.995, 1.595)))
+    finding = judge("executor.timer", run, **ASKED)
+    assert finding.status is Status.PASSED and "let the executor" not in finding.observed
+
+
+@pytest.mark.parametrize("runs", [(), (1.1, 2.05, 2.495)])
+def test_a_program_that_ends_by_itself_does_not_pass_on_what_it_declares(runs):
+    finding = judge("executor.timer", ended(*map(ran, runs)), **ASKED)
+    assert finding.status is Status.ERROR
+    assert "ended before it could be judged whether a callback publishes" in finding.observed
+
+
+def test_a_pause_that_is_too_short_for_the_rhythm_proves_nothing():
+    slow = {"messages": messages([0.7, 1.7, 2.7, 3.7])}
+    finding = judge("executor.timer", after_the_run(**slow), **ASKED)
+    assert finding.status is Status.ERROR and "too far apart" in finding.observed
+    called = after_the_run((), ran(0.695), ran(1.695), **slow)
+    assert judge("executor.timer", called, **ASKED).status is Status.PASSED
 
 
 def test_only_the_newest_of_a_process_that_was_started_again_must_pause():

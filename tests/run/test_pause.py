@@ -100,6 +100,15 @@ RIGHT = {
     executor.add_node(BotPublisher(lambda node: node.create_timer(0.1, node.publish)))
     executor.spin()
 """,
+    "timer_that_ends_the_program": """
+    left = ["x"] * 4
+    def publish(node):
+        node.publish()
+        left.pop()
+        if not left:
+            raise SystemExit
+    rclpy.spin(BotPublisher(lambda node: node.create_timer(0.1, lambda: publish(node))))
+""",
     "process_that_a_timer_commands": """
     if "HELPS" in os.environ:
         node = BotPublisher(lambda node: None)
@@ -183,3 +192,15 @@ def test_what_publishes_beside_a_timer_shows_from_outside(trick: str, run_node: 
         "published outside of every callback, while rosgrade let the executor call nothing"
         in finding.observed
     )
+
+
+def test_a_loop_that_ends_by_itself_earns_nothing(run_node: RunNode) -> None:
+    loop = """
+    node = BotPublisher(lambda node: node.create_timer(1.0, lambda: None))
+    for _ in range(4):
+        node.publish()
+        time.sleep(0.1)
+    rclpy.shutdown()
+"""
+    finding = judged(run_node, loop)
+    assert finding.status is Status.FAILED and "never called" in finding.observed, finding

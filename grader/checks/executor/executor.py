@@ -25,9 +25,9 @@ from grader.diagnosis.undeclared import why_undeclared
 from grader.findings.finding import Evidence, Finding, Moment, Plot
 from grader.findings.first_seen import first_seen, nodes_seen
 from grader.findings.wording import code, codes, counted
-from grader.measure import declarations
+from grader.measure import callback_runs, declarations
 from grader.measure.declarations import was_held_up
-from grader.measure.paused import paused
+from grader.measure.paused import paused, publishers
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.model import NS, Call, Kind, Recording
 from grader.spec.name import TopicName
@@ -322,7 +322,7 @@ def timer(recording: Recording, parameters: Timer) -> Finding | Cause:
         name = f", which calls {code(calling[0].callback)}" if calling[0].callback else ""
         created_s = recording.since_launch_s(calling[0].declared_ns)
         rest = f", and nothing was published while {_CALLED_NOTHING}"
-        seen = rest if recording.pauses else ""
+        seen = rest if recording.pauses and publishers(recording, parameters.topic) else ""
         return Finding.passed(
             parameters.asked_for,
             f"the process declared a timer of {format_duration(calling[0].period_s)}{name}{seen}",
@@ -344,18 +344,16 @@ def _why_uncalled(recording: Recording, topic: str) -> Cause | None:
     """Why it is no timer that publishes, from what came while no executor called anything."""
     found = paused(recording, topic)
     if found is None:
-        waited = "after the run no executor of the process waited for work when it was asked to"
-        if not declarations.declares(recording, "spin"):
-            return Cause(f"{waited}: rosgrade does not know its kind", ours=True)
+        return _why_not_paused(recording, topic)
+    if not found.uncalled_ns:
+        if found.covers(recording, topic) or callback_runs.publishes(recording, topic):
+            return None
         return Cause(
-            waited,
-            "Every callback must return, and rclpy.spin() must wait for the next one. Do not "
-            "replace the executor's methods, and close only the file descriptors that you opened.",
-            Evidence(moments=first_seen(recording, recording.on(topic))),
+            f"the messages on {code(topic)} are too far apart to see in the pause after the run "
+            "whether a callback publishes them",
+            ours=True,
             disturbed=was_held_up(recording),
         )
-    if not found.uncalled_ns:
-        return None
     number = counted(len(found.uncalled_ns), "message was", "messages were")
     observed = f"{number} published outside of every callback, while {_CALLED_NOTHING}"
     if found.is_doubtful(recording):
@@ -363,3 +361,42 @@ def _why_uncalled(recording: Recording, topic: str) -> Cause | None:
     when_s = recording.since_launch_s(found.uncalled_ns[0])
     moment = Moment("published outside of every callback", when_s)
     return Cause(f"{observed}: a thread or a loop calls publish()", _HINT, Evidence((moment,)))
+
+
+def _why_not_paused(recording: Recording, topic: str) -> Cause | None:
+    """Why a process that publishes did not pause, where that is not right."""
+    publish = {
+        one.process
+        for one in recording.declared("publisher")
+        if one.data.get("topic") == topic and not declarations.is_compiled(recording, one.process)
+    }
+    has_ended = not publishers(recording, topic)
+    seen = (
+        "the program ended"
+        if has_ended
+        else "after the run no executor of the process waited for work when it was asked to"
+    )
+    # An executor of another kind may call callbacks as well.
+    uncalled = [
+        one
+        for one in recording.processes
+        if one.name in publish and not declarations.declares(recording, "ran", one.name)
+    ]
+    stop_if(why_never_spun(recording, seen, processes=uncalled))
+    if has_ended:
+        if callback_runs.publishes(recording, topic):
+            return None
+        return Cause(
+            f"{seen} before it could be judged whether a callback publishes",
+            "Let rclpy.spin(node) run until Ctrl+C ends it.",
+            ours=True,
+        )
+    if not declarations.declares(recording, "spin"):
+        return Cause(f"{seen}: rosgrade does not know its kind", ours=True)
+    return Cause(
+        seen,
+        "Every callback must return, and rclpy.spin() must wait for the next one. Do not "
+        "replace the executor's methods, and close only the file descriptors that you opened.",
+        Evidence(moments=first_seen(recording, recording.on(topic))),
+        disturbed=was_held_up(recording),
+    )

@@ -40,7 +40,8 @@ _GRAPH_PERIOD_S = 0.1
 _SETTLED_GRAPH_PERIOD_S = 0.25
 _PIPES_LIMIT_S = 5.0
 _PAUSED_INTERVALS = 2.5
-_LEAST_PAUSE_S, _MOST_PAUSE_S = 0.4, 3.0
+_LEAST_PAUSE_S, _MOST_PAUSE_S = 0.4, 6.0
+_UNTIL_PAUSED_S = 3.0
 _MOST_MALFORMED = 10
 """Packets; no library sends a single one."""
 _FORGERY = "wrote into the channel through which rosgrade reports from inside a process"
@@ -129,7 +130,7 @@ class Cell:
             if self._robot is not None:
                 # With its last command it would drive on while nothing steers it.
                 self._robot.stop()
-            pauses = self._pause() if self._order.pauses and not self._all_ended() else ()
+            pauses = self._pause() if self._order.pauses else ()
             tell("stopping")
             self._students.stop(self._order.limits)
         finally:
@@ -230,6 +231,8 @@ class Cell:
         length_s = min(_PAUSED_INTERVALS * self._probe.interval_s(), _MOST_PAUSE_S)
         length_s = max(length_s, _LEAST_PAUSE_S)
         began_ns = time.time_ns()
+        if self._all_ended():
+            return (Pause(began_ns, began_ns),)
         self._students.pause()
         for watch in self._ticks():
             paused = (one for one in self._output.declarations if one.kind == "paused")
@@ -239,7 +242,7 @@ class Cell:
                 # Wakes executors that wait for nothing else.
                 for node in self._graph.nodes:
                     self._probe.call_executor(node.name, "list_parameters")
-            if since_s > length_s or watch.elapsed_s > _MOST_PAUSE_S + length_s:
+            if since_s > length_s or watch.elapsed_s > _UNTIL_PAUSED_S + length_s:
                 break
         received = {name: tuple(found) for name, found in self._probe.afterwards.items()}
         return (Pause(began_ns, time.time_ns(), received),)
