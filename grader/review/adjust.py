@@ -21,7 +21,7 @@ def adjusted(
     """A result with the points, comments and deductions as they are written down now.
 
     They replace those that the result has, so doing it twice is the same as once; the checks stay
-    as they are. Where each that could not be judged got points from a person, there is a score.
+    as they are. Where points of a person stand for each that could not be judged, there is a score.
     The manual items are those of the result: what a review says of an item that the assignment
     does not have any more is left out.
 
@@ -48,7 +48,7 @@ def adjusted(
     result = result.model_copy(update={"checks": tuple(checks)})
     points = (*manual, *_forgiven(result, of_class), *_given(result, written.given))
     if still_open(result.checks):
-        graded = not still_open(result.checks, [one.check for one in written.given])
+        graded = not still_open(result.checks, [one.check for one in written.given if one.instead])
         score = total(check.points for check in result.checks) if graded else None
         result = result.model_copy(update={"graded": graded, "score": score})
     return result.model_copy(update={"adjustments": points, "comments": tuple(comments)})
@@ -60,7 +60,7 @@ def _given(result: Result, given: Collection[Given]) -> Iterator[AdjustmentPart]
     for one in given:
         title = titles.get(one.check or "", "Points by a person")
         if one.check in left or not one.instead:
-            yield AdjustmentPart(kind="given", title=title, **one.model_dump(exclude={"instead"}))
+            yield AdjustmentPart(kind="given", title=title, **one.model_dump())
 
 
 def _scored(item: AdjustmentPart, score: ManualScore | None, key: str) -> AdjustmentPart:

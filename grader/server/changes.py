@@ -8,6 +8,7 @@ from contextlib import suppress
 from typing import Any
 
 from grader.errors import UsageError
+from grader.grade.model import still_open
 from grader.review.model import (
     AttemptReview,
     BankEntry,
@@ -43,7 +44,8 @@ def change_student(reviewed: ReviewedClass, row: ReviewedRow, sent: Any) -> None
         now = review.of(row.counts)
         changed = review.about(row.counts, manual=dict(_scores(now, row, sent, reviewed.by)))
     else:
-        changed = review.about(row.attempt, **_update(review.of(row.attempt), sent, reviewed.by))
+        update = _update(review.of(row.attempt), row, sent, reviewed.by)
+        changed = review.about(row.attempt, **update)
     store.save(changed, sent["version"])
     if sent["do"] == "comment" and sent.get("index") is None:
         _count(reviewed, sent["text"])
@@ -56,11 +58,15 @@ def _settled(row: ReviewedRow, by: str) -> Iterator[Given]:
         yield Given(points=check.max_points, reason=reason, by=by, check=check.id, instead=True)
 
 
-def _update(review: AttemptReview, sent: Any, by: str) -> dict[str, Any]:
+def _update(review: AttemptReview, row: ReviewedRow, sent: Any, by: str) -> dict[str, Any]:
     comments, index = list(review.comments), sent.get("index")
     if sent["do"] == "give":
-        check = sent.get("check") or None
-        new = Given(points=float(sent["points"]), reason=str(sent["reason"]), by=by, check=check)
+        points, check = float(sent["points"]), sent.get("check") or None
+        left = still_open(row.row.result.checks) if row.row.result else ()
+        # What is judged in the end must not count twice; a deduction is about something else.
+        instead = points >= 0 and check in {one.id for one in left}
+        reason = str(sent["reason"])
+        new = Given(points=points, reason=reason, by=by, check=check, instead=instead)
         return {"given": (*review.given, new)}
     if sent["do"] == "take":
         return {"given": tuple(one for at, one in enumerate(review.given) if at != index)}

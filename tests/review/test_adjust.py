@@ -12,7 +12,7 @@ from grader.report.model.result import result_json
 from grader.report.model.result_model import AdjustmentPart, Result
 from grader.report.model.student import for_student
 from grader.review.adjust import adjusted
-from grader.review.model import ClassReview, Comment, Forgiven, ManualScore, StudentReview
+from grader.review.model import ClassReview, Comment, Forgiven, Given, ManualScore, StudentReview
 from tests.grade.sample import Told
 from tests.report.sample import judged
 
@@ -96,3 +96,15 @@ def test_more_points_than_an_item_has_are_refused(result: Result) -> None:
     review = StudentReview(key="ana", manual={"readme": ManualScore(points=20, by="AB")})
     with pytest.raises(UsageError, match=r"ana: manual\.readme: has 20 points, but at most 2 "):
         adjusted(result, review, NOTHING)
+
+
+@pytest.mark.parametrize(("points", "instead"), [(-0.5, False), (2.0, False), (2.0, True)])
+def test_a_check_that_could_not_be_judged_is_settled_only_by_points_in_place_of_it(
+    points: float, instead: bool
+) -> None:
+    lost = judged([Told("node"), Told("x", Finding.error("a node", "a full disk"))]).result
+    given = Given(points=points, reason="seen", by="AB", check="x", instead=instead)
+    found = adjusted(lost, StudentReview(key="ana", given=(given,)), NOTHING)
+    assert found.graded is instead
+    assert found.final_score == (3.0 if instead else None)
+    assert found.settled == ({"x"} if instead else set())

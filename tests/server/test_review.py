@@ -189,19 +189,21 @@ def test_a_forgiven_cause_gives_points_back_until_that_is_taken_back(
     assert not ReviewStore(out).of_class().content.forgiven
 
 
-def leave_open(out: Path, key: str, check: str) -> None:
-    """Have a check end as an error, as on a machine that is too busy."""
+def end(out: Path, key: str, check: str, status: str = "error", points: float = 0.0) -> None:
+    """Have a check end otherwise, as after a run: an error as on a machine that is too busy."""
     file = out / "submissions" / key / RESULT_FILE
     result = json.loads(file.read_text(encoding="utf-8"))
-    result |= {"graded": False, "score": None}
     for one in result["checks"]:
         if one["id"] == check:
-            one |= {"status": "error", "points": 0.0}
+            one |= {"status": status, "points": points}
+    graded = all(one["status"] != "error" for one in result["checks"])
+    score = sum(one["points"] for one in result["checks"]) if graded else None
+    result |= {"graded": graded, "score": score}
     file.write_text(json.dumps(result), encoding="utf-8")
 
 
 def test_a_click_grades_without_a_check_that_could_not_be_judged(out: Path, client: Client) -> None:
-    leave_open(out, "ana", "print")
+    end(out, "ana", "print")
     text = client.get(page("ana")).text
     assert "5 of 6 points so far, 1 open" in text and "Give 1 point, grade without" in text
     assert "--retry" in text
@@ -222,6 +224,23 @@ def test_a_click_grades_without_a_check_that_could_not_be_judged(out: Path, clie
     assert ClassAdjustments(Ledger(out))(judged).known_score == 5.0
     assert change(client, "ana", do="take", index=0).status == 200
     assert "1 open" in client.get(page("ana")).text
+
+
+def test_points_by_hand_for_a_check_that_could_not_be_judged_count_until_it_is_judged(
+    out: Path, client: Client
+) -> None:
+    end(out, "ana", "print")
+    # A deduction is about something else: it is no judgement of the check.
+    change(client, "ana", do="give", points="-0.5", reason="shouts", check="print")
+    row = next(row for row in read_class(out) if row.id == "ana")
+    assert row.result is not None and not row.result.graded and row.result.open
+    change(client, "ana", do="give", points="1", reason="seen by hand", check="print")
+    row = next(row for row in read_class(out) if row.id == "ana")
+    assert row.result is not None and row.result.graded and not row.result.open
+    assert row.result.known_score == 5 - 0.5 + 1
+    end(out, "ana", "print", status="passed", points=1.0)
+    row = next(row for row in read_class(out) if row.id == "ana")
+    assert row.result is not None and row.result.known_score == 6 - 0.5
 
 
 def test_one_comment_reaches_all_who_made_the_mistake_once(out: Path, client: Client) -> None:

@@ -167,7 +167,8 @@ class AdjustmentPart(_Part):
     are added, so a deduction is negative, and null where a manual item waits for a person;
     ``max_points`` is what a manual item can give, else 0. ``by`` are the initials of the person,
     empty for a rule; ``item`` is the id of the manual item, ``check`` that of the check that is
-    forgiven, or that the points are about.
+    forgiven, or that the points are about; ``instead`` says that they stand for it, as long as it
+    could not be judged.
     """
 
     kind: Literal["manual", "forgiven", "given", "late", "attempts"]
@@ -178,6 +179,7 @@ class AdjustmentPart(_Part):
     by: str = ""
     check: str | None = None
     item: str | None = None
+    instead: bool = False
 
 
 class CommentPart(_Part):
@@ -264,8 +266,8 @@ class Result(_Part):
 
     @property
     def settled(self) -> frozenset[str | None]:
-        """Checks for which a person has given points, whether or not they could be judged."""
-        return frozenset(one.check for one in self.adjustments if one.kind == "given")
+        """Checks that could not be judged, for which points of a person stand."""
+        return frozenset(one.check for one in self.adjustments if one.instead)
 
     @property
     def open(self) -> tuple[CheckPart, ...]:
