@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from grader.batch.handed_in import HandedIn
 from grader.course.instant import read_time
 from grader.errors import GraderFault, UsageError
 from grader.submission.git import run_git
+from grader.submission.intake.paths import shown
 
 _COLUMNS = ("handed_in", "handed in", "submitted_at")
 NOT_KNOWN = ("", "")
@@ -47,16 +48,26 @@ def of_metadata(about: Mapping[str, Any]) -> tuple[str, str]:
     return _valid(text, "Gradescope's metadata")
 
 
-def of_canvas(folders: Iterable[Path]) -> dict[str, tuple[str, str]]:
-    """When Canvas says that each user handed in: what its API told, as the instructor kept it."""
-    times = {}
-    for file in (one for folder in folders for one in sorted(folder.glob(CANVAS_TIMES))):
+def of_canvas(
+    folder: Path, beside: Path | None, on_left_out: Callable[[str], None]
+) -> dict[str, tuple[str, str]]:
+    """When Canvas says that each user handed in: what its API told, as the instructor kept it.
+
+    ``beside`` is the folder around an archive, where files of anything else may lie too.
+    """
+    times: dict[str, tuple[str, str]] = {}
+    folders = filter(None, (folder, beside))
+    for file in (one for place in folders for one in sorted(place.glob(CANVAS_TIMES))):
         try:
-            for about in json.loads(file.read_bytes()):
-                if about.get("submitted_at"):
-                    times[str(about["user_id"])] = _iso(str(about["submitted_at"])), "Canvas"
+            told = [one for one in json.loads(file.read_bytes()) if one.get("submitted_at")]
+            times |= {
+                str(one["user_id"]): (_iso(str(one["submitted_at"])), "Canvas") for one in told
+            }
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-            raise UsageError(f"{file}: is no list of submissions of Canvas: {error!r}") from error
+            why = "is no list of submissions of Canvas"
+            if file.parent != beside:
+                raise UsageError(f"{file}: {why}: {error!r}") from error
+            on_left_out(f"{shown(file.name)} {why}, so it is left out")
     return times
 
 

@@ -64,11 +64,12 @@ def take_in(
     """Find out who handed in what, and when."""
     folder = _opened(source, staging)
     _refuse_single(folder, source)
-    times = of_canvas([folder, *([source.parent] if source.is_file() else [])])
-    entries = [
-        row.at(times.get(row.names[0], NOT_KNOWN)) if row.download else row
-        for row in _entries(folder, staging, on_left_out, out)
-    ]
+    entries = list(_entries(folder, staging, on_left_out, out))
+    if any(row.download for row in entries):
+        times = of_canvas(folder, source.parent if source.is_file() else None, on_left_out)
+        entries = [
+            row.at(times.get(row.names[0], NOT_KNOWN)) if row.download else row for row in entries
+        ]
     if not entries:
         raise UsageError(f"{source}: holds no submission; expected one folder or archive for each")
     rows = matched(entries, roster) if roster else entries

@@ -164,6 +164,27 @@ def test_canvas_says_when_something_was_handed_in(course: Path, staging: Path) -
         take_in(course, staging)
 
 
+@pytest.mark.parametrize("content", ['{"a": 1}', "[1]", "{", '[{"submitted_at": "2026-10-12"}]'])
+def test_a_foreign_file_beside_the_archive_of_a_class_refuses_nobody(
+    tmp_path: Path, staging: Path, content: str
+) -> None:
+    (tmp_path / "submissions-index.json").write_text(content)
+    (tmp_path / "submissions.json").write_text(
+        '[{"user_id": 90211, "submitted_at": "2026-10-12T22:20:00Z"}]'
+    )
+    for name in ("lopezana_90211_1_ws", "ana"):
+        with zipfile.ZipFile(tmp_path / f"{name}-class.zip", "w") as made:
+            made.write(archive(tmp_path / f"{name}.zip"), f"{name}.zip")
+    left_out: list[str] = []
+    for one, told in (("lopezana_90211_1_ws", "Canvas"), ("ana", "")):
+        (staging / one).mkdir()
+        (row,) = take_in(tmp_path / f"{one}-class.zip", staging / one, None, left_out.append)
+        assert row.handed_in_from == told
+    assert left_out == [
+        "submissions-index.json is no list of submissions of Canvas, so it is left out"
+    ]
+
+
 def test_moodle_s_folders_and_files_are_read(course: Path, staging: Path) -> None:
     ana = course / "Ana Lopez_4711_assignsubmission_file_"
     archive(ana / "my_ws.zip")
