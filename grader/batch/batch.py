@@ -99,15 +99,8 @@ class Batch:
                 elif not entry.fault:
                     paths[row.key] = row.path
             self._entries[row.key] = entry
-        for key, old in earlier.items() if self.keep else ():
-            now = self._entries.get(key, Entry(key))
-            own = old.sha256 and not (old.attempt_of or old.shared_by)
-            if own and not (now.sha256 or now.fault):
-                twin = old.same_as if old.same_as in self._entries else ""
-                self._entries[key] = replace(old, same_as=twin)
-                self._given.setdefault(key, {})
-                if twin:
-                    self._twins.setdefault(twin, []).append(key)
+        if self.keep:
+            self._keep_absent(earlier)
         self._keep_attempts(earlier)
         to_do = {key: path for key, path in paths.items() if not self._is_done(key)}
         self._refuse_changed(set(paths) - set(to_do))
@@ -214,6 +207,26 @@ class Batch:
                     row = self._entries[twin.key] = self._with_fault(twin, again)
             known = result is not None and not row.fault
             yield Done(row, self.ledger.result(twin.key) if known else None, fresh)
+
+    def _keep_absent(self, earlier: Mapping[str, Entry]) -> None:
+        """Keep the rows of students whose submission is not among those that were named now."""
+        kept, heirs = {}, dict[str, str]()
+        for key, old in earlier.items():
+            now = self._entries.get(key, Entry(key))
+            own = old.sha256 and not (old.attempt_of or old.shared_by)
+            if own and not (now.sha256 or now.fault):
+                kept[key] = old
+                self._given.setdefault(key, {})
+        self._entries |= kept
+        for key, old in kept.items():
+            original = self._entries.get(old.same_as, Entry(""))
+            if old.same_as and original.sha256 != old.sha256:
+                # It is something else by now, so the first of its twins takes its place.
+                original = self._entries[heirs.setdefault(old.same_as, key)]
+            twin = original.original if original.key != key else ""
+            self._entries[key] = replace(old, same_as=twin)
+            if twin:
+                self._twins.setdefault(twin, []).append(key)
 
     def _keep_attempts(self, earlier: Mapping[str, Entry]) -> None:
         """Keep the grades of students who handed in again, each as a row of its own."""

@@ -24,7 +24,7 @@ from grader.batch.files import REPORT_FILE, RESULT_FILE, STUDENT_FILE, write_gra
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.batch.groups import regroup, strangers
 from grader.batch.intake import take_in
-from grader.batch.ledger import Ledger
+from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import find, regrade
 from grader.batch.rendering import bring_up_to_date
 from grader.batch.roster import parse_roster
@@ -102,6 +102,10 @@ class Class:
         """Write course.yaml."""
         (self.folder / "course.yaml").write_text(text, encoding="utf-8")
 
+    def entries(self) -> dict[str, Entry]:
+        """The rows as they are written down."""
+        return {one.key: one for one in Ledger(self.out).read().entries}
+
     def hand_in(self, name: str, *packages: str, text: str = "") -> Path:
         """A folder, or a zip, with the names of packages."""
         target = self.handed / name
@@ -118,17 +122,21 @@ class Class:
             (target / file).write_text(content)
         return target
 
-    def grade(self, roster: str = "", now: datetime = NOW) -> dict[str, ClassRow]:
-        """Run a batch as the command does; the rows as everything else reads them then."""
+    def grade(
+        self, roster: str = "", now: datetime = NOW, handed: Path | None = None
+    ) -> dict[str, ClassRow]:
+        """Run a batch as the command does; the rows as everything else reads them then.
+
+        With ``handed`` go on with the class, by what is in that folder: ``rosgrade batch OUT NEW``.
+        """
         course = course_of(self.out, self.folder / "course.yaml", self.name)
         known = parse_roster(roster, "class.csv") if roster else None
         staging = self.folder / f"staging{len(list(self.folder.iterdir()))}"
         staging.mkdir()
         with Ledger(self.out).opened() as ledger:
-            batch = Batch(
-                self.loaded, ledger, course=str(course.file.resolve()) if course else None
-            )
-            _, to_do = batch.read(take_in(self.handed, staging, known, course=course))
+            place = str(course.file.resolve()) if course else None
+            batch = Batch(self.loaded, ledger, course=place, keep=handed is not None)
+            _, to_do = batch.read(take_in(handed or self.handed, staging, known, course=course))
             done: list[Done] = list(batch.grade(to_do, Reader(self.loaded)))
             write_class(bring_up_to_date(done, ledger, now), ledger)
         return {row.id: row for row in read_class(self.out)}
@@ -425,3 +433,37 @@ def test_groups_that_are_written_down_later_are_applied_by_a_report(course: Clas
     rows = reported()
     assert rows["ana"].missing and rows["cai"].score == rows["ben"].score
     assert Ledger(course.out).read().entries[1].review_key == "ben"
+
+
+ROSTER = "login\nana\nben\ncai\nzed\n"
+
+
+@pytest.mark.parametrize("roster", [ROSTER, ""])
+def test_who_handed_in_the_same_keeps_the_grade_when_the_other_hands_in_again(
+    course: Class, roster: str
+) -> None:
+    for name in ("ben", "cai", "zed"):
+        course.hand_in(name, "bot", "extra")
+    course.grade(roster)
+    assert course.entries()["zed"].same_as == "ben"
+    rows = course.grade(roster, handed=course.hand_in("wed/ben", "extra").parent)
+    assert {key: rows[key].score for key in ("ben", "cai", "zed")} == {
+        "ben": 2,
+        "cai": 10,
+        "zed": 10,
+    }
+    assert [course.entries()[key].same_as for key in ("cai", "zed")] == ["", "cai"]
+    assert rows["zed"].note == "the same submission as cai"
+    rows = course.grade(roster, handed=course.hand_in("thu/ana", "bot").parent)
+    assert [rows[key].score for key in ("ana", "ben", "cai", "zed")] == [8, 2, 10, 10]
+
+
+def test_of_two_who_are_kept_with_the_same_submission_each_still_names_the_other(
+    course: Class,
+) -> None:
+    for name in ("ben", "zed"):
+        course.hand_in(name, "bot")
+    course.grade(ROSTER)
+    rows = course.grade(ROSTER, handed=course.hand_in("wed/ana", "extra").parent)
+    assert rows["zed"].note == "the same submission as ben" and rows["zed"].score == 8
+    assert rows["ben"].note == "the same submission as zed"
