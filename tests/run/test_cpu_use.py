@@ -234,6 +234,17 @@ def test_more_hogs_than_cpus_explain_no_delay_once_they_have_started(
     assert found[-1] == last_ms
 
 
+@pytest.mark.parametrize("nodes", [3, 4, 12])
+def test_nodes_that_start_at_once_on_a_loaded_machine_wait_for_it(nodes: int) -> None:
+    """Each had 0.6 s of CPU time so far; one that goes on to compute has soon had too much."""
+    waits = Waits(cpus=2)
+    assert waits.longest_ns(0, {}) == 0
+    starting = dict.fromkeys(range(nodes), Scheduled(600 * MS, 9300 * MS))
+    assert waits.longest_ns(9900 * MS, starting) == 9300 * MS
+    spinning = dict.fromkeys(range(nodes), Scheduled(1100 * MS, 9600 * MS))
+    assert waits.longest_ns(10700 * MS, spinning) == 0
+
+
 @pytest.mark.parametrize(
     ("late_ms", "waited_ms", "length_ms", "more_ms"),
     [

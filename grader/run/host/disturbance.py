@@ -130,8 +130,8 @@ _SAMPLES_PER_LOOK = 10
 one had to wait."""
 _COMPUTES = 0.9
 """Share of its life that a thread runs or waits for a CPU, if all it does is to compute."""
-_START_NS = 2 * NS
-"""CPU time that programs need to start: 0.4 s for a node, to import rclpy and to make it."""
+_START_NS = NS
+"""CPU time that a program may need to start: a node takes 0.4 s to import rclpy and be made."""
 _TRIFLE_NS = 2_000_000
 """A wait in one sample that needs no explanation."""
 _KEPT = 100
@@ -164,7 +164,7 @@ class Waits:
     """How long threads of the submission wait for a CPU.
 
     Those that do nothing but compute, more of them than there are CPUs, would wait on any machine.
-    Once they have had more than a start needs, they explain no delay.
+    Once they have had more than their starts need, they explain no delay.
     """
 
     def __init__(self, cpus: int) -> None:
@@ -182,7 +182,7 @@ class Waits:
             if sum(one) >= _COMPUTES * (now_ns - self._born_ns[thread])
         }
         had_ns = sum(threads[thread].ran_ns for thread in computing)
-        left_out = len(computing) > self._cpus and had_ns > _START_NS
+        left_out = len(computing) > self._cpus and had_ns > _START_NS * len(computing)
         longest_ns = 0
         for thread, one in threads.items():
             before_ns = self._waited_ns.get(thread, 0)
