@@ -22,7 +22,10 @@ TARGET = 'Imported target "rclcpp::rclcpp" includes non-existent path\n\n    "{}
 NOT_READ = "CMake Error at /opt/ros/jazzy/share/rclcpp/cmake/rclcppConfig.cmake:{}:\n  {}"
 HEADER = "/opt/ros/jazzy/include/rclcpp/rclcpp.hpp:3:10: fatal error: rcl/{}: No such file"
 MODULE = 'File "/opt/ros/jazzy/lib/python3/site-packages/a.py", line 1, in <module>\n  import {0}\n'
-EXPORT = 'set_target_properties(rclcpp::rclcpp PROPERTIES X "${_IMPORT_PREFIX}/include/rclcpp")\n'
+EXPORT = """\
+set_target_properties(rclcpp::rclcpp PROPERTIES X "${_IMPORT_PREFIX}/include/rclcpp"
+  IMPORTED_LOCATION "${_IMPORT_PREFIX}/lib/librclcpp.so")
+"""
 
 
 @pytest.fixture
@@ -36,6 +39,9 @@ def whole(named_ros: RosInstallation) -> RosInstallation:
     (cmake / "rclcppExport.cmake").write_text(EXPORT)
     (cmake / "rclcppConfig.cmake").write_text('if(A)\n  include("B")\nendif()\n')
     (headers / "rcl.h").touch()
+    (prefix / "include/rclcpp/rclcpp.hpp").write_text('#include "rcl/rcl.h"\n')
+    (prefix / "lib/python3/site-packages").mkdir(parents=True)
+    (prefix / "lib/python3/site-packages/a.py").write_text("import em_\n")
     return replace(named_ros, source="sourced")
 
 
@@ -92,9 +98,22 @@ def test_what_is_damaged_is_named_and_what_is_only_printed_is_not(
         "No rule to make target '/home/ada/librclcpp.so', needed by 'bot'",
         "No rule to make target '/opt/ros/jazzy/lib/librclccp.so', needed by 'bot'",
         f"{MODULE.format('json')}ModuleNotFoundError: No module named 'json'",
+        # Words that a build file can print: no file of ROS is there that asks for what they name.
+        HEADER.format("nope.hpp"),
+        HEADER.format("nope.hpp").replace("rclcpp.hpp", "nope.hpp"),
+        HEADER.format("nope.hpp").replace("include/rclcpp", "../student"),
+        f"{MODULE.format('nope_zz')}ModuleNotFoundError: No module named 'nope_zz'",
+        f"{MODULE.format('em_')}ModuleNotFoundError: No module named 'em_'".replace("a.py", "b.py"),
+        NOT_READ.format(2, "Parse error.  Expected").replace("rclcppConfig", "nope"),
+        "/usr/bin/ld: /opt/ros/jazzy/lib/librclcpp__nope.so: file truncated",
+        "No rule to make target '/opt/ros/jazzy/lib/librclcpp__nope.so', needed by 'bot'",
     ],
 )
-def test_a_students_own_path_is_no_damage(whole: RosInstallation, log: str) -> None:
+def test_a_students_own_path_or_words_are_no_damage(
+    whole: RosInstallation, tmp_path: Path, log: str
+) -> None:
+    (tmp_path / "student").mkdir()
+    (tmp_path / "student/rclcpp.hpp").write_text('#include "rcl/nope.hpp"\n')
     assert damaged(log, whole, ()) == set()
 
 

@@ -9,7 +9,7 @@ import hashlib
 import importlib.util
 import os
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 from grader.ros import RosInstallation
@@ -18,6 +18,8 @@ from grader.submission.read.rosdistro import PACKAGES
 from grader.tree import listing
 
 _FILE = rf"(?P<file>{ROS}/[^\s:'\"]+)"
+# One that was read, so that it is there.
+_READ = _FILE.replace("file", "read")
 _DAMAGE = tuple(
     re.compile(pattern)
     for pattern in (
@@ -25,13 +27,13 @@ _DAMAGE = tuple(
         r"references the file)\s+\"(?P<named>/[^\"]+)\"",
         rf"No rule to make target '{_FILE}', needed by",
         rf"'{_FILE}', needed by '[^']+', missing and no known rule",
-        rf"{_FILE}: file (?:not recognized|truncated)",
-        rf"(?:CMake Error at|Error in cmake code at)\s+{_FILE}:\d+(?: \(\w+\))?:\s+"
+        rf"{_READ}: file (?:not recognized|truncated)",
+        rf"(?:CMake Error at|Error in cmake code at)\s+{_READ}:\d+(?: \(\w+\))?:\s+"
         r"(?:Parse error|A logical block|Flow control|include could not)",
         rf"CMake Error at {ROS}/\S+ \(find_package\):\s+By not providing \"Find(?P<package>[\w-]+)",
         rf"CMake Error at {ROS}/\S+ \(include\):\s+include could not find [\w ]+:\s+{_FILE}",
-        rf"{ROS}/[^\s:]+:\d+:\d+: fatal error: (?P<header>[\w./+-]+): No such file",
-        rf"File \"{ROS}/[^\"]+\", line \d+, in .*\n(?:.*\n)?"
+        rf"{_READ}:\d+:\d+: fatal error: (?P<header>[\w./+-]+): No such file",
+        rf"File \"{_READ}\", line \d+, in .*\n(?:.*\n)?"
         r"ModuleNotFoundError: No module named '(?P<module>\w+)",
     )
 )
@@ -66,7 +68,7 @@ def _name(found: dict[str, str | None]) -> str:
     """The package of ROS that the log speaks of, or a module; nothing for the student's own."""
     if found.get("module"):
         return found["module"] or ""
-    owner = _OWNER.search(found.get("file") or "")
+    owner = _OWNER.search(found.get("file") or found.get("read") or "")
     header = (found.get("header") or "").partition("/")[0]
     name = found.get("package") or header or (owner and (owner[1] or owner[2])) or ""
     return name if name in PACKAGES else ""
@@ -74,17 +76,24 @@ def _name(found: dict[str, str | None]) -> str:
 
 def _is_damaged(found: dict[str, str | None], ros: RosInstallation) -> bool:
     prefixes = [*ros.underlays, *ros.prefixes]
+    read = [path for at in prefixes if (path := _below(at, found.get("read"))).is_file()]
     if header := found.get("header"):
         # One that is there was only not looked for: the submission links too little.
         package = header.partition("/")[0]
         places = (place for at in prefixes for place in (at / "include", at / "include" / package))
-        return not any((place / header).is_file() for place in places)
+        there = any((place / header).is_file() for place in places)
+        return not there and _has(read, rf'#\s*include\s*[<"]{re.escape(header)}[>"]')
     if module := found.get("module"):
         there = any(any(site.glob(f"{module}*")) for site in ros.site_packages)
-        return not there and importlib.util.find_spec(module) is None
+        there = there or importlib.util.find_spec(module) is not None
+        return not there and _has(read, rf"(?:import|from)\b.*\b{module}\b")
+    if found.get("read"):
+        return bool(read) and all(map(_is_broken, read))
     if file := found.get("file"):
-        places = (at / file.removeprefix(f"{ROS}/") for at in prefixes)
-        return all(map(_is_broken, places))
+        # A library that no package of ROS speaks of is wanted by the submission alone.
+        exports = (one for at in prefixes for one in at.glob("share/*/cmake/*.cmake"))
+        wanted = not file.endswith(".so") or _has(exports, rf".*/{re.escape(Path(file).name)}\b")
+        return wanted and all(_is_broken(_below(at, file)) for at in prefixes)
     folders = [at / "share" / (found["package"] or "") / "cmake" for at in prefixes]
     if not (named := found.get("named")):
         return not any([*at.glob("*[Cc]onfig.cmake")] for at in folders)
@@ -93,6 +102,17 @@ def _is_damaged(found: dict[str, str | None], ros: RosInstallation) -> bool:
     written = (named, named.replace(ROS, "${_IMPORT_PREFIX}"))
     texts = [path.read_text(errors="replace") for at in folders for path in at.glob("*.cmake")]
     return any(name in text for name in written for text in texts)
+
+
+def _below(prefix: Path, named: str | None) -> Path:
+    """Where a file of ROS is here, by its name in a log; never outside of the installation."""
+    return prefix / os.path.normpath(f"/{(named or '').removeprefix(ROS)}").lstrip("/")
+
+
+def _has(files: Iterable[Path], line: str) -> bool:
+    """Whether one of them has a line that begins so."""
+    begins = re.compile(rf"^\s*{line}", re.MULTILINE)
+    return any(begins.search(file.read_text(errors="replace")) for file in files)
 
 
 def _is_broken(file: Path) -> bool:
