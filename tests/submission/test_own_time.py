@@ -58,6 +58,20 @@ def test_the_pressure_on_disks_is_read_where_the_kernel_tells(tmp_path: Path) ->
     assert stalled_s(file) == 1.5
 
 
+@pytest.mark.parametrize(
+    ("wall_s", "own_s"), [pytest.param(9, 0, id="waits"), pytest.param(21, 11, id="writes on")]
+)
+def test_a_program_that_keeps_the_disks_busy_itself_has_twice_its_time(
+    monkeypatch: pytest.MonkeyPatch, wall_s: int, own_s: float
+) -> None:
+    looks = (Look(second, idle_s=second, stalled_s=second, does="D") for second in range(99))
+    monkeypatch.setattr(OwnTime, "_look", lambda *_: next(looks))
+    clock = OwnTime(disk_s=10)
+    for _ in range(wall_s):
+        clock.look((), 0.0)
+    assert (clock.wall_s, clock.own_s) == (wall_s, own_s)
+
+
 @pytest.fixture
 def crowded() -> Iterator[int]:
     """A CPU that eight other processes want, too."""

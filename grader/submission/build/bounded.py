@@ -104,7 +104,8 @@ def run_bounded(
     """Run a command and wait until it and everything that it started is gone.
 
     Args:
-        wall_s: Most wall time, less what the machine takes of it: see :class:`OwnTime`.
+        wall_s: Most wall time, less what the machine takes of it: see :class:`OwnTime`. Stalls of
+            disks are taken off up to as much again.
         excess: Called several times a second with what all its processes take; names the limit
             that was passed, which ends the command.
 
@@ -114,7 +115,7 @@ def run_bounded(
     limits = output or OutputLimits()
     kept = CappedOutput(limits, on_line)
     started = time.monotonic()
-    clock = OwnTime()
+    clock = OwnTime(disk_s=wall_s)
     with _supervised(command, cwd, environment) as process:
         ended_by_us = _drain(process, kept, _watch(process, clock, wall_s, excess))
     return Outcome(

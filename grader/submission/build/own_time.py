@@ -7,6 +7,7 @@ processes are on the CPUs, they wait for each other.
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import time
@@ -45,8 +46,12 @@ class Look:
     does: str = ""
 
 
-def taken_s(before: Look, after: Look, cpus: int) -> float:
-    """How much of the time between two looks the machine took from a program."""
+def taken_s(before: Look, after: Look, cpus: int, disk_s: float = math.inf) -> float:
+    """How much of the time between two looks the machine took from a program.
+
+    Args:
+        disk_s: How much of it may be stalls of disks, at most.
+    """
     wall_s = after.time_s - before.time_s
     ran_s = max(0.0, after.used_s - before.used_s)
     # This process was held up, and saw nothing of what the program did meanwhile.
@@ -56,7 +61,7 @@ def taken_s(before: Look, after: Look, cpus: int) -> float:
         others_s = cpus * wall_s - ran_s - idle_s - after.unseen * wall_s
         explained_s += max(0.0, others_s) + after.throttled_s - before.throttled_s
     if "D" in after.does:
-        explained_s += after.stalled_s - before.stalled_s
+        explained_s += min(disk_s, after.stalled_s - before.stalled_s)
     return max(0.0, min(wall_s - ran_s, explained_s))
 
 
@@ -69,8 +74,13 @@ class OwnTime:
         computed_s: CPU time of all processes of the program.
     """
 
-    def __init__(self) -> None:
-        """Start it."""
+    def __init__(self, disk_s: float) -> None:
+        """Start it.
+
+        Args:
+            disk_s: How long it stands still for disks, at most: nothing says who keeps them busy.
+        """
+        self._disk_s = disk_s
         self.wall_s = self.own_s = self.computed_s = 0.0
         self._cpu = OrphanCpu()
         self._idle = IdleCpu()
@@ -81,7 +91,9 @@ class OwnTime:
         now = self._look(usages, late_s)
         wall_s = now.time_s - self._last.time_s
         self.wall_s += wall_s
-        self.own_s += wall_s - taken_s(self._last, now, self._idle.cpus)
+        self.own_s += wall_s - taken_s(self._last, now, self._idle.cpus, self._disk_s)
+        if "D" in now.does:
+            self._disk_s = max(0.0, self._disk_s - (now.stalled_s - self._last.stalled_s))
         self.computed_s, self._last = now.used_s, now
 
     def _look(self, usages: Sequence[Usage], late_s: float) -> Look:
