@@ -12,10 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from grader.measure.compatibility import STRENGTH
-from grader.recording.model import Declaration, Kind, Process, Qos, Recording
+from grader.recording.model import NS, Declaration, Kind, Process, Qos, Recording
 
 # Announcements are repeated: only a machine that is busy for longer makes all of them get lost.
 _LOST_S = 0.5
+# What only a function's own variables hold is gone sooner.
+_MOMENT_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -151,7 +153,8 @@ def dropped_ns(recording: Recording, kind: Kind, topic: str) -> int | None:
     """When a process had lost the last of its endpoints on a topic as soon as they were made.
 
     A constructor or a callback destroys what only its own variables hold when it returns. What was
-    made before the executor spun, and is destroyed afterwards, was kept and ended on purpose.
+    made before the executor spun, and is destroyed afterwards, was kept and ended on purpose; so
+    was what lived for longer.
     """
     ends = []
     for made in _on(recording, kind, topic):
@@ -162,8 +165,26 @@ def dropped_ns(recording: Recording, kind: Kind, topic: str) -> int | None:
             return None
         if any(made.time_ns < one < end.time_ns for one in spun[:1]):
             return None
+        if _lived_s(recording, made, end) > _MOMENT_S:
+            return None
         ends.append(end.time_ns)
     return max(ends, default=None)
+
+
+def _lived_s(recording: Recording, made: Declaration, end: Declaration) -> float:
+    """How long the program had an endpoint, without what the tracer and the machine waited."""
+    held, leaving = (
+        [
+            one.time_ns
+            for one in recording.declared(kind)
+            if _same_process(one, made)
+            and made.time_ns < one.time_ns < end.time_ns
+            and one.data.get("topic") in (None, made.data.get("topic"))
+        ]
+        for kind in ("held", "leaving")
+    )
+    begin_ns, end_ns = max(held, default=made.time_ns), min(leaving, default=end.time_ns)
+    return (end_ns - begin_ns) / NS - recording.stolen_s(begin_ns, end_ns)
 
 
 def destroyed(recording: Recording, made: Declaration) -> Declaration | None:

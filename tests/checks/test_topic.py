@@ -127,10 +127,21 @@ class TestPublished:
         )
 
     @pytest.mark.parametrize(
+        "waited",
+        [declared("held", 1.9, topic="/cmd_vel"), declared("leaving", 0.4), declared("none", 0.4)],
+    )
+    def test_what_the_tracer_or_the_machine_waits_makes_no_moment_longer(self, waited):
+        slow = taken(0.4, 2.0, waited_s=1.5) if waited.kind == "none" else ()
+        run = ended_at(2.0, waited, spun_s=0.1, disturbance=slow)
+        assert "only for a moment" in failing("topic.published", run, topic="/cmd_vel")
+
+    @pytest.mark.parametrize(
         "run",
         [
             # A callback destroys what the constructor kept.
             lambda: ended_at(2.0),
+            # main() creates it while a thread spins, sends for seconds, and destroys it.
+            lambda: ended_at(2.0, spun_s=0.1),
             # It destroys what it has, and ends.
             lambda: ended_at(4.2, spun_s=4.4),
             lambda: ended_at(0.4, processes=(died(0, 0.8),), ending=Ending.EXITED),
