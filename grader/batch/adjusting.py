@@ -96,9 +96,8 @@ class ClassAdjustments:
             found = ruled(results, times, rules)
         several = len(tried) > 1
         parts = attempts_of(results, [one.at for one in times], found.counts) if several else ()
-        # A person scores the attempt that counts.
-        added = [one for one in results[found.counts].adjustments if one.kind == "manual"]
-        added += [one for one in results[-1].adjustments if one.kind != "manual"]
+        added = [one for one in results[found.counts].adjustments if one.is_of_counted]
+        added += [one for one in results[-1].adjustments if not one.is_of_counted]
         update = {"attempts": parts, "adjustments": (*added, *found.lines)}
         return results[-1].model_copy(update=update), found.notes
 

@@ -60,8 +60,7 @@ def ruled(results: Sequence[Result], times: Sequence[HandInTime], rules: Rules) 
         counts = (in_time or allowed)[-1]
     lines = [late[counts].line]
     if counts != last:
-        # Manual items are those of the attempt that counts.
-        judged, of_last = (_without_manual(results[at]) for at in (counts, last))
+        judged, of_last = (_judged(results[at]) for at in (counts, last))
         line = AdjustmentPart(
             kind="attempts",
             title=f"Attempt {counts + 1} of {len(results)} counts ({rule.words})",
@@ -76,6 +75,6 @@ def ruled(results: Sequence[Result], times: Sequence[HandInTime], rules: Rules) 
     )
 
 
-def _without_manual(result: Result) -> float:
-    added = (one.points for one in result.adjustments if one.kind != "manual")
+def _judged(result: Result) -> float:
+    added = (one.points for one in result.adjustments if not one.is_of_counted)
     return total(points for points in (result.score, *added) if points is not None)

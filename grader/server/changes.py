@@ -21,6 +21,9 @@ from grader.review.model import (
 from grader.review.store import ReviewConflict, Saved
 from grader.server.reviewed_class import ReviewedClass, ReviewedRow
 
+_POINTS = ("score", "give", "take", "settle")
+"""Changes of points, which are those of the attempt that counts."""
+
 
 def change_student(reviewed: ReviewedClass, row: ReviewedRow, sent: Any) -> None:
     """Change the review of a student as a page sent it, and write it.
@@ -35,14 +38,16 @@ def change_student(reviewed: ReviewedClass, row: ReviewedRow, sent: Any) -> None
         store.undo(key, sent["version"])
         return
     review = store.student(key).content
+    if sent["do"] in _POINTS:
+        row = reviewed.counted(row)
     if sent["do"] == "settle":
         given = (*review.of(row.attempt).given, *_settled(row, reviewed.by))
         changed = review.about(row.attempt, given=given)
     elif sent["do"] == "notes":
         changed = review.model_copy(update={"notes": str(sent["notes"])})
     elif sent["do"] == "score":
-        now = review.of(row.counts)
-        changed = review.about(row.counts, manual=dict(_scores(now, row, sent, reviewed.by)))
+        now = review.of(row.attempt)
+        changed = review.about(row.attempt, manual=dict(_scores(now, row, sent, reviewed.by)))
     else:
         update = _update(review.of(row.attempt), row, sent, reviewed.by)
         changed = review.about(row.attempt, **update)

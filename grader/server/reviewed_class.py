@@ -46,7 +46,7 @@ class ReviewedRow:
 
     @property
     def counts(self) -> str:
-        """The hash of the attempt that counts, which is the one that a person scores."""
+        """The hash of the attempt that counts, which is the one that a person gives points to."""
         tried = self.row.result.attempts if self.row.result is not None else ()
         return next((one.sha256 for one in tried if one.counts), self.attempt)
 
@@ -129,6 +129,11 @@ class ReviewedClass:
             if row.name == name:
                 return row, [one for one in rows if not one.entry.attempt_of]
         raise UsageError(f"{name}: is no submission of this class any more")
+
+    def counted(self, row: ReviewedRow) -> ReviewedRow:
+        """The row of the attempt that counts for the student whose row it is."""
+        tried = (one for one in (row, *self._all()) if one.row.id in row.attempts)
+        return next((one for one in tried if one.attempt == row.counts), row)
 
     def clusters(self) -> tuple[Cluster, ...]:
         """Failures with the same cause."""

@@ -372,8 +372,8 @@ def test_comments_and_points_stay_with_the_attempt_that_they_were_written_about(
     assert f"{NODE}:6 of an earlier attempt" in report
 
 
-def test_the_attempt_that_counts_is_the_one_that_a_person_scores(out: Path, client: Client) -> None:
-    before = hand_in_again(out, "ana", documented=1)
+def count_the_best(out: Path) -> None:
+    """Give the class the rule that the best attempt counts."""
     rules = "attempts: {counts: best}\nassignments: {lesson: {due: 2026-10-12 23:59}}\n"
     course = out.parent / "course.yaml"
     course.write_text(f"title: A course\ntime_zone: UTC\n{rules}", encoding="utf-8")
@@ -381,6 +381,11 @@ def test_the_attempt_that_counts_is_the_one_that_a_person_scores(out: Path, clie
         now = ledger.read()
         used = load_assignment(out.parent / "lesson")
         ledger.write(now.entries, now.assignment, used.sha256, now.location, str(course))
+
+
+def test_the_attempt_that_counts_is_the_one_that_a_person_scores(out: Path, client: Client) -> None:
+    before = hand_in_again(out, "ana", documented=1)
+    count_the_best(out)
     assert "of the attempt that counts" in client.get(page("ana")).text
     for item in ("readme", "oral"):
         assert change(client, "ana", do="score", item=item, points=1, note="").status == 200
@@ -390,6 +395,38 @@ def test_the_attempt_that_counts_is_the_one_that_a_person_scores(out: Path, clie
     assert client.get(page(before)).text.count("Attempt ") == 2
     change(client, before, do="comment", text="The first")
     assert ReviewStore(out).student("ana").content.of("ana").comments[0].text == "The first"
+
+
+def test_points_for_one_student_count_with_the_attempt_that_counts(
+    out: Path, client: Client
+) -> None:
+    change(client, "ana", do="give", points="0.5", reason="of then", check="")
+    hand_in_again(out, "ana", documented=1)
+    count_the_best(out)
+    for item in ("readme", "oral"):
+        change(client, "ana", do="score", item=item, points=2, note="")
+    assert scores(out)["ana"] == 10 + 0.5
+    assert change(client, "ana", do="give", points="2", reason="now", check="").status == 200
+    assert scores(out)["ana"] == 10 + 2.5
+    text = client.get(page("ana")).text
+    assert "+0.5: of then" in text and "+2: now" in text
+    assert change(client, "ana", do="take", index=0).status == 200
+    assert scores(out)["ana"] == 10 + 2
+    row = next(row for row in read_class(out) if row.id == "ana")
+    assert row.result and "it has 6 of 6 points" in row.result.adjustments[-1].reason
+
+
+def test_an_attempt_with_points_in_place_of_a_check_stays_graded_where_another_one_counts(
+    out: Path, client: Client
+) -> None:
+    hand_in_again(out, "ana", documented=1)
+    count_the_best(out)
+    end(out, "ana", "print")
+    assert change(client, "ana", do="settle").status == 200
+    for item in ("readme", "oral"):
+        change(client, "ana", do="score", item=item, points=2, note="")
+    row = next(row for row in read_class(out) if row.id == "ana")
+    assert row.score == 10 and row.result and row.result.graded and row.result.settled == {"print"}
 
 
 def test_what_is_sent_about_an_attempt_never_lands_at_the_next_one(

@@ -181,6 +181,11 @@ class AdjustmentPart(_Part):
     item: str | None = None
     instead: bool = False
 
+    @property
+    def is_of_counted(self) -> bool:
+        """Whether a person gave them to the attempt that counts, and not in place of a check."""
+        return self.kind == "manual" or (self.kind == "given" and not self.instead)
+
 
 class CommentPart(_Part):
     """What a person wrote to the student, at a line of a file or about the whole.
