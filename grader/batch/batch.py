@@ -211,13 +211,14 @@ class Batch:
     def _keep_absent(self, earlier: Mapping[str, Entry]) -> None:
         """Keep the rows of students whose submission is not among those that were named now."""
         kept, heirs = {}, dict[str, str]()
-        for key, old in earlier.items():
+        # Who has it of another one of the group keeps it with that one.
+        for key, old in sorted(earlier.items(), key=lambda one: bool(one[1].shared_by)):
             now = self._entries.get(key, Entry(key))
-            own = old.sha256 and not (old.attempt_of or old.shared_by)
+            giver = self._entries.get(old.shared_by, Entry("")) if old.shared_by else old
+            own = old.sha256 and not old.attempt_of and giver.sha256 == old.sha256
             if own and not (now.sha256 or now.fault):
-                kept[key] = old
+                self._entries[key] = kept[key] = old
                 self._given.setdefault(key, {})
-        self._entries |= kept
         for key, old in kept.items():
             original = self._entries.get(old.same_as, Entry(""))
             if old.same_as and original.sha256 != old.sha256:

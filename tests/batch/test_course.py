@@ -467,3 +467,18 @@ def test_of_two_who_are_kept_with_the_same_submission_each_still_names_the_other
     rows = course.grade(ROSTER, handed=course.hand_in("wed/ana", "extra").parent)
     assert rows["zed"].note == "the same submission as ben" and rows["zed"].score == 8
     assert rows["ben"].note == "the same submission as zed"
+
+
+def test_a_group_keeps_its_grade_when_others_hand_in(course: Class) -> None:
+    course.rules(COURSE + "groups: [[ana, ben]]\n")
+    course.hand_in("ben", "bot", text="mon")
+    course.hand_in("zed", "extra")
+    course.grade(ROSTER)
+    for handed in ("wed/zed", "thu/zed"):
+        rows = course.grade(ROSTER, handed=course.hand_in(handed, "bot").parent)
+        assert {key: (rows[key].score, rows[key].note) for key in ("ana", "ben", "zed")} == (
+            dict.fromkeys(("ana", "ben", "zed"), (8, ""))
+        )
+    # With another submission of one of them, both have that.
+    rows = course.grade(ROSTER, handed=course.hand_in("fri/ben", "extra").parent)
+    assert [rows[key].score for key in ("ana", "ben", "zed")] == [2, 2, 8]
