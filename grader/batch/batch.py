@@ -6,6 +6,7 @@ import shutil
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
@@ -100,7 +101,7 @@ class Batch:
                     paths[row.key] = row.path
             self._entries[row.key] = entry
         if self.keep:
-            self._keep_absent(earlier)
+            paths |= self._keep_absent(earlier)
         self._keep_attempts(earlier)
         to_do = {key: path for key, path in paths.items() if not self._is_done(key)}
         self._refuse_changed(set(paths) - set(to_do))
@@ -208,9 +209,13 @@ class Batch:
             known = result is not None and not row.fault
             yield Done(row, self.ledger.result(twin.key) if known else None, fresh)
 
-    def _keep_absent(self, earlier: Mapping[str, Entry]) -> None:
-        """Keep the rows of students whose submission is not among those that were named now."""
-        kept, heirs = {}, dict[str, str]()
+    def _keep_absent(self, earlier: Mapping[str, Entry]) -> dict[str, Path]:
+        """Keep the rows of students whose submission is not among those that were named now.
+
+        Returns:
+            What is still to be graded of them, such as after Ctrl-C, where it lay before.
+        """
+        kept, heirs, paths = {}, dict[str, str](), dict[str, Path]()
         # Who has it of another one of the group keeps it with that one.
         for key, old in sorted(earlier.items(), key=lambda one: bool(one[1].shared_by)):
             now = self._entries.get(key, Entry(key))
@@ -228,6 +233,12 @@ class Batch:
             self._entries[key] = replace(old, same_as=twin)
             if twin:
                 self._twins.setdefault(twin, []).append(key)
+                continue
+            result = self.ledger.result(key)
+            if (result is None or result.submission.sha256 != old.sha256) and _lies_still(old):
+                self._entries[key] = replace(old, same_as="", fault="")
+                paths[key] = Path(old.source)
+        return paths
 
     def _keep_attempts(self, earlier: Mapping[str, Entry]) -> None:
         """Keep the grades of students who handed in again, each as a row of its own."""
@@ -256,6 +267,13 @@ class Batch:
         loaded = self.loaded
         version = (loaded.assignment.id, loaded.sha256, loaded.location)
         self.ledger.write(self._entries.values(), *version, self.course, self.taken_from)
+
+
+def _lies_still(entry: Entry) -> bool:
+    """Whether what was handed in lies where it was read, unchanged."""
+    with suppress(RosgradeError, OSError):
+        return bool(entry.source) and fingerprint(entry.source) == entry.sha256
+    return False
 
 
 def copy_result(loaded: LoadedAssignment, ledger: Ledger, key: str, twin: Entry) -> None:

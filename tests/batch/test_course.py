@@ -482,3 +482,24 @@ def test_a_group_keeps_its_grade_when_others_hand_in(course: Class) -> None:
     # With another submission of one of them, both have that.
     rows = course.grade(ROSTER, handed=course.hand_in("fri/ben", "extra").parent)
     assert [rows[key].score for key in ("ana", "ben", "zed")] == [2, 2, 8]
+
+
+def test_what_an_interrupted_batch_left_is_graded_by_the_next_from_where_it_lay(
+    course: Class,
+) -> None:
+    for name, text in (("ana", "a"), ("ben", "b"), ("cai", "c"), ("zed", "b")):
+        course.hand_in(name, "bot", text=text)
+    with Ledger(course.out).opened() as ledger:
+        batch = Batch(course.loaded, ledger)
+        _, to_do = batch.read(take_in(course.handed, course.folder))
+        assert list(to_do) == ["ana", "ben", "cai"]
+    # What was changed meanwhile is not what she handed in.
+    (course.handed / "ana" / "notes.txt").write_text("changed")
+    rows = course.grade(ROSTER, handed=course.hand_in("wed/cai", "extra").parent)
+    assert {key: row.score for key, row in rows.items()} == {
+        "ana": None,
+        "ben": 8,
+        "cai": 2,
+        "zed": 8,
+    }
+    assert "not graded yet" in rows["ana"].note
