@@ -55,9 +55,9 @@ def grade(
     """Judge a submission, with its names in the places of the assignment's variables.
 
     A check whose requirement did not pass is skipped, unless that failed alone, such as by a wrong
-    name which the runs put right. So is one that failed in a run whose parameters the node does not
-    take, if a check is about that. A check that raises an exception ends as an error and keeps the
-    traceback.
+    name which the runs put right. So is one without credit that failed in a run whose parameters
+    the node does not take, if a check is about that. A check that raises an exception ends as an
+    error and keeps the traceback.
 
     Args:
         recordings: By scenario id; empty where nothing could be launched.
@@ -83,7 +83,10 @@ def grade(
             why = unnamed.finding if unnamed and is_unnamed else None
             findings = tuple(_findings(bound[name], loaded, known, recordings, faults, why))
             lacking = _roots(sooner[name], results)
-            if lacking and any(_has_other_parameters(item, recordings) for item in findings):
+            lost = _counted(bound[name].spec.counts, [item.finding for item in findings])
+            other = any(_has_other_parameters(item, recordings) for item in findings)
+            # One mistake costs its own check, and takes no credit from another.
+            if lacking and other and lost == (Status.FAILED, 0.0):
                 roots, findings = lacking, (_skipped([results[root] for root in lacking]),)
         spec = bound[name].spec
         speaks_cpp = is_cpp(known, _about(bound[name], loaded))

@@ -369,9 +369,10 @@ def test_what_requires_a_name_is_judged_where_the_run_put_the_name_right(put_rig
     assert result.remaps == {"listen": {rule}}
 
 
-@pytest.mark.parametrize("has_check", [True, False])
-def test_a_parameter_that_the_node_does_not_take_is_one_mistake_and_is_told_first(has_check):
-    run = make_recording(
+def lacking_parameter(scenario="listen"):
+    """A run that gives a parameter which no node of the student declares."""
+    return make_recording(
+        scenario,
         nodes=(Node("/bot", Owner.STUDENT, LAUNCHED_NS),),
         calls=(
             Call(
@@ -384,6 +385,11 @@ def test_a_parameter_that_the_node_does_not_take_is_one_mistake_and_is_told_firs
         ),
         environment={"parameters": "goal_x"},
     )
+
+
+@pytest.mark.parametrize("has_check", [True, False])
+def test_a_parameter_that_the_node_does_not_take_is_one_mistake_and_is_told_first(has_check):
+    run = lacking_parameter()
     given = Told(
         "given", FAIL, uses="parameter.given" if has_check else "told.told", requires=("type",)
     )
@@ -396,6 +402,30 @@ def test_a_parameter_that_the_node_does_not_take_is_one_mistake_and_is_told_firs
     else:
         seen = result.result("goal").decisive.finding.observed
         assert seen.startswith("the launch gives `goal_x`, but no node declares it; ")
+
+
+def test_a_parameter_that_the_node_does_not_take_takes_no_partial_credit_away():
+    runs = {name: make_recording(name) for name in ("one", "two")}
+    runs["three"] = lacking_parameter("three")
+    given = Told("given", FAIL, uses="parameter.given", scenarios=("three",))
+    some = {"one": PASS, "two": PASS, "three": FAIL}
+    error = Finding.error("a goal", "a full disk")
+    checks = (
+        given,
+        Told("mean", some, counts="mean", points=3.0),
+        Told("half", replace(FAIL, credit=0.5), scenarios=("three",)),
+        Told("open", some | {"one": error}, counts="mean"),
+        Told("worst", some),
+    )
+    result = judge(*checks, scenarios=tuple(runs), recordings=runs)
+    assert statuses(result) == {
+        "given": "failed",
+        "mean": "failed",
+        "half": "failed",
+        "open": "error",
+        "worst": "skipped",
+    }
+    assert [result.result(name).points for name in ("mean", "half", "worst")] == [2.0, 0.5, 0.0]
 
 
 def test_a_name_is_put_right_only_where_the_program_that_has_it_wrong_is_launched():

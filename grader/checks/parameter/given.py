@@ -43,7 +43,7 @@ def given(recording: Recording, parameters: Given) -> Finding:
 
     Judged by what the student's nodes answer when the probe asks for their parameters. Without an
     answer of each node it passes: what the node does is judged by other checks. If it fails, others
-    that fail in the same scenario are skipped, but for those that it requires.
+    that fail in the same scenario, without partial credit, are skipped, but for those it requires.
     """
     names, asked = parameters.names or recording.given_parameters, parameters.asked_for
     cause = why_not_taken(recording, names)
