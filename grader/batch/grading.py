@@ -119,9 +119,9 @@ class Grading:
         def tested(record: SubmissionRecord) -> frozenset[str]:
             self._on_recorded(record, {})
             record = replace(record, given=outside)
-            wanted = _tested(named(self._loaded, record)[0])
-            record = with_stand_ins(self._loaded, record)
-            return frozenset(one.name for name in wanted if (one := record.package(name)))
+            loaded, _ = named(self._loaded, record)
+            record = with_stand_ins(loaded, record)
+            return frozenset(one.name for name in _tested(loaded) if (one := record.package(name)))
 
         prepared = prepare(
             path,
@@ -167,7 +167,7 @@ class Grading:
 
     def grade_prepared(self, prepared: Prepared, folder: Path) -> Graded:
         """Run and judge a submission that is built already."""
-        record = with_stand_ins(self._loaded, prepared.record)
+        record = with_stand_ins(named(self._loaded, prepared.record)[0], prepared.record)
         prepared = replace(prepared, record=record)
         for old in folder.glob("*.mcap"):
             old.unlink()

@@ -230,6 +230,34 @@ def test_a_run_is_repeated_with_the_name_that_it_showed(
     assert [one.record[0].topic for one in runner.scenarios] == ["/cmd_vel", topic][:runs]
 
 
+def test_a_misnamed_package_is_found_by_the_names_that_the_submission_chose(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "lesson"
+    folder.mkdir()
+    group = 'variables: {n: {match: "group{n}_interfaces", in: packages, example: 7}}\npackages:'
+    checks = """checks:
+  - {id: found, uses: package.found, with: {package: "group{n}_gp2", remap: true}, points: 1}
+  - {id: tests, uses: package.tests, with: {package: "group{n}_gp2"}, points: 1}
+"""
+    text = YAML.replace("packages:", group, 1).replace("{name: bot,", '{name: "group{n}_gp2",')
+    text = text.replace("checks:\n", checks)
+    (folder / "assignment.yaml").write_text(text, encoding="utf-8")
+    packages = tuple(PackageRecord(name, name) for name in ("group3_interfaces", "grup3_gp2"))
+    record = dataclasses.replace(SUBMISSION, packages=packages)
+    asked: list[frozenset[str]] = []
+
+    def note(*_: object, tested: Callable[[SubmissionRecord], frozenset[str]], **__: object) -> Any:
+        asked.append(tested(record))
+        return Prepared(record=record, install=None)
+
+    monkeypatch.setattr(grading_module, "prepare", note)
+    grading = Grading(load_assignment(folder), ScriptedRunner(), tmp_path / "cache")
+    graded = grading.grade(tmp_path, tmp_path / "out")
+    assert asked == [{"grup3_gp2"}]
+    assert graded.prepared.record.stand_ins == (("group3_gp2", "grup3_gp2"),)
+
+
 def test_what_has_not_the_name_of_the_roster_is_not_run(
     named: LoadedAssignment, tmp_path: Path
 ) -> None:
