@@ -25,6 +25,7 @@ from grader.report.files import write_whole
 from grader.report.model.facts import Clock
 from grader.report.model.grade_part import grade_json
 from grader.report.model.result_model import Result
+from grader.review.store import ReviewStore
 from grader.spec.nearest_name import did_you_mean
 from grader.submission.intake.locate import NO_FILES
 from grader.submission.intake.paths import shown
@@ -74,7 +75,6 @@ class Batch:
             raise UsageError(f"--retry: there is no submission called {name}.{nearest}")
         paths: dict[str, Path] = {}
         first: dict[tuple[str, str], str] = {}
-        teams = _teams(rows)
         columns = {
             name: one.column.casefold()
             for name, one in self.loaded.assignment.variables.items()
@@ -84,7 +84,7 @@ class Batch:
             on_read(row.key)
             given = {name: row.columns.get(column, "") for name, column in columns.items()}
             self._given[row.key] = {name: value for name, value in given.items() if value}
-            entry: Entry = replace(row, team=teams.get(row.key, ""))
+            entry: Entry = row
             if row.path is not None:
                 entry = replace(entry, source=str(row.path.resolve()))
                 try:
@@ -102,6 +102,8 @@ class Batch:
             self._entries[row.key] = entry
         if self.keep:
             paths |= self._keep_absent(earlier)
+        named = with_teams(self._entries.values(), earlier, self.ledger)
+        self._entries = {entry.key: entry for entry in named}
         self._keep_attempts(earlier)
         to_do = {key: path for key, path in paths.items() if not self._is_done(key)}
         self._refuse_changed(set(paths) - set(to_do))
@@ -291,10 +293,23 @@ def copy_result(loaded: LoadedAssignment, ledger: Ledger, key: str, twin: Entry)
     ledger.put(twin.key, partial)
 
 
-def _teams(rows: Sequence[HandedIn]) -> dict[str, str]:
-    """For each member of a team, which shares a submission: the key of the first member."""
-    shared: dict[Path, list[str]] = {}
-    for row in rows:
-        if row.path is not None:
-            shared.setdefault(row.path, []).append(row.key)
-    return {key: keys[0] for keys in shared.values() if len(keys) > 1 for key in keys}
+def with_teams(rows: Iterable[Entry], before: Mapping[str, Entry], ledger: Ledger) -> list[Entry]:
+    """Rows with the teams that share a submission.
+
+    A team has the review of the first who handed in, or of whoever has one already: a row with a
+    review never gets another one.
+    """
+    rows, store = list(rows), ReviewStore(ledger.out)
+    shared: dict[str, list[str]] = {}
+    for row in sorted(rows, key=lambda row: bool(row.shared_by)):
+        if not row.attempt_of:
+            hand = row.source or row.shared_by or row.team or row.key
+            shared.setdefault(hand, []).append(row.key)
+    teams: dict[str, str] = {}
+    for keys in filter(lambda keys: len(keys) > 1, shared.values()):
+        had = {key: before[key].review_key if key in before else key for key in keys}
+        had = {key: one if one in keys else key for key, one in had.items()}
+        reviewed = {key: one for key, one in had.items() if store.file(one).is_file()}
+        first = next(iter(reviewed.values()), keys[0])
+        teams |= {key: reviewed.get(key, first) for key in keys}
+    return [row if row.attempt_of else replace(row, team=teams.get(row.key, "")) for row in rows]

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 from typing import Any, TypeVar
 
-from grader.batch.batch import copy_result
+from grader.batch.batch import copy_result, with_teams
 from grader.batch.handed_in import NOTHING, HandedIn
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import load_used
@@ -21,8 +21,7 @@ R = TypeVar("R", bound=Entry)
 
 def with_groups(rows: Sequence[R], course: Course | None) -> list[R]:
     """Rows in which a group has what the one of them handed in who did."""
-    givers = {row.shared_by for row in rows}
-    found = [_alone(replace(row, team="") if row.key in givers else row) for row in rows]
+    found = [_alone(row) for row in rows]
     rows = list(found)
     places = {written(row.key): at for at, row in enumerate(rows)}
     for group in course.spec.groups if course is not None else ():
@@ -35,17 +34,16 @@ def with_groups(rows: Sequence[R], course: Course | None) -> list[R]:
         for at in set(members) - set(handed) if len(paths) == 1 else ():
             row, other = rows[at], rows[handed[0]]
             parts = (part for part in row.problem.split("; ") if not part.startswith(NOTHING))
-            first = rows[min(at, handed[0])].key if other.sha256 else ""
-            row = replace(row, problem="; ".join(parts), shared_by=other.key, team=first)
+            row = replace(row, problem="; ".join(parts), shared_by=other.key)
             found[at] = replace(row, **{name: getattr(other, name) for name in _shared(row)})
-            found[handed[0]] = replace(found[handed[0]], team=found[handed[0]].team or first)
     return found
 
 
 def regroup(ledger: Ledger, course: Course) -> None:
     """Give the rows of a graded class what the groups of its rules share now; nothing is run."""
     before = ledger.read()
-    rows = with_groups(before.entries, course)
+    earlier = {row.key: row for row in before.entries}
+    rows = with_teams(with_groups(before.entries, course), earlier, ledger)
     if rows == list(before.entries):
         return
     loaded = load_used(ledger)

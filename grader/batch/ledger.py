@@ -44,7 +44,7 @@ class Entry:
         problem: What the instructor should look at, or why there is nothing to grade.
         same_as: Key of the row with the same submission that was graded for both, or empty.
         fault: Why it could not be graded, where not even a result could be written.
-        team: Key of the first of those who handed it in together, or empty for one alone.
+        team: Key whose review those have who handed it in together, or empty for one alone.
         email: The student's, or empty.
         source: Path of what was handed in, as it lay when it was read; may be gone by now.
         handed_in: ISO 8601, without an offset where its source has none; or empty.
@@ -72,7 +72,7 @@ class Entry:
 
     @property
     def review_key(self) -> str:
-        """Whose review is this row's: a team has one, that of its first member."""
+        """Whose review is this row's: a team has one."""
         return self.team or self.attempt_of or self.key
 
     @property

@@ -58,7 +58,7 @@ class AttemptReview(Model):
 
 
 class StudentReview(AttemptReview):
-    """The review of one student, or of a team under the key of its first member."""
+    """The review of one student, or of a team under the key of one of them."""
 
     key: str = Field(min_length=1, description="As in the column `submission` of grades.csv.")
     notes: str = Field("", description="Of an oral exam, say; only for instructors.")

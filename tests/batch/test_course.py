@@ -34,6 +34,8 @@ from grader.report.files import write_whole
 from grader.report.model.class_row import ClassRow
 from grader.report.model.facts import Clock
 from grader.report.model.student import for_student
+from grader.review.model import Given, StudentReview
+from grader.review.store import ReviewStore
 from grader.submission.intake.locate import opened
 from grader.submission.prepare import fingerprint
 from grader.submission.record import PackageRecord, SubmissionRecord
@@ -101,6 +103,14 @@ class Class:
     def rules(self, text: str) -> None:
         """Write course.yaml."""
         (self.folder / "course.yaml").write_text(text, encoding="utf-8")
+
+    def reported(self) -> dict[str, ClassRow]:
+        """Apply the rules again to what is graded, as ``rosgrade report OUT`` does."""
+        rules = course_of(self.out, None, self.name)
+        assert rules is not None
+        with Ledger(self.out).opened() as ledger:
+            regroup(ledger, rules)
+        return {row.id: row for row in read_class(self.out)}
 
     def entries(self) -> dict[str, Entry]:
         """The rows as they are written down."""
@@ -414,23 +424,14 @@ def test_groups_that_are_written_down_later_are_applied_by_a_report(course: Clas
     course.hand_in("ben", "bot", "extra")
     roster = "login,name\nana,Ana\nben,Ben\ncai,Cai\n"
     assert course.grade(roster)["ana"].missing
-
-    def reported() -> dict[str, ClassRow]:
-        rules = course_of(course.out, None, course.name)
-        assert rules is not None
-        with Ledger(course.out).opened() as ledger:
-            regroup(ledger, rules)
-        return {row.id: row for row in read_class(course.out)}
-
     course.rules(COURSE + "groups: [[ana, ben]]\n")
     for _ in range(2):
-        rows = reported()
+        rows = course.reported()
         assert (rows["ana"].score, rows["ana"].note) == (rows["ben"].score, "") != (None, "")
-    entries = {one.key: one for one in Ledger(course.out).read().entries}
-    assert {entries[key].review_key for key in ("ana", "ben")} == {"ana"}
+    assert {course.entries()[key].review_key for key in ("ana", "ben")} == {"ben"}
     assert course.grade(roster)["ana"].score == rows["ben"].score
     course.rules(COURSE + "groups: [[ben, cai]]\n")
-    rows = reported()
+    rows = course.reported()
     assert rows["ana"].missing and rows["cai"].score == rows["ben"].score
     assert Ledger(course.out).read().entries[1].review_key == "ben"
 
@@ -503,3 +504,30 @@ def test_what_an_interrupted_batch_left_is_graded_by_the_next_from_where_it_lay(
         "zed": 8,
     }
     assert "not graded yet" in rows["ana"].note
+
+
+@pytest.mark.parametrize("reviewed", [(), ("ben",), ("abe",), ("ben", "abe")])
+def test_a_group_takes_no_review_from_anybody(course: Class, reviewed: tuple[str, ...]) -> None:
+    roster = "login\nana\nabe\nben\n"
+    course.hand_in("ben", "bot")
+    course.grade(roster)
+    store, keys = ReviewStore(course.out), {key: key for key in reviewed}
+    for key in reviewed:
+        given = Given(points=1, reason=f"Talk of {key}.", by="AB")
+        store.save(StudentReview(key=key, given=(given,)), "")
+
+    def shown() -> dict[str, str]:
+        return {key: course.entries()[key].review_key for key in ("abe", "ben")}
+
+    course.rules(COURSE + "groups: [[abe, ben]]\n")
+    # Without a review it is that of the one who handed in, though another row comes first.
+    expected = {key: keys.get(key, (*reviewed, "ben")[0]) for key in ("abe", "ben")}
+    assert course.reported()["abe"].score == (9 if reviewed else 8)
+    assert shown() == expected
+    # A batch picks it in the same way as a report, and so it stays.
+    course.grade(roster)
+    assert shown() == expected
+    course.hand_in("ana", "extra")
+    assert course.grade(roster)["ben"].score == (9 if reviewed else 8)
+    course.reported()
+    assert shown() == expected
