@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from grader.batch.batch import copy_result, with_teams
 from grader.batch.handed_in import NOTHING, HandedIn
 from grader.batch.ledger import Entry, Ledger
-from grader.batch.regrading import load_used
+from grader.batch.regrading import load_used, refuse_changed
 from grader.course.load import Course, written
 from grader.findings.wording import listing
 from grader.spec.nearest_name import did_you_mean
@@ -47,8 +47,12 @@ def regroup(ledger: Ledger, course: Course) -> None:
     if rows == list(before.entries):
         return
     loaded = load_used(ledger)
-    for row in rows:
-        if row.shared_by and ledger.result(row.shared_by) is not None:
+    given = [(row, ledger.result(row.shared_by)) for row in rows if row.shared_by]
+    for _, result in given:
+        if result is not None:
+            refuse_changed(ledger.out, result.assignment.sha256, loaded)
+    for row, result in given:
+        if result is not None:
             copy_result(loaded, ledger, row.shared_by, row)
     ledger.write(rows, before.assignment, before.sha256, before.location, before.course)
 

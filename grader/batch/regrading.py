@@ -122,6 +122,15 @@ def regrade_command(path: Path, loaded: LoadedAssignment) -> str:
     return f"`{shlex.join(['rosgrade', 'regrade', str(path), name])}`"
 
 
+def refuse_changed(path: Path, sha256: str, loaded: LoadedAssignment) -> None:
+    """Refuse to write a result again with another version of the assignment."""
+    if loaded.sha256 != sha256:
+        raise UsageError(
+            f"{path}: the assignment has changed since this was graded. "
+            f"{regrade_command(path, loaded)} judges again with the new assignment"
+        )
+
+
 def refuse_other(folder: Path, name: str, loaded: LoadedAssignment) -> None:
     """Refuse to judge a recording with another assignment: all points would be lost."""
     if name != loaded.assignment.id:

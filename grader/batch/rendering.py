@@ -14,7 +14,13 @@ from grader.batch.adjusting import ClassAdjustments
 from grader.batch.batch import Done
 from grader.batch.files import RESULT_FILE, write_report
 from grader.batch.ledger import Ledger
-from grader.batch.regrading import find, regrade, regrade_command, stored_assignment
+from grader.batch.regrading import (
+    find,
+    refuse_changed,
+    regrade,
+    regrade_command,
+    stored_assignment,
+)
 from grader.errors import RosgradeError, UsageError
 from grader.report.files import write_whole
 from grader.report.model.result import read_result, result_json
@@ -69,11 +75,7 @@ def render_again(
     used = result.assignment
     words = ("report", str(folder))
     loaded = _load(assignment or stored_assignment(folder, used.id, used.location, *words))
-    if loaded.sha256 != used.sha256:
-        raise UsageError(
-            f"{folder}: the assignment has changed since this was graded. "
-            f"{regrade_command(folder, loaded)} judges again with the new assignment"
-        )
+    refuse_changed(folder, used.sha256, loaded)
     shown = visible_part(loaded) if result.withheld.checks else loaded
     graded = regrade(select(shown, tuple(check.id for check in result.checks)), found)
     before = {check.id: check.status for check in result.checks}

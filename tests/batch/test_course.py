@@ -531,3 +531,21 @@ def test_a_group_takes_no_review_from_anybody(course: Class, reviewed: tuple[str
     assert course.grade(roster)["ben"].score == (9 if reviewed else 8)
     course.reported()
     assert shown() == expected
+
+
+def test_a_group_is_not_graded_with_two_versions_of_the_assignment(course: Class) -> None:
+    course.hand_in("ben", "bot")
+    course.grade(ROSTER)
+    yaml = course.folder / "lesson" / "assignment.yaml"
+    yaml.write_text(YAML.replace("points: 6", "points: 7"))
+    course.rules(COURSE + "groups: [[ana, ben]]\n")
+    with pytest.raises(UsageError, match=r"changed since this was graded.*rosgrade regrade .*out "):
+        course.reported()
+    rows = {row.id: row for row in read_class(course.out)}
+    assert rows["ben"].score == 8 and rows["ana"].missing
+    assert not Ledger(course.out).folder("ana").exists()
+    ledger = Ledger(course.out)
+    with ledger.opened():
+        list(regrade_class(load_assignment(yaml.parent), ledger))
+    rows = course.reported()
+    assert rows["ana"].score == rows["ben"].score == 9
