@@ -212,7 +212,8 @@ def test_the_row_of_what_was_not_graded_says_why() -> None:
     sample = not_graded()
     result = make_result(sample.grade, sample.recordings, sample.facts)
     observed = next(c.observed for c in result.checks if c.status is Status.ERROR)
-    assert notes_of([Done(Entry("ana"), result, fresh=True)])["ana"] == f"not graded: {observed}"
+    told = notes_of([Done(Entry("ana"), result, fresh=True)])
+    assert told["ana"] == f"not graded, 2 points open: {observed}"
 
 
 def test_a_full_disk_is_the_machine_s_and_says_what_to_do(course: Class) -> None:
