@@ -72,7 +72,7 @@ def test_a_pair_is_shown_side_by_side_with_those_who_handed_in_the_same(
 def test_a_class_without_pairs_says_so(tmp_path: Path, loaded: LoadedAssignment) -> None:
     file, pairs = write_similarity(loaded, graded(tmp_path, {"ana": NODE, "ben": OTHER}))
     assert pairs == 0
-    assert "No two submissions are alike beyond what is usual." in file.read_text(encoding="utf-8")
+    assert "No two submissions are more alike than usual." in file.read_text(encoding="utf-8")
 
 
 def test_each_student_has_three_questions_and_a_damaged_recording_takes_none(
