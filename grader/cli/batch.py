@@ -35,7 +35,7 @@ def batch(
         str,
         typer.Argument(
             metavar="ASSIGNMENT",
-            help="Id of the assignment, or its folder. Or OUT, to go on with all as it is in use.",
+            help="Id of the assignment, or its folder. Or OUT, to continue with a class.",
             callback=lambda name: name if is_batch(name) else assignment_argument(name),
         ),
     ],
@@ -69,7 +69,7 @@ def batch(
     """Grade a class. `rosgrade batch OUT` continues where it stopped, also with new submissions.
 
     Writes a report for each submission, an overview (index.html) and grades.csv to OUT. Ends
-    with 0 if every submission was graded, whatever the grades, and with 3 if one was not.
+    with 0 if every submission was graded, with good or bad grades, and with 3 if one was not.
     """
     from grader.assignment.load import load_assignment
     from grader.batch.adjusting import ClassAdjustments, course_of

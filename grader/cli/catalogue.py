@@ -104,7 +104,7 @@ def explain(
         bool, typer.Option("--html", help="Write the page with its picture, to open in a browser.")
     ] = False,
 ) -> None:
-    """Explain an idea of ROS, such as QoS: what a failed check says to read."""
+    """Explain an idea of ROS, such as QoS. A failed check names the idea to read."""
     from rich.markdown import Markdown
 
     from grader.errors import UsageError

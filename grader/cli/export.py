@@ -23,7 +23,7 @@ Tag = Annotated[
     str,
     typer.Option(
         metavar="PATTERN",
-        help="On GitHub, grade only pushes of such tags, as `submit*`; by default every push.",
+        help="On GitHub, grade only pushes of tags such as `submit*`; by default every push.",
     ),
 ]
 
@@ -188,8 +188,8 @@ def mail(
 ) -> None:
     """Write a message for each student, with the report. Nothing is sent.
 
-    mail.mbox is for a mail program, mail.csv for mail merge. The addresses are those of the roster
-    that the class was graded with. Ends with 1 if a student gets no message, and says who and why.
+    mail.mbox is for a mail program, mail.csv for mail merge. The addresses come from the roster
+    with which the class was graded. Ends with 1 if a student gets no message, and says who and why.
     """
     from grader.batch.feedback import class_feedback, letters
     from grader.errors import UsageError

@@ -27,7 +27,8 @@ AssignmentName = Annotated[
 UsedAssignment = Annotated[
     str | None,
     typer.Argument(
-        metavar="[ASSIGNMENT]", help="Id or folder; by default the one used for grading."
+        metavar="[ASSIGNMENT]",
+        help="Id or folder; by default the assignment that was used for grading.",
     ),
 ]
 ClassFolder = Annotated[Path, typer.Argument(help="Folder of a batch.")]

@@ -27,14 +27,17 @@ def regrade(
     ],
     assignment: UsedAssignment = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Show who would gain what, and write nothing.")
+        bool,
+        typer.Option(
+            "--dry-run", help="Show which students would gain or lose points, and write nothing."
+        ),
     ] = False,
     quiet: Quiet = False,
 ) -> None:
     """Judge the recordings again with the current YAML. Nothing is run.
 
-    Shows what changed and why, and updates reports and results. The folder of one submission of
-    a class stands for the class: all of it is judged alike. Then the gradebook and the overview are
+    Shows what changed and why, and updates reports and results. If you name the folder of one
+    submission of a class, the whole class is judged. Then the gradebook and the overview are
     updated too, and the old results are kept.
     """
     from grader.batch.ledger import Ledger

@@ -23,7 +23,7 @@ def replay(
     submission: Annotated[Path, typer.Argument(help="Program to run: a folder or an archive.")],
     assignment: Annotated[
         str | None,
-        typer.Argument(help="Id or folder; by default the one of the recording."),
+        typer.Argument(help="Id or folder; by default the assignment of the recording."),
     ] = None,
     quiet: Quiet = False,
 ) -> None:

@@ -30,10 +30,10 @@ def report(
     gradescope_metadata: GradescopeMetadata = None,
     github: Github = False,
 ) -> None:
-    """Write reports again, also in other formats. Nothing is run, no check ends differently.
+    """Write reports again, also in other formats. Nothing is run or judged.
 
-    The options of the formats work for one report. For a class, every report is written, with what
-    `rosgrade review` added, and so are the gradebook and the overview.
+    The options of the formats work for one report. For a class, this writes every report, the
+    gradebook and the overview, with everything that you wrote in `rosgrade review`.
     """
     from grader.batch.adjusting import ClassAdjustments, course_of
     from grader.batch.class_files import all_standing, find_reports, write_class

@@ -25,8 +25,8 @@ def review(
 ) -> None:
     """Review a class in a browser, until Ctrl-C.
 
-    Reports with the source beside them, comments, points by a person, and failures with the same
-    cause. What is written lies in OUT/review/. Only this machine can open the page.
+    Shows reports with the source beside them, comments, points by a person, and failures with the
+    same cause. It saves what you write in OUT/review/. Only this machine can open the page.
     """
     from grader.server.review import ReviewServer
 

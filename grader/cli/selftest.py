@@ -30,7 +30,7 @@ def selftest(
         int | None, typer.Option(min=1, help="Submissions at once; by default two for each CPU.")
     ] = None,
     cpp: Annotated[
-        bool, typer.Option("--cpp", help="Take the reference in C++, and mutants_cpp.yaml.")
+        bool, typer.Option("--cpp", help="Use the reference in C++ and mutants_cpp.yaml.")
     ] = False,
     record: Annotated[
         bool,

@@ -48,8 +48,8 @@ def add(
 ) -> None:
     """Fetch packages and build them, once for this machine and ROS installation.
 
-    They lie under every submission of an assignment that names them in `underlays`. A package
-    that ROS has already is not built. An interrupted command goes on where it stopped.
+    Every submission of an assignment that names them in `underlays` can use them. A package that
+    ROS already has is not built. After an interruption, the command continues where it stopped.
     """
     from grader import ros
     from grader.assignment.load import load_assignment

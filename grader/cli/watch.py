@@ -69,9 +69,9 @@ def watch(
 ) -> None:
     """Grade now, and again after every save, until Ctrl-C.
 
-    Runs first what failed last, and shows at once how it ends now. Shows what changed since the
-    last grade. The report page updates itself. A save during a run starts the run again. The files
-    of the assignment are watched too.
+    First runs the checks that failed last time, and shows at once how they end now. Shows what
+    changed since the last grade. The report page updates itself. A save during a run starts the run
+    again. The files of the assignment are watched too.
     """
     from grader import ros
     from grader.assignment.load import load_assignment

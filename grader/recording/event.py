@@ -88,7 +88,7 @@ class Wait:
 class Pause:
     """The moment after the observation in which executors find nothing ready.
 
-    What is published meanwhile, no executor has called.
+    If a message is published in this moment, no executor has called the code that publishes it.
 
     Attributes:
         began_ns: When the processes were told; their executors follow when they wait again.

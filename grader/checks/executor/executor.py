@@ -300,10 +300,10 @@ class Timer(Parameters):
 def timer(recording: Recording, parameters: Timer) -> Finding | Cause:
     """The process has a timer.
 
-    Messages of a thread that sleeps look like those of a timer. So the executors are told for a
-    moment after the run that nothing is ready: what is published meanwhile, no callback publishes,
-    whatever the process declares. The process must also have declared its publisher and a timer
-    with a callback, of any period.
+    A thread that sleeps and publishes looks like a timer. So, for a moment after the run, the
+    executors find nothing ready and call no callback. If a message is published in this moment, it
+    does not come from a callback, whatever the process declares. The process must also have
+    declared its publisher and a timer with a callback, of any period.
     """
     messages = recording.on(parameters.topic)
     if not messages:

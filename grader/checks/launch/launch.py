@@ -113,7 +113,7 @@ def shown_arguments(lines: Iterable[str]) -> dict[str, tuple[str, str]]:
 def arguments(recording: Recording, parameters: Arguments) -> Finding | Cause:
     """The launch file declares its arguments, with defaults and descriptions.
 
-    Judged by what `ros2 launch --show-args` prints. It needs a scenario of its own, whose launch is
+    Judged by what `ros2 launch --show-args` prints. It needs a separate scenario with the launch
     `{file: robot.launch.py, arguments: [--show-args]}`.
     """
     asked = parameters.asked_for

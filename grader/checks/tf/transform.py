@@ -136,8 +136,8 @@ class Broadcast(EdgeParameters):
 def broadcast(recording: Recording, parameters: Broadcast) -> Finding | Cause:
     """A transform is broadcast at the right rate, with stamps of the node's clock.
 
-    A stamp must be within 1 s of the moment of publishing, or be that of a message that the node
-    may have made the transform of. The rate is judged as by timing.rate.
+    A stamp must be within 1 s of the moment of publishing. Or it is the stamp of a message from
+    which the node may have made the transform. The rate is judged as by timing.rate.
     """
     alone = parameters.alone(recording)
     low, high = (parameters.rate * (1.0 + part) for part in (-_RATE_TOLERANCE, _RATE_TOLERANCE))

@@ -43,7 +43,7 @@ class Tree(Parameters):
 def tree(recording: Recording, parameters: Tree) -> Finding:
     """The frames make one tree: one root, connected, and no frame with two parents.
 
-    Judged by all transforms of the run, also those of the simulated robot.
+    Judged by all transforms of the run, also the transforms of the simulated robot.
     """
     there = list(sent(recording, (parameters.topic, parameters.static_topic)))
     if not there:

@@ -158,7 +158,7 @@ def own_module(symptom: Raised) -> str | None:
 
 @explanation(Raised, only=PYTHON)
 def file_not_installed(symptom: Raised) -> str | None:
-    """A file of the package is opened by a relative path, or by one that only its author has."""
+    """A file of the package is opened by a relative path, or by one of another machine."""
     found = _NO_FILE.search(symptom.failure.message)
     name = found[1].rpartition("/")[2] if found else ""
     file, owner = _own_file(symptom.recording.submission, name)

@@ -22,8 +22,8 @@ from grader.spec.quantity import DurationOrZero
 class Join(StimulusModel):
     """Join late: another subscription of the probe, created in the middle of the run.
 
-    Its messages are recorded under its own name, apart from those of `record`. If `record` does not
-    have the topic, this is the first subscription to it.
+    Its messages are recorded under its own name, separate from the messages of `record`. If
+    `record` does not have the topic, this is the first subscription to it.
     """
 
     key = "join"

@@ -144,7 +144,7 @@ class ReadParameters(StimulusModel):
 class SetParameters(StimulusModel):
     """Set parameters of a node, as `ros2 param set` does, and read them before and after.
 
-    The type of a value is that of the YAML: `1` is an integer, `1.0` a double.
+    A value has the type that it has in the YAML: `1` is an integer, `1.0` a double.
     """
 
     key = "set_parameters"

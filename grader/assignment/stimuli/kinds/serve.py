@@ -183,10 +183,10 @@ class Serve(StimulusModel):
 class ServeService(Serve):
     """Offer a service that the student's node calls.
 
-    Each answer of the list is given once, in order, to a request with its `when`. The last one that
-    fits is given again and again. A request that none fits gets a response of zeros. Values may use
-    `$name` of `random` and quantities such as `30 deg`. What was asked is in the recording's
-    `asked`. The stimulus is `done` 1 s after every answer was given.
+    Each answer of the list is given once, in order, to a request that fits its `when`. The last
+    answer that fits is repeated. If no answer fits, the request gets a response of zeros. Values
+    may use `$name` of `random` and quantities such as `30 deg`. What was asked is in the
+    recording's `asked`. The stimulus is `done` 1 s after every answer was given.
     """
 
     heading = "serve a service"
@@ -204,7 +204,7 @@ class ServeService(Serve):
 class ServeAction(Serve):
     """Offer an action that the student's node sends goals to.
 
-    Answers are chosen as those of a served service are. A goal that none fits is rejected. Goals
+    Answers are chosen as in `serve` for a service. If no answer fits a goal, it is rejected. Goals
     and cancel requests are in the recording's `asked`. The stimulus is `done` 1 s after every
     answer was given and its goal has ended.
     """
