@@ -75,7 +75,7 @@ class OdometryOrigin(str, Enum):
 class Drive(Model):
     """A velocity command that the robot gets without a message on its topic.
 
-    For scenarios in which the student's node only subscribes to a moving robot.
+    It is for scenarios in which the robot moves and the student's node only subscribes.
     """
 
     at: DurationOrZero = Field(description="Simulated time at which it acts.")
@@ -246,12 +246,12 @@ class ClockTopic(TopicOptions):
 class TransformTopic(TopicOptions):
     """The topics of transforms: `odom` to `base_footprint`, and what is fixed to the robot.
 
-    Published where the package tf2_msgs is installed. A scenario that names `tf` among its `topics`
-    has them everywhere, and records them.
+    They are published if the package tf2_msgs is installed. If a scenario has `tf` in its `topics`,
+    they are always published, and recorded.
     """
 
     enabled: bool = Field(
-        True, description="Whether they are published: not where students publish them."
+        True, description="Whether they are published. Set it to false if students publish them."
     )
     topic: TopicName = Field("/tf", description="Fully qualified name.")
     static_topic: TopicName = Field("/tf_static", description="For what is fixed to the robot.")

@@ -28,12 +28,12 @@
         body: JSON.stringify({ version: panel.dataset.version, attempt: panel.dataset.attempt, ...what }),
       });
       const body = await answer.text();
-      if (!answer.ok) return fail(`${body}\nNothing was saved. What you typed stays in its box.`);
+      if (!answer.ok) return fail(`${body}\nNothing was saved. Your text stays in its box.`);
       problem.hidden = true;
       swap(body);
       return true;
     } catch {
-      return fail("rosgrade review cannot be reached any more. Nothing was saved. Start it again; what you typed stays in its box.");
+      return fail("rosgrade review cannot be reached any more. Nothing was saved. Start it again. Your text stays in its box.");
     }
   }));
   const swap = (html) => {

@@ -31,7 +31,7 @@
     } catch {
       said = "rosgrade review cannot be reached any more. Start it again.";
     }
-    problem.querySelector("p").textContent = `${said}\nNothing was saved. What you typed stays in its box.`;
+    problem.querySelector("p").textContent = `${said}\nNothing was saved. Your text stays in its box.`;
     problem.hidden = false;
     problem.scrollIntoView();
   });

@@ -456,8 +456,8 @@ class Assignment(Model):
         (),
         description="Python libraries that students may import in addition to the standard "
         "library, ROS and numpy, by their names for pip, such as `[scipy, pillow]`. They must be "
-        "installed on the machine that grades. In a sandbox there are no others, but where ROS is "
-        "sourced those of the system; the report then names them.",
+        "installed on the machine that grades. In a sandbox, students cannot import others. "
+        "With a sourced ROS they can also import the system's; the report then names them.",
     )
     underlays: tuple[str, ...] = Field(
         (),

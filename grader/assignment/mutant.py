@@ -105,7 +105,7 @@ class Variant(Change):
 class MutantFile(Model):
     """The mutants and variants of an assignment: `assignments/<id>/mutants.yaml`.
 
-    Those of the reference in C++ are in `mutants_cpp.yaml`.
+    The file for the reference in C++ is `mutants_cpp.yaml`.
     """
 
     rosgrade: Literal[1] = Field(description="Version of this format.")
