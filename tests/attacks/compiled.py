@@ -199,7 +199,7 @@ COMPILED = {
     "cpp_endless_loop": ended(_ENDLESS, "s of CPU time, 3 s are allowed"),
     "cpp_ignores_signals": compiled(
         _DEAF + "while (true) {\n  tick();\n  usleep(100000);\n}",
-        lost=frozenset({"ends"}),
+        lost=frozenset({"ends", "timer"}),
         named=("SIGKILL",),
     ),
     "cpp_daemon": compiled(_DAEMON, lost=frozenset({"ends"}), named=("86397",)),

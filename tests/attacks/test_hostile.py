@@ -443,7 +443,7 @@ ATTACKS = {
     "ignores_signals": Attack(
         "for n in (2, 15, 1):\n    signal.signal(n, signal.SIG_IGN)\n"
         "while True:\n    node.tick() or time.sleep(.1)",
-        lost=frozenset({"ends"}),
+        lost=frozenset({"ends", "timer"}),
         named=("SIGKILL",),
     ),
     "hides_shared_memory": ended(HIDDEN_MEMORY.format(mib=600), "MiB of memory"),

@@ -11,7 +11,7 @@ from grader.diagnosis.no_messages import FewMessages, NoMessages
 from grader.diagnosis.process.exceptions import CPP_ROWS, TABLE, Raised, Row
 from grader.diagnosis.process.failure import Failure, Frame
 from grader.docs import explanations_markdown
-from tests.checks.builder import declared, recording, submission
+from tests.checks.builder import declared, package, recording, submission
 
 ALL = [(symptom, entry) for symptom, entries in explanations().items() for entry in entries]
 
@@ -150,3 +150,9 @@ def test_the_fields_that_a_message_has_are_listed() -> None:
     run = recording(declarations=(declared("exiting", 2.0, fields="x y z"),))
     raised = Raised(Failure("AttributeError", "'Vector3' object has no attribute 'w'", ()), run)
     assert cause_of(raised) == "`Vector3` has the fields `x`, `y` and `z`."
+
+
+def test_a_module_of_nobody_is_not_looked_for_in_a_package_at_the_top() -> None:
+    run = recording(submission=submission(package(path="."), files=("bot_publisher/node.py",)))
+    hint = cause_of(Raised(Failure("ModuleNotFoundError", "No module named 'pydantic'", ()), run))
+    assert hint.startswith("Python does not find this module: check its spelling")

@@ -177,7 +177,7 @@ def file_not_installed(symptom: Raised) -> str | None:
 def _own_file(submission: SubmissionRecord, name: str) -> tuple[str, PackageRecord | None]:
     """A file of the submission by its name, with the package that it lies in; None without one."""
     file = next((path for path in submission.files if f"/{path}".endswith(f"/{name}")), "")
-    owners = [one for one in submission.packages if file.startswith(one.file(""))]
+    owners = [one for one in submission.packages if file and file.startswith(one.file(""))]
     return file, max(owners, key=lambda one: len(one.path), default=None)
 
 
