@@ -136,7 +136,7 @@ def test_no_answer_breaks_a_check(calls, services, goals, log, processes, distur
         disturbance=disturbance,
     )  # fmt: skip
     for name in NAMES:
-        finding = judge(name, run, **PARAMETERS[name])
+        finding = judge(name, run, **PARAMETERS.get(name, {}))
         assert isinstance(finding, Finding)
         assert finding.expected and finding.observed
         assert (finding.credit == 1.0) == (finding.status is Status.PASSED)
