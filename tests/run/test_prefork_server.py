@@ -150,8 +150,8 @@ def test_a_student_inherits_no_descriptor_but_its_own(run_node: RunNode) -> None
     standard = [target for fd, target in held if int(fd) <= 2]
     others = [target for fd, target in held if int(fd) > 2]
     assert standard[0] == "/dev/null"
-    # The tracer's two pipes, and nothing of the prefork server's or of another cell's.
-    assert len([target for target in others if target.startswith("pipe:")]) == 2
+    # The tracer's three pipes, and nothing of the prefork server's or of another cell's.
+    assert len([target for target in others if target.startswith("pipe:")]) == 3
     assert not [target for target in others if target.startswith("socket:")]
 
 
