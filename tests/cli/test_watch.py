@@ -86,7 +86,7 @@ def test_a_save_is_graded_again_and_ctrl_c_leaves_nothing(tmp_path: Path) -> Non
 
         node.write_text(right.replace("PERIOD_S = 0.4", "PERIOD_S = 2.5"))
         # What failed last is told as soon as it is known.
-        read_until(watch.stdout, "rosgrade: builds passes now")
+        read_until(watch.stdout, "passes now")
         read_until(watch.stdout, "run: recording")
         watch.send_signal(signal.SIGINT)
         told, _ = watch.communicate(timeout=60)
