@@ -15,6 +15,7 @@ from grader.assignment.limits import BuildLimitOptions, LimitOptions
 from grader.assignment.stimuli.stimulus import Stimulus
 from grader.assignment.variable import Variable
 from grader.checks.window import Phase, Window
+from grader.findings.words import Words
 from grader.spec.name import (
     BuildTypes,
     Durability,
@@ -374,10 +375,11 @@ class CheckSpec(Model):
     requires: tuple[Id, ...] = Field(
         (), description="Checks that must pass; otherwise this check is skipped."
     )
-    hint: str | tuple[str, ...] = Field(
+    hint: str | Words | tuple[str | Words, ...] = Field(
         "",
-        description="What to try if the check fails, in the author's words; or steps in a list, "
-        "from a nudge to nearly the answer, of which a student asks for each after the first.",
+        description="What to try if the check fails, in the author's words; where Python and C++ "
+        "differ, `{python: ..., cpp: ...}`. Or steps in a list, from a nudge to nearly the answer, "
+        "of which a student asks for each after the first.",
     )
     visibility: Visibility = Field(Visibility.VISIBLE, description="When students see the check.")
 
@@ -390,9 +392,9 @@ class CheckSpec(Model):
         return self
 
     @property
-    def hints(self) -> tuple[str, ...]:
+    def hints(self) -> tuple[str | Words, ...]:
         """The steps of the hint; none where there is no hint."""
-        steps = (self.hint,) if isinstance(self.hint, str) else self.hint
+        steps = self.hint if isinstance(self.hint, tuple) else (self.hint,)
         return tuple(filter(None, steps))
 
     @property

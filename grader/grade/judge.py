@@ -22,7 +22,8 @@ from grader.diagnosis.no_parameter import why_not_taken
 from grader.diagnosis.not_built import why_lacking, why_not_built
 from grader.findings.finding import Finding, Status
 from grader.findings.wording import percent
-from grader.grade.language import finding_in_cpp, in_cpp, is_cpp
+from grader.findings.words import speaking
+from grader.grade.language import finding_in_cpp, is_cpp
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
 from grader.grade.naming import named, with_stand_ins
 from grader.grade.origins import with_origins
@@ -30,7 +31,7 @@ from grader.grade.runtime_imports import with_runtime_imports
 from grader.grade.windowed import judged_in
 from grader.measure.parameter_calls import undeclared
 from grader.recording.model import Ending, Recording
-from grader.submission.record import CPP, SubmissionRecord
+from grader.submission.record import CPP, PYTHON, SubmissionRecord
 
 if TYPE_CHECKING:
     # Reading YAML is not needed to judge; a worker of a batch starts without it.
@@ -90,6 +91,8 @@ def grade(
                 roots, findings = lacking, (_skipped([results[root] for root in lacking]),)
         spec = bound[name].spec
         speaks_cpp = is_cpp(known, _about(bound[name], loaded))
+        with speaking(CPP if speaks_cpp else PYTHON):
+            hints = tuple(map(str, spec.hints))
         if speaks_cpp:
             findings = tuple(replace(one, finding=finding_in_cpp(one.finding)) for one in findings)
         status, credit = _counted(spec.counts, [item.finding for item in findings])
@@ -104,7 +107,7 @@ def grade(
             scenarios=tuple(scenario.id for scenario in loaded.scenarios_of(bound[name])),
             findings=findings,
             waits_for=roots,
-            hints=tuple(map(in_cpp, spec.hints)) if speaks_cpp else spec.hints,
+            hints=hints,
             credit=credit,
             put_right=put_right and status is Status.FAILED,
         )

@@ -42,7 +42,11 @@ CHECKS = [
     "{id: a, uses: timing.period, points: 1, with: {topic: /cmd_vel, period: 300 ms}}",
     "{id: a, uses: timing.period, points: 1, with: {topic: /cmd_vel, period: 1e-1s}}",
     "{id: a, uses: node.alive, points: 1, requires: [], scenarios: [run]}",
+    "{id: a, uses: node.alive, points: 1, hint: {python: x, cpp: y}}",
+    "{id: a, uses: node.alive, points: 1, hint: [x, {python: x, cpp: y}]}",
     # From here on each has one mistake.
+    "{id: a, uses: node.alive, points: 1, hint: {python: x}}",
+    "{id: a, uses: node.alive, points: 1, hint: {python: x, cpp: y, rust: z}}",
     "{id: a, uses: node.alive}",
     "{id: a, points: 1}",
     "{id: a, uses: node.alive, python: 'checks.py:mine', points: 1}",
@@ -60,7 +64,7 @@ CHECKS = [
     "{id: a, uses: timing.period, points: 1, with: {topic: /cmd_vel, period: 0}}",
     "{id: a, uses: timing.period, points: 1, with: {topic: /cmd_vel, period: '12:30'}}",
 ]
-_GOOD = 6
+_GOOD = 8
 
 
 @pytest.mark.parametrize(("check", "good"), [(c, i < _GOOD) for i, c in enumerate(CHECKS)])

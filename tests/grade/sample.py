@@ -36,7 +36,7 @@ class Told:
     points: float = 1.0
     scenarios: tuple[str, ...] = ()
     title: str = ""
-    hint: str | Sequence[str] = ""
+    hint: str | Sequence[str | dict[str, str]] = ""
     visibility: str = "visible"
     counts: str = "worst"
     uses: str = "told.told"

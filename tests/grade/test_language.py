@@ -7,13 +7,14 @@ import re
 from collections.abc import Iterator
 
 import pytest
-import yaml
 
 from grader import resources
+from grader.assignment.load import list_assignments, load_assignment
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import NoParameters, Subject
 from grader.diagnosis.explanation import explanations
 from grader.findings.finding import Status
+from grader.findings.words import speaking
 from grader.grade import grade
 from grader.grade.language import in_cpp, is_cpp
 from grader.submission.record import CPP, PYTHON, PackageRecord, SourceFile
@@ -101,9 +102,6 @@ def _all_texts() -> Iterator[tuple[str, str]]:
             own = {name for where, name in declared if where == module}
             for statement in _spoken(ast.parse(file.read_text(encoding="utf-8")), own):
                 yield from ((f"{file}:{statement.lineno}", text) for text in _texts(statement))
-    for file in sorted(resources.assignments().glob("*/assignment.yaml")):
-        for check in yaml.safe_load(file.read_text(encoding="utf-8"))["checks"]:
-            yield f"{file}: {check['id']}", check.get("hint", "")
 
 
 def test_no_word_of_python_is_left_for_students_of_cpp() -> None:
@@ -114,6 +112,18 @@ def test_no_word_of_python_is_left_for_students_of_cpp() -> None:
         for where, text in texts
         if (found := _OF_PYTHON.search(in_cpp(text)))
     ]
+    assert not left, "\n".join(left)
+
+
+def test_hints_of_the_lessons_have_no_word_of_python_for_students_of_cpp() -> None:
+    with speaking(CPP):
+        left = [
+            f"{name}: {bound.spec.id}: {found[0]!r}"
+            for name in list_assignments()
+            for bound in load_assignment(name).checks
+            for hint in bound.spec.hints
+            if (found := _OF_PYTHON.search(str(hint)))
+        ]
     assert not left, "\n".join(left)
 
 
@@ -174,10 +184,11 @@ def test_findings_and_hints_of_the_author_are_in_the_language_of_the_package() -
     compiled = PackageRecord("bot_publisher", "src/bot_publisher", "ament_cmake")
     files = ("src/bot_publisher/src/bot.cpp",)
     handed_in = make_submission(packages=(compiled,), files=files)
-    loaded = make_loaded([Told("node", FAIL, hint="Call rclpy.init() first.")])
+    words = {"python": "Call rclpy.init() first.", "cpp": "Call rclcpp::init(argc, argv) first."}
+    loaded = make_loaded([Told("node", FAIL, hint=[words, "It imports rclpy."])])
     for record, expected in (
-        (handed_in, ("Call rclcpp::spin(node).", "Call rclcpp::init(argc, argv) first.")),
-        (make_submission(), ("Call rclpy.spin(node).", "Call rclpy.init() first.")),
+        (handed_in, ("Call rclcpp::spin(node).", words["cpp"], "It imports rclpy.")),
+        (make_submission(), ("Call rclpy.spin(node).", words["python"], "It imports rclpy.")),
     ):
         run = {"listen": make_recording(submission=record)}
         result = grade(loaded, record, run).result("node")
