@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import wraps
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 from grader.checks.need import Doubt, Need
 from grader.findings.finding import Finding, Status
@@ -102,61 +102,52 @@ class Check:
         return self.documentation.partition("\n")[0].rstrip(".")
 
 
-class Reason(Protocol):
-    """Why something is not as expected: a :class:`~grader.diagnosis.cause.Cause`."""
-
-    def finding(self, expected: str) -> Finding:
-        """The finding of a check that expected something else."""
-
-
 class Unmet(Exception):
-    """What a check asks for is not there."""
+    """Ends a check with what it found; only :func:`stop_if` raises it."""
 
-    def __init__(self, reason: Reason) -> None:
+    def __init__(self, found: Finding) -> None:
         super().__init__()
-        self.reason = reason
+        self.found = found
 
 
-def stop_if(reason: Reason | None) -> None:
-    """End a check here if there is a reason: its finding says what is expected, and the reason."""
-    if reason is not None:
-        raise Unmet(reason)
+def stop_if(found: Finding | None) -> None:
+    """End a check here if something is not as it should be: that is its finding."""
+    if found is not None:
+        raise Unmet(found)
 
 
-def stop_if_any(reasons: Iterable[Reason | None]) -> None:
-    """End a check here by the first of some reasons, one for each case, that is the student's.
+def stop_if_any(findings: Iterable[Finding | None]) -> None:
+    """End a check here by the first of some findings, one for each case, that is the student's.
 
     Only where there is none, by one of the machine: an undisturbed case decides without the others.
     """
     undecided = None
-    for reason in reasons:
-        if reason is not None and reason.finding("").status is not Status.ERROR:
-            stop_if(reason)
-        undecided = undecided or reason
+    for found in findings:
+        if found is not None and found.status is not Status.ERROR:
+            stop_if(found)
+        undecided = undecided or found
     stop_if(undecided)
 
 
 def check(
     name: str, subject: Subject, parameters: type[Parameters] = NoParameters, concept: str = ""
-) -> Callable[[Callable[[Any, Any], Finding | Reason]], Check]:
+) -> Callable[[Callable[[Any, Any], Finding]], Check]:
     """Make a :class:`Check` of a function; its docstring becomes the catalogue's text.
 
-    It returns a finding, or the reason why what its parameters ask for is not so.
+    A finding that does not say what is expected expects what the parameters ask for.
     """
 
-    def decorate(judge: Callable[[Any, Any], Finding | Reason]) -> Check:
+    def decorate(judge: Callable[[Any, Any], Finding]) -> Check:
         @wraps(judge)
         def judged(subject: Any, parameters: Any) -> Finding:
             try:
                 found = judge(subject, parameters)
             except Unmet as unmet:
-                found = unmet.reason
+                found = unmet.found
             except NoSuchField as error:
-                text = f"the assignment expects what cannot be: {error}"
-                return Finding.error(parameters.asked_for, text)
-            finding = found if isinstance(found, Finding) else found.finding(parameters.asked_for)
-            is_open = finding.status is Status.FAILED and not finding.concept
-            return replace(finding, concept=concept) if is_open else finding
+                found = Finding.ours(f"the assignment expects what cannot be: {error}")
+            named = found.concept or (concept if found.status is Status.FAILED else "")
+            return replace(found, expected=found.expected or parameters.asked_for, concept=named)
 
         return Check(name, subject, parameters, judged, concept)
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from grader.checks.check import stop_if
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_endpoint import SERVICE, Word, why_not_met, why_not_offered
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.fields import (
@@ -17,7 +16,7 @@ from grader.findings.fields import (
     unlike,
     words,
 )
-from grader.findings.finding import Evidence, Moment, Table
+from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.value import EXACT, Tolerance
 from grader.findings.wording import code
 from grader.recording.interaction import NO_SERVER, Goal
@@ -46,13 +45,13 @@ def judged_requests(
     stop_if(why_not_offered(recording, kind, name, own[0].type if own else None))
     failed = next((one.error for one in own if one.error not in ("", NO_SERVER)), None)
     if failed:
-        stop_if(Cause(f"{code(name)} could not be asked: {failed}", ours=True))
+        stop_if(Finding.ours(f"{code(name)} could not be asked: {failed}"))
     found = tuple(one for one in own if not unlike(_content(one), fields, EXACT) and is_judged(one))
     if not found:
         request = "call" if kind is SERVICE else "goal"
         which = f" with {words(fields)}" if fields else ""
         never = f"the probe sent no such {request}{which} to {code(name)}"
-        stop_if(why_ended(recording) or Cause.to_repeat(never))
+        stop_if(why_ended(recording) or Finding.undecided(never))
     for one in found:
         if one.error:
             stop_if(why_not_met(recording, kind, name, _sent_ns(one)))
@@ -75,7 +74,7 @@ def why_other_fields(
     tolerance: Tolerance,
     evidence: Evidence,
     hint: str = "",
-) -> Cause | None:
+) -> Finding | None:
     """Which fields of an answer are not as expected, or None if all are.
 
     Args:
@@ -84,7 +83,7 @@ def why_other_fields(
     found = unlike(value or {}, wanted, tolerance)
     if not found:
         return None
-    return Cause(
+    return Finding(
         f"{seen} {difference_words(found)}",
         hint or fields_hint(part, value or {}, [item.field for item in found]),
         replace(evidence, tables=(difference_table(part.capitalize(), found), *evidence.tables)),

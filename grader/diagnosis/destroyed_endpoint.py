@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.process.process_exit import ended_early, exited
-from grader.findings.finding import Evidence, Moment
+from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code
 from grader.measure import declarations
 from grader.recording.interaction import Service, executor_services
@@ -21,7 +20,7 @@ _HINT = (
 
 def why_unsubscribed(
     recording: Recording, topic: str, seen: str, sent_ns: int | None = None
-) -> Cause | None:
+) -> Finding | None:
     """The cause if the student's code destroyed its subscriptions to a topic, or None.
 
     Args:
@@ -33,7 +32,7 @@ def why_unsubscribed(
     return _why_destroyed(recording, seen, f"the subscription to {code(topic)}", subscriptions)
 
 
-def why_unpublished(recording: Recording, topic: str, seen: str) -> Cause | None:
+def why_unpublished(recording: Recording, topic: str, seen: str) -> Finding | None:
     """The same of its publishers on a topic."""
     publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
     return _why_destroyed(recording, seen, f"the publisher on {code(topic)}", publishers)
@@ -41,7 +40,7 @@ def why_unpublished(recording: Recording, topic: str, seen: str) -> Cause | None
 
 def _why_destroyed(
     recording: Recording, seen: str, what: str, found: tuple[Endpoint | Service, ...]
-) -> Cause | None:
+) -> Finding | None:
     """The cause if the student's code destroyed all of some endpoints.
 
     What vanished with its process, or because the scenario ended that, was not destroyed.
@@ -52,7 +51,7 @@ def _why_destroyed(
     return _destroyed_at(recording, seen, what, {item.node for item in found}, max(ends))
 
 
-def why_dropped(recording: Recording, kind: Kind, topic: str) -> Cause | None:
+def why_dropped(recording: Recording, kind: Kind, topic: str) -> Finding | None:
     """The cause if the student's code lost its endpoints on a topic where it created them.
 
     What the scenario asks for may make a node create and destroy endpoints, as a lifecycle node.
@@ -71,7 +70,7 @@ def why_dropped(recording: Recording, kind: Kind, topic: str) -> Cause | None:
     return _destroyed_at(recording, "it was there only for a moment", what, nodes, last_ns)
 
 
-def why_withdrawn(recording: Recording, what: str, found: tuple[Service, ...]) -> Cause | None:
+def why_withdrawn(recording: Recording, what: str, found: tuple[Service, ...]) -> Finding | None:
     """The cause if the student's code destroyed a server before it answered anything."""
     names = {item.name for item in found}
     own = {name for item in found for name in executor_services(item.node)}
@@ -85,7 +84,7 @@ def why_withdrawn(recording: Recording, what: str, found: tuple[Service, ...]) -
 
 def _destroyed_at(
     recording: Recording, seen: str, what: str, nodes: set[str], last_ns: int
-) -> Cause | None:
+) -> Finding | None:
     """The cause, unless the process ended itself or the scenario did something to it."""
     for node in nodes:
         process = declarations.process_of(recording, node)
@@ -97,7 +96,7 @@ def _destroyed_at(
         ):
             return None
     when_s = recording.since_launch_s(last_ns)
-    return Cause(
+    return Finding(
         f"{seen}: {what} was destroyed {when_s:.2f} s after launch, while the process still ran",
         _HINT,
         Evidence(moments=(Moment(f"{what.replace('`', '')} was destroyed", when_s),)),

@@ -4,27 +4,28 @@ A *symptom* is what a check saw: no message on a topic, a process that ended. An
 function from a symptom to its cause, or to None where it does not apply::
 
     @explanation(NoMessages)
-    def other_type(symptom: NoMessages) -> Cause | None:
+    def other_type(symptom: NoMessages) -> Finding | None:
         \"\"\"The publisher has another message type.\"\"\"
 
-It lies in any module of this package, and its docstring is its line in the documentation. Those in
-the module of the symptom are asked first, in the order of their definition: the deepest cause comes
-first. Those of other modules follow, and after them the general ones, which nearly always apply.
+It lies in any module of this package, and its docstring is its line in the documentation. It serves
+the symptoms that are derived from its own, too. The deepest cause is asked first: in one module
+they stand in this order, and one of another module says ``before=`` or ``after=`` which it is
+asked. The general ones, which nearly always apply, follow after all others.
 """
 
 from __future__ import annotations
 
 import inspect
-from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from graphlib import TopologicalSorter
 from importlib import import_module
 from pkgutil import walk_packages
 from typing import Any, ClassVar, Generic, TypeVar, cast
 
 from grader import diagnosis
-from grader.diagnosis.cause import Cause
+from grader.findings.finding import Finding, Status
 
 A = TypeVar("A")
 S = TypeVar("S", bound="Symptom[Any]")
@@ -50,6 +51,8 @@ class Explanation:
         sentence: What it explains: the text of the documentation.
         example: How Python says it, or nothing.
         only: The one language of the programs that it explains, or nothing if any.
+        before: Functions of other explanations that are asked later, if this one is asked.
+        after: Those that are asked sooner.
     """
 
     symptom: type[Symptom[Any]]
@@ -61,6 +64,15 @@ class Explanation:
     example: str = ""
     only: str = ""
     concept: str = ""
+    before: tuple[Callable[[Any], Any], ...] = ()
+    after: tuple[Callable[[Any], Any], ...] = ()
+
+    def follows(self, other: Explanation, *, is_later: bool) -> bool:
+        """Whether it is asked after another one of its symptom, which may be defined later."""
+        if self.is_general != other.is_general:
+            return self.is_general
+        in_order = self.module == other.module and is_later
+        return in_order or other.apply in self.after or self.apply in other.before
 
 
 def add(entry: Explanation) -> None:
@@ -69,13 +81,20 @@ def add(entry: Explanation) -> None:
 
 
 def explanation(
-    *symptoms: type[Symptom[Any]], general: bool = False, only: str = "", concept: str = ""
+    *symptoms: type[Symptom[Any]],
+    general: bool = False,
+    before: tuple[Callable[[Any], Any], ...] = (),
+    after: tuple[Callable[[Any], Any], ...] = (),
+    only: str = "",
+    concept: str = "",
 ) -> Callable[[Callable[[S], A]], Callable[[S], A]]:
     """Put a function into the catalogue.
 
     Args:
         symptoms: Which it explains.
         general: Asked after all others: it says only what is there in any case.
+        before: Explanations of other modules that are asked later.
+        after: Explanations of other modules that are asked sooner.
         only: The one language of the programs that it explains.
         concept: The page of ``docs/concepts`` that explains the idea.
     """
@@ -85,7 +104,8 @@ def explanation(
         for symptom in symptoms:
             name, module = apply.__name__, apply.__module__
             entry = Explanation(symptom, name, apply, module, sentence, general)
-            add(replace(entry, only=only, concept=concept or symptom.concept))
+            named = concept or symptom.concept
+            add(replace(entry, only=only, concept=named, before=before, after=after))
         return apply
 
     return register
@@ -96,26 +116,49 @@ def explanations() -> dict[type[Symptom[Any]], tuple[Explanation, ...]]:
     """All explanations by their symptom, in the order in which they are asked."""
     for module in walk_packages(diagnosis.__path__, f"{diagnosis.__name__}."):
         import_module(module.name)
-    found: dict[type[Symptom[Any]], list[Explanation]] = defaultdict(list)
-    for entry in _DEFINED:
-        found[entry.symptom].append(entry)
-    return {
-        symptom: tuple(
-            sorted(
-                entries,
-                key=lambda one: (one.is_general, one.module != symptom.__module__),
-            )
+    found = {}
+    for symptom in _derived(Symptom):
+        entries = [entry for entry in _DEFINED if issubclass(symptom, entry.symptom)]
+        found[symptom] = tuple(in_order(entries))
+    return {symptom: entries for symptom, entries in found.items() if entries}
+
+
+def _derived(symptom: type[Symptom[Any]]) -> Iterator[type[Symptom[Any]]]:
+    for one in symptom.__subclasses__():
+        yield one
+        yield from _derived(one)
+
+
+def in_order(entries: Sequence[Explanation]) -> Iterator[Explanation]:
+    """The explanations of one symptom as they are asked.
+
+    Raises:
+        LookupError: Nothing decides which of two is asked first.
+    """
+    sorter = TopologicalSorter[int]()
+    for number, one in enumerate(entries):
+        earlier = (
+            index
+            for index, other in enumerate(entries)
+            if index != number and one.follows(other, is_later=number > index)
         )
-        for symptom, entries in found.items()
-    }
+        sorter.add(number, *earlier)
+    sorter.prepare()
+    while sorter.is_active():
+        number, *others = sorter.get_ready()
+        if others:
+            names = [f"{entries[one].module}.{entries[one].name}" for one in (number, *others)]
+            raise LookupError(f"say by before= or after= which is asked first: {', '.join(names)}")
+        yield entries[number]
+        sorter.done(number)
 
 
 def explain(symptom: Symptom[A]) -> A | None:
     """The deepest explanation of a symptom that applies, or None."""
     for entry in explanations()[type(symptom)]:
         answer = entry.apply(symptom)
-        if isinstance(answer, Cause) and not answer.concept:
-            answer = replace(answer, concept=entry.concept)
+        if isinstance(answer, Finding) and answer.status is Status.FAILED:
+            answer = replace(answer, concept=answer.concept or entry.concept)
         if answer is not None:
             return cast(A, answer)
     return None

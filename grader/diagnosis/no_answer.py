@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_endpoint import Word, offered
 from grader.diagnosis.process.blocked_executor import HINT, at_its_place, why_never_spun
 from grader.diagnosis.process.process_exit import ended_early, exited, why_it_exited
 from grader.diagnosis.process.raised import in_brackets, own_frames, parse_failures, raised_at
 from grader.diagnosis.process.standing import Stand, where_it_stands
-from grader.findings.finding import Evidence, Moment
+from grader.findings.finding import Evidence, Finding, Moment
 from grader.measure import declarations
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
@@ -23,7 +22,7 @@ _ROUNDING_S = 1e-6
 
 
 @dataclass(frozen=True)
-class NoAnswer(Symptom[Cause], concept="executors"):
+class NoAnswer(Symptom[Finding], concept="executors"):
     """A call or a goal was not answered in time.
 
     Attributes:
@@ -38,7 +37,7 @@ class NoAnswer(Symptom[Cause], concept="executors"):
     name: str
     asked_ns: int
     within_s: float
-    while_busy: Cause | None = None
+    while_busy: Finding | None = None
 
     @property
     def node(self) -> str:
@@ -69,7 +68,7 @@ class NoAnswer(Symptom[Cause], concept="executors"):
         process = self.process
         return where_it_stands(self.recording, process.name) if process else None
 
-    def placed(self, cause: Cause) -> Cause:
+    def placed(self, cause: Finding) -> Finding:
         """A cause with the time of the call, and with where the process did not go on."""
         when_s = self.recording.since_launch_s(self.asked_ns)
         evidence = Evidence(moments=(Moment("call, not answered in time", when_s),))
@@ -87,7 +86,7 @@ def why_late(
     seen: str,
     hint: str,
     evidence: Evidence,
-) -> Cause | None:
+) -> Finding | None:
     """Why an answer did not come in time, or None if it did.
 
     Args:
@@ -100,7 +99,7 @@ def why_late(
         return None
     seen = f"{seen} for {format_duration(took_s)}"
     taken = why_taken(recording, seen, asked_ns, answered_ns, within_s)
-    return taken or Cause(seen, hint, evidence)
+    return taken or Finding(seen, hint, evidence)
 
 
 def why_unanswered(
@@ -110,34 +109,34 @@ def why_unanswered(
     name: str,
     asked_ns: int,
     within_s: float,
-    while_busy: Cause | None = None,
-) -> Cause:
+    while_busy: Finding | None = None,
+) -> Finding:
     """Why an answer did not come in time."""
     return cause_of(NoAnswer(recording, what, server, name, asked_ns, within_s, while_busy))
 
 
 @explanation(NoAnswer)
-def process_gone(symptom: NoAnswer) -> Cause | None:
+def process_gone(symptom: NoAnswer) -> Finding | None:
     """The process ended."""
     return why_gone(symptom.recording, symptom.what, symptom.node)
 
 
 @explanation(NoAnswer)
-def no_cpu_time(symptom: NoAnswer) -> Cause | None:
+def no_cpu_time(symptom: NoAnswer) -> Finding | None:
     """The machine gave the process too little CPU time; this is an error and costs no points."""
     recording = symptom.recording
     return why_taken(recording, symptom.what, symptom.asked_ns, recording.stop_ns, symptom.within_s)
 
 
 @explanation(NoAnswer)
-def callback_raised(symptom: NoAnswer) -> Cause | None:
+def callback_raised(symptom: NoAnswer) -> Finding | None:
     """A callback raised an exception."""
     own = [symptom.process] if symptom.process else []
     return why_raised(symptom.recording, symptom.what, symptom.asked_ns, own)
 
 
 @explanation(NoAnswer)
-def never_spun(symptom: NoAnswer) -> Cause | None:
+def never_spun(symptom: NoAnswer) -> Finding | None:
     """rclpy.spin() is never called, or the node is not given to the executor that spins."""
     if symptom.process is None:
         return None
@@ -145,11 +144,11 @@ def never_spun(symptom: NoAnswer) -> Cause | None:
 
 
 @explanation(NoAnswer)
-def blocked_executor(symptom: NoAnswer) -> Cause | None:
+def blocked_executor(symptom: NoAnswer) -> Finding | None:
     """A callback does not return and blocks the executor."""
     blocked = None if symptom.spins else symptom.while_busy
     if symptom.spins is False and blocked is None:
-        blocked = Cause(
+        blocked = Finding(
             f"{symptom.what}: something blocks the executor; the node's parameter services do "
             "not answer either",
             f"{HINT} A call() to another service waits for an answer that the same executor must "
@@ -159,11 +158,11 @@ def blocked_executor(symptom: NoAnswer) -> Cause | None:
 
 
 @explanation(NoAnswer, general=True)
-def callback_does_not_answer(symptom: NoAnswer) -> Cause:
+def callback_does_not_answer(symptom: NoAnswer) -> Finding:
     """The callback does not finish, or waits for another callback of its group."""
     spins = ", although the node's executor spins" if symptom.spins else ""
     return symptom.placed(
-        Cause(
+        Finding(
             f"{symptom.what}{spins}",
             "Does the callback reach its end and return the response? A callback that waits for "
             "another callback of the same callback group waits for ever.",
@@ -171,7 +170,7 @@ def callback_does_not_answer(symptom: NoAnswer) -> Cause:
     )
 
 
-def why_gone(recording: Recording, what: str, node: str) -> Cause | None:
+def why_gone(recording: Recording, what: str, node: str) -> Finding | None:
     """Why the process of a node ended early, or None if it did not."""
     process = declarations.process_of(recording, node)
     ended = exited(recording) if process is None else (process,)
@@ -182,7 +181,7 @@ def why_gone(recording: Recording, what: str, node: str) -> Cause | None:
 
 def why_taken(
     recording: Recording, what: str, begin_ns: int, end_ns: int, within_s: float
-) -> Cause | None:
+) -> Finding | None:
     """The machine's doing, if it took as much as something was too late; else None.
 
     An answer that never came was not due where the observation ended before its time.
@@ -191,15 +190,15 @@ def why_taken(
     excess_s = (end_ns - begin_ns) / NS - within_s
     if excess_s < -_ROUNDING_S:
         ended = format_duration((end_ns - begin_ns) / NS)
-        return Cause.to_repeat(f"{what}: the run ended {ended} later, before the answer was due")
+        return Finding.undecided(f"{what}: the run ended {ended} later, before the answer was due")
     if stolen_s <= 0.0 or stolen_s < excess_s:
         return None
-    return Cause.held_up(what, stolen_s)
+    return Finding.held_up(what, stolen_s)
 
 
 def why_raised(
     recording: Recording, what: str, begin_ns: int, processes: Iterable[Process] | None = None
-) -> Cause | None:
+) -> Finding | None:
     """An exception that a process printed and survived from a time on; None if there is none.
 
     Args:
@@ -218,7 +217,7 @@ def why_raised(
         if raised is None:
             continue
         place = raised_at(raised, recording)
-        return Cause(
+        return Finding(
             f"{what}: an exception was raised meanwhile, {raised}{in_brackets(place)}",
             "Correct the line that is named here."
             if place

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_dropped, why_withdrawn
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_node import why_no_node
@@ -65,7 +64,7 @@ _WORDS = (PUBLISHER, SUBSCRIPTION, SERVICE, ACTION, CLIENT, ACTION_CLIENT)
 
 
 @dataclass(frozen=True)
-class NoEndpoint(Symptom[Cause], concept="names"):
+class NoEndpoint(Symptom[Finding], concept="names"):
     """A publisher, a subscription, a service, an action, or a client of one is missing.
 
     Attributes:
@@ -112,7 +111,7 @@ def offered(recording: Recording, word: Word, name: str) -> tuple[Service, ...]:
     return tuple(item for item in items if item.name == name)
 
 
-def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | None:
+def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Finding | None:
     """Why the student has no such endpoint on a topic, or None if there is one."""
     if recording.student_endpoints(kind, topic):
         return None
@@ -128,7 +127,7 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | Non
 
 def why_not_offered(
     recording: Recording, word: Word, name: str, interface: str | None = None
-) -> Cause | None:
+) -> Finding | None:
     """Why no node of the student offers a service or action, or None if one does."""
     symptom = NoEndpoint(recording, word, name, (interface,) if interface else ())
     if any(one.name == name and interface in (None, one.type) for one in symptom.there):
@@ -149,7 +148,7 @@ def is_offered(recording: Recording, word: Word, name: str, interface: str | Non
     servers = offered(recording, word, name)
     cause = cause or why_withdrawn(recording, f"the {word.noun} {code(name)}", servers)
     if cause is not None:
-        return cause.finding(expected)
+        return replace(cause, expected=expected)
     found = servers[0]
     when_s = recording.since_launch_s(found.appeared_ns)
     return Finding.passed(
@@ -160,9 +159,9 @@ def is_offered(recording: Recording, word: Word, name: str, interface: str | Non
     )
 
 
-def why_not_met(recording: Recording, word: Word, name: str, asked_ns: int) -> Cause:
+def why_not_met(recording: Recording, word: Word, name: str, asked_ns: int) -> Finding:
     """Why something that was offered could not be asked."""
-    return Cause(
+    return Finding(
         f"the {word.noun} {code(name)} could not be asked: it was there, but went away, or did not "
         "match a client with the default QoS",
         f"Keep the {word.noun} and its node as long as the program runs, and do not change its "
@@ -191,19 +190,19 @@ def misnamed(recording: Recording, kind: Kind, topic: str) -> str:
 
 
 @explanation(NoEndpoint)
-def no_node(symptom: NoEndpoint) -> Cause | None:
+def no_node(symptom: NoEndpoint) -> Finding | None:
     """There is no node at all."""
     return why_no_node(symptom.recording)
 
 
 @explanation(NoEndpoint, concept="interfaces")
-def other_interface(symptom: NoEndpoint) -> Cause | None:
+def other_interface(symptom: NoEndpoint) -> Finding | None:
     """The service or action has another type."""
     own = next((one for one in symptom.there if one.name == symptom.name), None)
     if own is None or not symptom.types:
         return None
     package, folder, short = symptom.types[0].split("/")
-    return Cause(
+    return Finding(
         f"the {symptom.word.noun} {code(own.name)} has the type {code(own.type)}",
         "A client and a server communicate only if they use the same type: "
         f"`from {package}.{folder} import {short}`.",
@@ -212,7 +211,7 @@ def other_interface(symptom: NoEndpoint) -> Cause | None:
 
 
 @explanation(NoEndpoint)
-def misspelt_name(symptom: NoEndpoint) -> Cause | None:
+def misspelt_name(symptom: NoEndpoint) -> Finding | None:
     """Its name is misspelt, private, in a namespace, or in wrong upper or lower case."""
     ended, wanted = crashed(symptom.recording), symptom.name
     # What a process that lives has is no misspelling of what another never came to create.
@@ -233,24 +232,24 @@ def misspelt_name(symptom: NoEndpoint) -> Cause | None:
             hint += " Leave out `~/`, which puts the node's name in front, and any namespace."
     match = match or nearest(wanted, [item.name for item in suspects])
     found = f"the node {symptom.word.does} {code(match or '')} instead of {code(wanted)}{why}"
-    return Cause(found, hint, symptom.evidence) if match else None
+    return Finding(found, hint, symptom.evidence) if match else None
 
 
 @explanation(NoEndpoint)
-def process_crashed(symptom: NoEndpoint) -> Cause | None:
+def process_crashed(symptom: NoEndpoint) -> Finding | None:
     """The process ended with a failure before it created it."""
     return why_crashed(symptom.recording)
 
 
 @explanation(NoEndpoint)
-def dropped(symptom: NoEndpoint) -> Cause | None:
+def dropped(symptom: NoEndpoint) -> Finding | None:
     """It ended with the constructor or the callback that created it."""
     kind = {PUBLISHER: Kind.PUBLISHER, SUBSCRIPTION: Kind.SUBSCRIPTION}.get(symptom.word)
     return why_dropped(symptom.recording, kind, symptom.name) if kind else None
 
 
 @explanation(NoEndpoint)
-def never_appeared(symptom: NoEndpoint) -> Cause | None:
+def never_appeared(symptom: NoEndpoint) -> Finding | None:
     """The process created it, but it never appeared in the ROS graph."""
     noun, name = symptom.word.noun, symptom.name
     if not declarations.declares(symptom.recording, noun, topic=name):
@@ -259,13 +258,13 @@ def never_appeared(symptom: NoEndpoint) -> Cause | None:
 
 
 @explanation(NoEndpoint, general=True)
-def others_only(symptom: NoEndpoint) -> Cause:
+def others_only(symptom: NoEndpoint) -> Finding:
     """The node has only others, perhaps of the right type, or none."""
     word, nodes = symptom.word, codes(node.name for node in symptom.recording.student_nodes)
     there = codes(item.name for item in symptom.there)
     same = codes(item.name for item in symptom.there if item.type in symptom.types)
     has = f"created {word.noun}s only for {there}" if there else f"created no {word.noun}"
-    return Cause(
+    return Finding(
         f"{nodes} {has}" + (f"; the type is right on {same}" if same else ""),
         f"Call {symptom.create} in the node's constructor.",
         symptom.evidence,

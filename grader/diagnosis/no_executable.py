@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.not_built import existing_package, why_not_built
-from grader.findings.finding import Evidence
+from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes
 from grader.spec.nearest_name import nearest
 from grader.submission.record import CPP, PYTHON, PackageRecord, SourceError, SubmissionRecord
 
 
 @dataclass(frozen=True)
-class NoExecutable(Symptom[Cause], concept="packages"):
+class NoExecutable(Symptom[Finding], concept="packages"):
     """An executable is missing, or its function does not exist."""
 
     submission: SubmissionRecord
@@ -34,7 +33,7 @@ class NoExecutable(Symptom[Cause], concept="packages"):
         return where if folder else ""
 
 
-def why_no_executable(submission: SubmissionRecord, package: str, name: str) -> Cause | None:
+def why_no_executable(submission: SubmissionRecord, package: str, name: str) -> Finding | None:
     """Why a package has no executable of a name, or None if it has one."""
     cause = why_not_built(submission, package)
     if cause is not None:
@@ -53,7 +52,7 @@ def _at(package: PackageRecord, file: str, what: str) -> Evidence:
 
 
 @explanation(NoExecutable, only=PYTHON)
-def no_such_function(symptom: NoExecutable) -> Cause | None:
+def no_such_function(symptom: NoExecutable) -> Finding | None:
     """The entry point names a module or function that does not exist or is not installed."""
     target = dict(symptom.package.missing_targets).get(symptom.name)
     if target is None:
@@ -70,17 +69,17 @@ def no_such_function(symptom: NoExecutable) -> Cause | None:
             "file there; it may be empty."
         )
     seen = f"the entry point {code(entry)} does not work: {target}"
-    return Cause(seen, hint, Evidence(places=(target,)))
+    return Finding(seen, hint, Evidence(places=(target,)))
 
 
 @explanation(NoExecutable, only=PYTHON)
-def installed_elsewhere(symptom: NoExecutable) -> Cause | None:
+def installed_elsewhere(symptom: NoExecutable) -> Finding | None:
     """setup.cfg is missing or wrong: the executable is in bin/ or in another package's folder."""
     package = symptom.package
     if not symptom.misplaced or package.build_type != "ament_python":
         return None
     folder = f"$base/lib/{package.name}"
-    return Cause(
+    return Finding(
         symptom.misplaced,
         f"setup.cfg beside setup.py must hold these four lines: [develop] / script_dir={folder} / "
         f"[install] / install_scripts={folder}",
@@ -89,7 +88,7 @@ def installed_elsewhere(symptom: NoExecutable) -> Cause | None:
 
 
 @explanation(NoExecutable, only=CPP)
-def not_installed_by_cmake(symptom: NoExecutable) -> Cause | None:
+def not_installed_by_cmake(symptom: NoExecutable) -> Finding | None:
     """CMakeLists.txt does not build it, or does not install it where `ros2 run` looks."""
     package, name = symptom.package, symptom.name
     if package.build_type == "ament_python":
@@ -102,7 +101,7 @@ def not_installed_by_cmake(symptom: NoExecutable) -> Cause | None:
     elif name in package.executables:
         seen = f"ROS does not find the package, so `ros2 run {package.name}` does not either"
     line = f"install(TARGETS {name} DESTINATION lib/${{PROJECT_NAME}})"
-    return Cause(
+    return Finding(
         seen,
         f"CMakeLists.txt needs `add_executable({name} src/<file>.cpp)`, then {code(line)} "
         "(of a Python script only install(PROGRAMS ...)), and `ament_package()` as its last line.",
@@ -111,12 +110,12 @@ def not_installed_by_cmake(symptom: NoExecutable) -> Cause | None:
 
 
 @explanation(NoExecutable, only=PYTHON)
-def no_console_scripts(symptom: NoExecutable) -> Cause | None:
+def no_console_scripts(symptom: NoExecutable) -> Finding | None:
     """setup.py defines no executables."""
     if symptom.package.entry_points:
         return None
     entry = f"{symptom.name} = {symptom.package.name}.<your module>:main"
-    return Cause(
+    return Finding(
         "setup.py defines no console_scripts",
         f"Add to setup.py: entry_points={{'console_scripts': ['{entry}']}}.",
         symptom.setup_py,
@@ -124,18 +123,18 @@ def no_console_scripts(symptom: NoExecutable) -> Cause | None:
 
 
 @explanation(NoExecutable, general=True, only=PYTHON)
-def other_console_scripts(symptom: NoExecutable) -> Cause:
+def other_console_scripts(symptom: NoExecutable) -> Finding:
     """setup.py gives the executable another name, or setup() does not get it."""
     name, scripts = symptom.name, [script for script, _ in symptom.package.entry_points]
     if name in scripts:
-        return Cause(
+        return Finding(
             f"setup.py defines {code(name)}, but the build did not install it",
             "Give it to setup() in entry_points={'console_scripts': [...]}, and write this line in "
             f"setup.cfg: install_scripts=$base/lib/{symptom.package.name}.",
             symptom.setup_py,
         )
     match = nearest(name, scripts)
-    return Cause(
+    return Finding(
         f"setup.py defines {code(match) if match else codes(scripts)}",
         "The left side of an entry of console_scripts is the executable's name: write "
         f"'{name} = ...'.",
@@ -143,7 +142,7 @@ def other_console_scripts(symptom: NoExecutable) -> Cause:
     )
 
 
-def why_nothing_to_run(package: PackageRecord) -> Cause | None:
+def why_nothing_to_run(package: PackageRecord) -> Finding | None:
     """A syntax error that leaves no executable of the package to run."""
     origins = dict(package.files)
     broken = {error.file: error for error in package.syntax_errors}
@@ -159,7 +158,7 @@ def why_nothing_to_run(package: PackageRecord) -> Cause | None:
     hint = "Correct this line or the one before it"
     if "null bytes" in errors[0].message:
         hint = "Save this file as plain text in UTF-8, not in UTF-16"
-    return Cause(
+    return Finding(
         f"Python cannot read {errors[0]}",
         f"{hint}; `colcon build` prints the error too, but goes on.",
         Evidence(places=tuple(dict.fromkeys(errors))),

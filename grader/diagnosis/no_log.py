@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_messages import why_few, why_not_delivered
@@ -15,7 +14,7 @@ from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spu
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.process.raised import defined_at
 from grader.diagnosis.wrong_value import factor_words
-from grader.findings.finding import Evidence, Moment
+from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.wording import code, counted, listing
 from grader.measure.printed import (
@@ -46,7 +45,7 @@ _RESENDS = ("reliable", "unknown")
 
 
 @dataclass(frozen=True)
-class NotLogged(Symptom[Cause]):
+class NotLogged(Symptom[Finding]):
     """The log does not show what the node received.
 
     Attributes:
@@ -120,25 +119,25 @@ def why_not_logged(
     decimals: int,
     within_ns: int,
     own: bool,
-) -> Cause:
+) -> Finding:
     """Why fewer messages than needed were followed by log lines with their values."""
     return cause_of(NotLogged(recording, topic, wanted, found, needed, decimals, within_ns, own))
 
 
 @explanation(NotLogged)
-def not_delivered(symptom: NotLogged) -> Cause | None:
+def not_delivered(symptom: NotLogged) -> Finding | None:
     """The messages do not reach the node."""
     return None if symptom.own else why_not_delivered(symptom.recording, symptom.topic)
 
 
 @explanation(NotLogged)
-def process_ended(symptom: NotLogged) -> Cause | None:
+def process_ended(symptom: NotLogged) -> Finding | None:
     """The process ended."""
     return why_ended(symptom.recording, symptom.seen)
 
 
 @explanation(NotLogged, concept="qos")
-def no_history(symptom: NotLogged) -> Cause | None:
+def no_history(symptom: NotLogged) -> Finding | None:
     """A late joiner does not request earlier messages (transient_local)."""
     wanted, recording = symptom.wanted, symptom.recording
     if symptom.own or not wanted or wanted[-1].message.stamp_ns >= recording.launched_ns:
@@ -147,7 +146,7 @@ def no_history(symptom: NotLogged) -> Cause | None:
         durability, reliability = item.qos.durability, item.qos.reliability
         if durability in _KEEPS and reliability in _RESENDS:
             continue
-        return Cause(
+        return Finding(
             f"{symptom.seen}: the messages were published before the subscription was there, and "
             f"it requests durability {durability} and reliability {reliability}. It matches the "
             "publisher, but gets only what is published from then on",
@@ -161,7 +160,7 @@ def no_history(symptom: NotLogged) -> Cause | None:
 
 
 @explanation(NotLogged)
-def too_few_sent(symptom: NotLogged) -> Cause | None:
+def too_few_sent(symptom: NotLogged) -> Finding | None:
     """Too few messages were sent: the program destroyed its subscription, or a fault occurred."""
     number = len(symptom.wanted)
     if number >= symptom.needed:
@@ -169,11 +168,11 @@ def too_few_sent(symptom: NotLogged) -> Cause | None:
     if symptom.own:
         return why_few(symptom.recording, symptom.topic, symptom.needed)
     sent = f"only {counted(number, 'message was', 'messages were')} sent on {code(symptom.topic)}"
-    return why_unsubscribed(symptom.recording, symptom.topic, sent) or Cause.to_repeat(sent)
+    return why_unsubscribed(symptom.recording, symptom.topic, sent) or Finding.undecided(sent)
 
 
 @explanation(NotLogged)
-def no_cpu_time(symptom: NotLogged) -> Cause | None:
+def no_cpu_time(symptom: NotLogged) -> Finding | None:
     """The machine gave the process too little CPU time; this is an error and costs no points."""
     recording, wanted = symptom.recording, symptom.wanted
     begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].due_ns + symptom.within_ns
@@ -185,14 +184,14 @@ def no_cpu_time(symptom: NotLogged) -> Cause | None:
         blocked = blocked_executor(symptom)
         if blocked is not None:
             return replace(blocked, disturbed=True)
-    return Cause.to_repeat(
+    return Finding.undecided(
         f"log lines for {code(symptom.topic)} are late or missing, but the machine took "
         f"{format_duration(stolen_s)} from the process meanwhile"
     )
 
 
 @explanation(NotLogged)
-def subscription_destroyed(symptom: NotLogged) -> Cause | None:
+def subscription_destroyed(symptom: NotLogged) -> Finding | None:
     """The program destroyed its subscription."""
     if symptom.own:
         return None
@@ -200,7 +199,7 @@ def subscription_destroyed(symptom: NotLogged) -> Cause | None:
 
 
 @explanation(NotLogged)
-def never_spun(symptom: NotLogged) -> Cause | None:
+def never_spun(symptom: NotLogged) -> Finding | None:
     """rclpy.spin() is never called, so the callback is never called."""
     if symptom.own:
         return None
@@ -213,28 +212,27 @@ def never_spun(symptom: NotLogged) -> Cause | None:
 
 
 @explanation(NotLogged)
-def blocked_executor(symptom: NotLogged) -> Cause | None:
+def blocked_executor(symptom: NotLogged) -> Finding | None:
     """A callback does not return, and blocks the executor."""
     begin_ns = symptom.recording.carried(symptom.topic)[0].stamp_ns
     return why_blocked(symptom.recording, symptom.seen, symptom.nodes, begin_ns)
 
 
 @explanation(NotLogged)
-def output_dropped(symptom: NotLogged) -> Cause | None:
+def output_dropped(symptom: NotLogged) -> Finding | None:
     """The program wrote more than is kept; this is an error and costs no points."""
     dropped = sum(process.dropped_bytes for process in symptom.recording.processes)
     if not dropped:
         return None
-    return Cause(
+    return Finding.ours(
         f"nothing about {code(symptom.topic)} is in the output that was kept, but the process "
         f"wrote {dropped} bytes more",
         "Write less: a line for each message is enough.",
-        ours=True,
     )
 
 
 @explanation(NotLogged)
-def callbacks_wait(symptom: NotLogged) -> Cause | None:
+def callbacks_wait(symptom: NotLogged) -> Finding | None:
     """Callbacks wait for each other, so lines are missing or late."""
     # What a late line shows may look like something else of the message that came before it.
     limit = format_duration(symptom.within_ns / NS)
@@ -243,14 +241,14 @@ def callbacks_wait(symptom: NotLogged) -> Cause | None:
 
 
 @explanation(NotLogged)
-def only_some_logged(symptom: NotLogged) -> Cause | None:
+def only_some_logged(symptom: NotLogged) -> Finding | None:
     """Only some messages are logged: an if, once=True or throttle_duration_sec skips the others."""
     recording, topic, found = symptom.recording, symptom.topic, symptom.found
     if not found:
         return None
     times_s = [recording.since_launch_s(echo.lines[-1].time_ns) for echo in found]
     written = listing(f"{time_s:.2f} s" for time_s in times_s)
-    return Cause(
+    return Finding(
         f"{symptom.seen}, written {written} after launch",
         "Log in every call of the callback, or as often as is asked: an `if`, once=True, "
         "skip_first=True and throttle_duration_sec=... leave lines out.",
@@ -262,13 +260,13 @@ def only_some_logged(symptom: NotLogged) -> Cause | None:
 
 
 @explanation(NotLogged)
-def no_f_string(symptom: NotLogged) -> Cause | None:
+def no_f_string(symptom: NotLogged) -> Finding | None:
     """The lines show `{x}` or `%f` instead of values: no f before the quotes."""
     line = _meant(symptom)
     unfilled = UNFILLED.search(logged_text(line.text)) if line else None
     if line is None or unfilled is None:
         return None
-    return Cause(
+    return Finding(
         f"log lines follow messages on {code(symptom.topic)}, but they show {code(unfilled[0])} "
         f"instead of a value: {quote(line.text)}",
         "Python fills in braces only where an f stands before the quotes: "
@@ -278,7 +276,7 @@ def no_f_string(symptom: NotLogged) -> Cause | None:
 
 
 @explanation(NotLogged)
-def wrong_sign_or_unit(symptom: NotLogged) -> Cause | None:
+def wrong_sign_or_unit(symptom: NotLogged) -> Finding | None:
     """The lines show a value 10, 100 or 1000 times too large, in degrees, or with a wrong sign."""
     found: list[tuple[str, str, LogLine]] = []
     for item in symptom.wanted:
@@ -292,7 +290,7 @@ def wrong_sign_or_unit(symptom: NotLogged) -> Cause | None:
     if number < max(_ALIKE, symptom.needed):
         return None
     line = next(one[2] for one in found if one[:2] == (path, words))
-    return Cause(
+    return Finding(
         f"log lines follow messages on {code(symptom.topic)}, but {code(path)} in them {words}: "
         f"{quote(line.text)}",
         f"Log {code(f'msg.{path}')} as it is in the message: ROS has metres, seconds and radians "
@@ -302,7 +300,7 @@ def wrong_sign_or_unit(symptom: NotLogged) -> Cause | None:
 
 
 @explanation(NotLogged)
-def other_values(symptom: NotLogged) -> Cause | None:
+def other_values(symptom: NotLogged) -> Finding | None:
     """The lines show other values: another field, exchanged names, an older message."""
     line, item, decimals = _meant(symptom), symptom.wanted[-1], symptom.decimals
     if line is None:
@@ -317,7 +315,7 @@ def other_values(symptom: NotLogged) -> Cause | None:
     names = dict.fromkeys(name for path in missing for name in Expression.of(path).fields)
     fields = listing(code(f"msg.{name}") for name in names)
     given = "is published" if symptom.own else "the callback is given"
-    return Cause(
+    return Finding(
         f"log lines follow messages on {code(symptom.topic)}, but none shows {values}: "
         f"{quote(line.text)}{how}",
         f"Log the fields of the message that {given}: {fields}.",
@@ -326,7 +324,7 @@ def other_values(symptom: NotLogged) -> Cause | None:
 
 
 @explanation(NotLogged, general=True)
-def nothing_logged(symptom: NotLogged) -> Cause:
+def nothing_logged(symptom: NotLogged) -> Finding:
     """Nothing is logged when a message comes."""
     recording, topic = symptom.recording, symptom.topic
     lines = output_lines(recording)
@@ -342,7 +340,7 @@ def nothing_logged(symptom: NotLogged) -> Cause:
     if symptom.own:
         seen = symptom.seen
         hint = "Log the message where it is published: self.get_logger().info('...')."
-    return Cause(
+    return Finding(
         seen + (f"; the process wrote {quote(lines[0].text)}" if lines else ""),
         hint,
         Evidence(

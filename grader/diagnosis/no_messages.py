@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unpublished, why_unsubscribed
 from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.process.process_exit import why_ended
-from grader.findings.finding import Evidence, Moment
+from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.wording import code, codes, counted
 from grader.measure.compatibility import compatibility_table, refusals, sides
@@ -29,7 +28,7 @@ _INACTIVE = "but the publisher is not activated"
 
 
 @dataclass(frozen=True)
-class OnTopic(Symptom[Cause]):
+class OnTopic(Symptom[Finding]):
     """Something is missing on a topic, as the student's endpoints of a kind have it."""
 
     recording: Recording
@@ -139,36 +138,36 @@ def seconds_hint(period_s: float = 0.3) -> str:
     return f"create_timer takes its period in seconds: {period_s:g} is {format_duration(period_s)}."
 
 
-def why_silent(recording: Recording, topic: str) -> Cause:
+def why_silent(recording: Recording, topic: str) -> Finding:
     """Why nothing was recorded on a topic."""
     return cause_of(NoMessages(recording, topic))
 
 
-def why_few(recording: Recording, topic: str, needed: int) -> Cause:
+def why_few(recording: Recording, topic: str, needed: int) -> Finding:
     """Why fewer messages than needed were recorded on a topic."""
     if not recording.on(topic):
         return why_silent(recording, topic)
     return cause_of(FewMessages(recording, topic, needed))
 
 
-def why_not_delivered(recording: Recording, topic: str) -> Cause | None:
+def why_not_delivered(recording: Recording, topic: str) -> Finding | None:
     """Why no message on a topic can have reached the student, or None if it must have."""
     return explain(NotDelivered(recording, topic))
 
 
-def why_not_sent(recording: Recording, topic: str) -> Cause:
+def why_not_sent(recording: Recording, topic: str) -> Finding:
     """Why a stimulus published nothing; without another reason the run should be repeated."""
-    return why_not_delivered(recording, topic) or Cause.to_repeat(
+    return why_not_delivered(recording, topic) or Finding.undecided(
         f"nothing was sent on {code(topic)}"
     )
 
 
-def why_unreadable(recording: Recording, topic: str) -> Cause | None:
+def why_unreadable(recording: Recording, topic: str) -> Finding | None:
     """Why messages on a topic could not be read, or None where all could."""
     number = recording.unreadable.get(topic, 0)
     if not number:
         return None
-    return Cause(
+    return Finding(
         f"{counted(number, 'message')} on {code(topic)} cannot be read: the bytes that were "
         "published are not a message of its type",
         "Give publish() a message object, not bytes: it publishes bytes unchanged.",
@@ -179,13 +178,13 @@ def why_unreadable(recording: Recording, topic: str) -> Cause | None:
 
 
 @explanation(NoMessages, only=CPP)
-def not_activated(symptom: NoMessages) -> Cause | None:
+def not_activated(symptom: NoMessages) -> Finding | None:
     """The publisher of a lifecycle node was never activated, as the log says."""
     lines = [line.text for line in symptom.recording.log if _INACTIVE in line.text]
     said = tuple(line for line in lines if f"'{symptom.topic}'" in line)
     if not said:
         return None
-    return Cause(
+    return Finding(
         f"{symptom.seen}: the log says that its publisher is not activated",
         "In on_activate() of the node call LifecycleNode::on_activate(state), which activates all "
         "of its publishers, or publisher_->on_activate().",
@@ -194,13 +193,13 @@ def not_activated(symptom: NoMessages) -> Cause | None:
 
 
 @explanation(NoMessages, NotDelivered)
-def no_endpoint(symptom: OnTopic) -> Cause | None:
+def no_endpoint(symptom: OnTopic) -> Finding | None:
     """The node has no publisher, or no subscription, on the topic."""
     return why_no_endpoint(symptom.recording, symptom.kind, symptom.topic)
 
 
 @explanation(NoMessages, NotDelivered, concept="interfaces")
-def other_type(symptom: OnTopic) -> Cause | None:
+def other_type(symptom: OnTopic) -> Finding | None:
     """The publisher and the subscription have different message types or definitions."""
     wanted = sorted({item.type for item in symptom.others})
     found = sorted({item.type for item in symptom.own})
@@ -209,7 +208,7 @@ def other_type(symptom: OnTopic) -> Cause | None:
         return None
     package, _, short = wanted[0].split("/")
     other = "with another definition" if misdefined else f"not {codes(wanted, last='or')}"
-    return Cause(
+    return Finding(
         f"{symptom.seen}: the {symptom.kind.value} on {code(symptom.topic)} has the type "
         f"{codes(found)}, {other}",
         "A publisher and a subscription communicate only if they use the same type: "
@@ -220,24 +219,24 @@ def other_type(symptom: OnTopic) -> Cause | None:
 
 
 @explanation(NoMessages, FewMessages)
-def unreadable(symptom: OnTopic) -> Cause | None:
+def unreadable(symptom: OnTopic) -> Finding | None:
     """The program publishes bytes that are not a message of this type."""
     return why_unreadable(symptom.recording, symptom.topic)
 
 
 @explanation(NoMessages, NotDelivered, concept="qos")
-def incompatible_qos(symptom: OnTopic) -> Cause | None:
+def incompatible_qos(symptom: OnTopic) -> Finding | None:
     """The publisher's QoS offers less (reliability, durability, deadline) than requested."""
     return why_refused(symptom) if symptom.pairs == symptom.refused else None
 
 
-def why_refused(symptom: OnTopic) -> Cause | None:
+def why_refused(symptom: OnTopic) -> Finding | None:
     """The cause if the QoS of an endpoint of the student's refuses another one, or is refused."""
     if not symptom.refused:
         return None
     other = "its reader" if symptom.kind is Kind.PUBLISHER else "the publisher"
     pair = symptom.refused[0]
-    return Cause(
+    return Finding(
         f"{symptom.seen}: the {symptom.kind.value}'s QoS does not match {other} on "
         f"{code(symptom.topic)} ({', '.join(refusals(*pair))})",
         "A subscription receives nothing from a publisher that offers less than it requests. A "
@@ -250,7 +249,7 @@ def why_refused(symptom: OnTopic) -> Cause | None:
 
 
 @explanation(NotDelivered, general=True)
-def nothing_sent(symptom: NotDelivered) -> Cause | None:
+def nothing_sent(symptom: NotDelivered) -> Finding | None:
     """The process ended or destroyed its subscription before a message was sent."""
     recording, topic = symptom.recording, symptom.topic
     carried = recording.carried(topic)
@@ -261,51 +260,51 @@ def nothing_sent(symptom: NotDelivered) -> Cause | None:
     return (
         why_ended(recording)
         or why_unsubscribed(recording, topic, "nothing was sent while it was there")
-        or Cause.to_repeat(f"nothing was sent on {code(topic)}, so there was nothing to receive")
+        or Finding.undecided(f"nothing was sent on {code(topic)}, so there was nothing to receive")
     )
 
 
 @explanation(NoMessages)
-def never_matched(symptom: NoMessages) -> Cause | None:
+def never_matched(symptom: NoMessages) -> Finding | None:
     """Because the machine was busy, the publisher and the probe did not discover each other."""
     if not was_held_up(symptom.recording) or not any(
         item.data.get("topic") == symptom.topic and item.data.get("matched") is False
         for item in symptom.recording.declared("held")
     ):
         return None
-    return Cause.to_repeat(
+    return Finding.undecided(
         f"the subscription of rosgrade did not match the publisher on {code(symptom.topic)} in "
         "time, so a message could be lost"
     )
 
 
 @explanation(NoMessages, FewMessages)
-def process_ended(symptom: OnTopic) -> Cause | None:
+def process_ended(symptom: OnTopic) -> Finding | None:
     """The process ended before it published, or before it published enough."""
     return why_ended(symptom.recording, symptom.seen)
 
 
 @explanation(FewMessages)
-def too_little_cpu_time(symptom: FewMessages) -> Cause | None:
+def too_little_cpu_time(symptom: FewMessages) -> Finding | None:
     """Without the delays of the machine, the process may have published enough."""
     number = len(symptom.recording.on(symptom.topic))
     left_to_it_s = symptom.watched_s - symptom.stolen_s
     if symptom.stolen_s <= 0.0 or number * symptom.watched_s < symptom.needed * left_to_it_s:
         return None
-    return Cause.to_repeat(
+    return Finding.undecided(
         f"{symptom.seen}, but the machine took {format_duration(symptom.stolen_s)} of them from "
         "the process"
     )
 
 
 @explanation(NoMessages, FewMessages)
-def publisher_destroyed(symptom: OnTopic) -> Cause | None:
+def publisher_destroyed(symptom: OnTopic) -> Finding | None:
     """The program destroyed its publisher."""
     return why_unpublished(symptom.recording, symptom.topic, symptom.seen)
 
 
 @explanation(NoMessages)
-def nothing_to_answer(symptom: NoMessages) -> Cause | None:
+def nothing_to_answer(symptom: NoMessages) -> Finding | None:
     """The messages that the node should answer did not reach it."""
     causes = [why_not_delivered(symptom.recording, name) for name in symptom.asked]
     cause = causes[0] if causes and all(causes) else None

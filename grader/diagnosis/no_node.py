@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.not_built import why_not_built
 from grader.diagnosis.process.blocked_executor import at_its_place
 from grader.diagnosis.process.process_exit import why_crashed, why_ended
 from grader.diagnosis.process.standing import where_it_stands
 from grader.diagnosis.undeclared import why_never_appeared
-from grader.findings.finding import Evidence
+from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import nodes_seen, until_the_end
 from grader.findings.wording import code, codes
 from grader.measure import declarations
@@ -24,7 +23,7 @@ _START = "start of "
 
 
 @dataclass(frozen=True)
-class NoNode(Symptom[Cause], concept="nodes"):
+class NoNode(Symptom[Finding], concept="nodes"):
     """No node of the student appeared."""
 
     recording: Recording
@@ -52,7 +51,7 @@ class NoNode(Symptom[Cause], concept="nodes"):
 
 
 @dataclass(frozen=True)
-class OtherNode(Symptom[Cause], concept="names"):
+class OtherNode(Symptom[Finding], concept="names"):
     """A node does not have the expected name."""
 
     recording: Recording
@@ -74,12 +73,12 @@ class OtherNode(Symptom[Cause], concept="names"):
         return self.wanted.rpartition("/")[2]
 
 
-def why_no_node(recording: Recording) -> Cause | None:
+def why_no_node(recording: Recording) -> Finding | None:
     """Why the student has no node at all, or None if there is one."""
     return None if recording.student_nodes else cause_of(NoNode(recording))
 
 
-def why_not_node(recording: Recording, name: str) -> Cause | None:
+def why_not_node(recording: Recording, name: str) -> Finding | None:
     """Why a certain node did not appear, or None if it did."""
     if name in [node.name for node in recording.student_nodes]:
         return None
@@ -87,7 +86,7 @@ def why_not_node(recording: Recording, name: str) -> Cause | None:
 
 
 @explanation(NoNode)
-def not_built(symptom: NoNode) -> Cause | None:
+def not_built(symptom: NoNode) -> Finding | None:
     """The packages did not build."""
     submission = symptom.recording.submission
     build, package = submission.build, symptom.what.partition(":")[0].partition("/")[0]
@@ -98,7 +97,7 @@ def not_built(symptom: NoNode) -> Cause | None:
         return cause and cause.after("nothing was launched")
     if symptom.what or build is None or build.succeeded:
         return None
-    return Cause(
+    return Finding(
         "nothing was launched, because the packages did not build",
         "Correct the build first: `colcon build` names the line.",
         Evidence(places=(build.culprit,) if build.culprit else ()),
@@ -117,7 +116,7 @@ _NOT_STARTED = {
 
 
 @explanation(NoNode)
-def no_executable(symptom: NoNode) -> Cause | None:
+def no_executable(symptom: NoNode) -> Finding | None:
     """The executable does not exist, or cannot be started."""
     if symptom.is_launched:
         return None
@@ -125,7 +124,7 @@ def no_executable(symptom: NoNode) -> Cause | None:
     packages = symptom.recording.submission.packages
     installed = [name for package in packages for name in package.executables]
     there = f"; installed are {codes(installed)}" if installed else ""
-    return Cause(
+    return Finding(
         f"{code(what)} could not be started: {why}{there}"
         if why
         else f"nothing was launched, because the executable does not exist{there}",
@@ -134,13 +133,13 @@ def no_executable(symptom: NoNode) -> Cause | None:
 
 
 @explanation(NoNode)
-def process_ended(symptom: NoNode) -> Cause | None:
+def process_ended(symptom: NoNode) -> Finding | None:
     """The process ended before it created a node."""
     return why_ended(symptom.recording)
 
 
 @explanation(NoNode)
-def never_appeared(symptom: NoNode) -> Cause | None:
+def never_appeared(symptom: NoNode) -> Finding | None:
     """The node never appeared in the ROS graph, as after a change of ROS_DOMAIN_ID."""
     if not symptom.declares("node") and not symptom.recording.environment.get("other_domains"):
         return None
@@ -148,7 +147,7 @@ def never_appeared(symptom: NoNode) -> Cause | None:
 
 
 @explanation(NoNode, general=True)
-def main_does_not_come_to_it(symptom: NoNode) -> Cause:
+def main_does_not_come_to_it(symptom: NoNode) -> Finding:
     """main() creates no node: a loop, time.sleep() or input() comes before it."""
     recording, name = symptom.recording, symptom.process.name
     stand = where_it_stands(recording, name)
@@ -158,7 +157,7 @@ def main_does_not_come_to_it(symptom: NoNode) -> Cause:
     elif declarations.traced(recording, name):
         done = "never called rclpy.init()"
     lines = tuple(line.text for line in recording.log if line.process == name)
-    cause = Cause(
+    cause = Finding(
         f"the process {code(name)} ran until the end, but {done}",
         "main() must call rclpy.init() and create the node right after it. Look for a loop, "
         "time.sleep() or input() before that, also at the top level of a module: a launched node "
@@ -172,7 +171,7 @@ def main_does_not_come_to_it(symptom: NoNode) -> Cause:
 
 
 @explanation(OtherNode)
-def process_crashed(symptom: OtherNode) -> Cause | None:
+def process_crashed(symptom: OtherNode) -> Finding | None:
     """The process of the node ended with a failure before it created the node."""
     # Without the namespaces, which make any two names alike.
     bases = [name.rpartition("/")[2].lower() for name in symptom.names]
@@ -182,7 +181,7 @@ def process_crashed(symptom: OtherNode) -> Cause | None:
 
 
 @explanation(OtherNode)
-def node_never_appeared(symptom: OtherNode) -> Cause | None:
+def node_never_appeared(symptom: OtherNode) -> Finding | None:
     """The process created the node, but it never appeared in the ROS graph."""
     # A process may declare anything, also what is no text.
     declared = {str(item.data.get("node")) for item in symptom.recording.declared("node")}
@@ -194,7 +193,7 @@ def node_never_appeared(symptom: OtherNode) -> Cause | None:
 
 
 @explanation(OtherNode, general=True)
-def other_name(symptom: OtherNode) -> Cause:
+def other_name(symptom: OtherNode) -> Finding:
     """The node has another name: wrong upper or lower case, a namespace, or a misspelling."""
     how = ""
     for name in symptom.names:
@@ -203,7 +202,7 @@ def other_name(symptom: OtherNode) -> Cause:
             how = ": upper and lower case differ"
         elif base == symptom.base:
             how = f": the name is right, but the node is in the namespace {code(space or '/')}"
-    return Cause(
+    return Finding(
         f"{symptom.seen}{how}",
         f"The node's name is the argument of super().__init__('{symptom.base}') in its "
         "constructor. Upper and lower case matter, and a namespace (the argument or `__ns`) "

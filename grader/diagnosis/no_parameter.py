@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_answer import why_late, why_unanswered
 from grader.diagnosis.no_endpoint import SERVICE
 from grader.diagnosis.no_node import why_not_node
 from grader.diagnosis.process.process_exit import why_ended
-from grader.findings.finding import Evidence, Moment
+from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code, codes
 from grader.measure.parameter_calls import calls_to, descriptor, undeclared
 from grader.measure.parameter_calls import names as declared
@@ -23,7 +22,7 @@ _ANSWER_S = 1.0
 
 
 @dataclass(frozen=True)
-class NotDeclared(Symptom[Cause]):
+class NotDeclared(Symptom[Finding]):
     """A parameter is not declared."""
 
     recording: Recording
@@ -40,13 +39,13 @@ class NotDeclared(Symptom[Cause]):
         """Calls that ask which parameters there are."""
         return calls_to(self.recording, self.node, "list_parameters", "describe_parameters")
 
-    def cause(self, seen: str) -> Cause:
+    def cause(self, seen: str) -> Finding:
         """The cause for what is declared instead."""
         hint = f"Call self.declare_parameter('{self.name}', default) in the node's constructor."
-        return Cause(seen, hint, Evidence(moments=answered_at(self.recording, self.asked)))
+        return Finding(seen, hint, Evidence(moments=answered_at(self.recording, self.asked)))
 
 
-def why_not_declared(recording: Recording, node: str, name: str) -> Cause | None:
+def why_not_declared(recording: Recording, node: str, name: str) -> Finding | None:
     """Why a node does not declare a parameter, or None if it does."""
     symptom = NotDeclared(recording, node, name)
     lost = why_not_node(recording, node) or why_services_silent(recording, symptom.asked)
@@ -57,7 +56,7 @@ def why_not_declared(recording: Recording, node: str, name: str) -> Cause | None
 
 
 @explanation(NotDeclared)
-def services_not_asked(symptom: NotDeclared) -> Cause | None:
+def services_not_asked(symptom: NotDeclared) -> Finding | None:
     """The process ended, or a callback blocked the node, before the probe could ask."""
     found = descriptor(symptom.recording, symptom.node, symptom.name)
     if symptom.asked and (found is not None or symptom.name not in symptom.there):
@@ -66,7 +65,7 @@ def services_not_asked(symptom: NotDeclared) -> Cause | None:
 
 
 @explanation(NotDeclared, general=True)
-def other_parameters(symptom: NotDeclared) -> Cause:
+def other_parameters(symptom: NotDeclared) -> Finding:
     """Its name is misspelt, it has no value, or only other parameters are declared, or none."""
     match, there = nearest(symptom.name, symptom.there), symptom.there
     if not there:
@@ -76,7 +75,7 @@ def other_parameters(symptom: NotDeclared) -> Cause:
     return symptom.cause(f"declared {f'is {code(match)}' if match else f'are {codes(there)}'}")
 
 
-def why_not_taken(recording: Recording, names: Iterable[str]) -> Cause | None:
+def why_not_taken(recording: Recording, names: Iterable[str]) -> Finding | None:
     """Which of some parameters the launch gives and no node declares, or None if there is none."""
     lacking = [name for name in undeclared(recording) if name in names]
     if not lacking:
@@ -86,7 +85,7 @@ def why_not_taken(recording: Recording, names: Iterable[str]) -> Cause | None:
         {one for node in recording.student_nodes for one in declared(recording, node.name)}
     )
     others = f"; declared {'is' if len(there) == 1 else 'are'} {codes(there)}" if there else ""
-    return Cause(
+    return Finding(
         f"the launch gives {codes(lacking)}, but no node declares {_it(lacking)}{others}",
         f"Call self.declare_parameter('{lacking[0]}', default) in the node's constructor, and read "
         f"it with self.get_parameter('{lacking[0]}').value. A parameter that is not declared is "
@@ -99,7 +98,7 @@ def _it(names: list[str]) -> str:
     return "it" if len(names) == 1 else "them"
 
 
-def why_services_silent(recording: Recording, calls: Iterable[Call]) -> Cause | None:
+def why_services_silent(recording: Recording, calls: Iterable[Call]) -> Finding | None:
     """Why one of some calls to a node's parameter services has no answer, or None."""
     lost = next((call for call in calls if call.answered_ns is None), None)
     if lost is None:
@@ -109,8 +108,8 @@ def why_services_silent(recording: Recording, calls: Iterable[Call]) -> Cause | 
         what = f"the node's parameter service {service} did not answer"
         return why_unanswered(recording, what, SERVICE, lost.service, lost.requested_ns, _ANSWER_S)
     if lost.error != NO_SERVER:
-        return Cause(f"{service} could not be asked: {lost.error}", ours=True)
-    return Cause(
+        return Finding.ours(f"{service} could not be asked: {lost.error}")
+    return Finding(
         f"the node has no service {service}",
         "Do not set start_parameter_services=False: the parameters of a node are read and set "
         "through its services.",
@@ -118,7 +117,7 @@ def why_services_silent(recording: Recording, calls: Iterable[Call]) -> Cause | 
     )
 
 
-def why_not_asked(recording: Recording, node: str, what: str) -> Cause:
+def why_not_asked(recording: Recording, node: str, what: str) -> Finding:
     """Why the probe asked a node's parameter services no more: an answer was late or lost."""
     ended = why_ended(recording)
     calls = [
@@ -135,7 +134,7 @@ def why_not_asked(recording: Recording, node: str, what: str) -> Cause:
         )
         shown = Evidence(moments=(Moment("asked", recording.since_launch_s(asked_ns)),))
         ended = why_late(recording, SERVICE, server, asked_ns, end_ns, _ANSWER_S, seen, hint, shown)
-    return ended.after(what) if ended else Cause.to_repeat(f"{what} by the probe")
+    return ended.after(what) if ended else Finding.undecided(f"{what} by the probe")
 
 
 def answered_at(recording: Recording, calls: Iterable[Call]) -> tuple[Moment, ...]:

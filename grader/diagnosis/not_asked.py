@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_answer import why_raised, why_taken
 from grader.diagnosis.no_endpoint import ACTION_CLIENT, CLIENT, why_not_offered
 from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spun
 from grader.diagnosis.process.process_exit import why_crashed
 from grader.findings.fields import brief, words
-from grader.findings.finding import Evidence, Moment, Table
+from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.first_seen import until_the_end
 from grader.findings.wording import code
 from grader.recording.interaction import Asked
@@ -39,7 +38,7 @@ _MOST_ROWS = 50
 
 
 @dataclass(frozen=True)
-class NotAsked(Symptom[Cause]):
+class NotAsked(Symptom[Finding]):
     """Fewer requests or goals came to a server of the scenario than expected."""
 
     recording: Recording
@@ -76,13 +75,13 @@ class NotAsked(Symptom[Cause]):
         return self.asked[-1].asked_ns if self.asked else self.recording.launched_ns
 
 
-def why_not_asked(recording: Recording, server: str, needed: int) -> Cause:
+def why_not_asked(recording: Recording, server: str, needed: int) -> Finding:
     """Why fewer requests or goals came than needed."""
     return cause_of(NotAsked(recording, server, needed))
 
 
 @explanation(NotAsked)
-def no_client(symptom: NotAsked) -> Cause | None:
+def no_client(symptom: NotAsked) -> Finding | None:
     """There is no client: it is missing, or its name is misspelt."""
     word = ACTION_CLIENT if symptom.is_action else CLIENT
     there = symptom.asked or symptom.nodes
@@ -90,7 +89,7 @@ def no_client(symptom: NotAsked) -> Cause | None:
 
 
 @explanation(NotAsked)
-def process_failed(symptom: NotAsked) -> Cause | None:
+def process_failed(symptom: NotAsked) -> Finding | None:
     """The process ended with a failure, or a callback raised an exception."""
     crashed = why_crashed(symptom.recording)
     raised = why_raised(symptom.recording, symptom.seen, symptom.since_ns)
@@ -98,7 +97,7 @@ def process_failed(symptom: NotAsked) -> Cause | None:
 
 
 @explanation(NotAsked, concept="executors")
-def waits_in_a_callback(symptom: NotAsked) -> Cause | None:
+def waits_in_a_callback(symptom: NotAsked) -> Finding | None:
     """call() or spin_until_future_complete() in a callback waits for an answer, and blocks it."""
     recording, seen = symptom.recording, symptom.seen
     blocked = why_blocked(recording, seen, symptom.nodes, symptom.since_ns)
@@ -108,25 +107,25 @@ def waits_in_a_callback(symptom: NotAsked) -> Cause | None:
 
 
 @explanation(NotAsked)
-def stops_after_a_failure(symptom: NotAsked) -> Cause | None:
+def stops_after_a_failure(symptom: NotAsked) -> Finding | None:
     """Nothing follows a goal that was rejected or aborted, or a request without an answer."""
     status = symptom.asked[-1].status if symptom.asked else ""
     if status not in _AFTER:
         return None
     seen = f"{symptom.seen}; nothing follows the last one, {status}"
-    return Cause(seen, _AFTER[status], evidence(symptom.recording, symptom.asked))
+    return Finding(seen, _AFTER[status], evidence(symptom.recording, symptom.asked))
 
 
 @explanation(NotAsked, general=True)
-def too_few(symptom: NotAsked) -> Cause:
+def too_few(symptom: NotAsked) -> Finding:
     """The request was sent before the server was found, or never."""
     recording, seen = symptom.recording, symptom.seen
     if symptom.asked:
         hint = "Send the next one in the callback that takes the answer to the one before."
         taken = why_taken(recording, seen, symptom.since_ns, recording.stop_ns, 0.0)
-        return taken or Cause(seen, hint, evidence(recording, symptom.asked))
+        return taken or Finding(seen, hint, evidence(recording, symptom.asked))
     moment = until_the_end(recording, "still nothing was asked")
-    return Cause(f"{seen}, although the client was there", _WAIT, Evidence(moments=(moment,)))
+    return Finding(f"{seen}, although the client was there", _WAIT, Evidence(moments=(moment,)))
 
 
 def evidence(recording: Recording, asked: tuple[Asked, ...]) -> Evidence:

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 
 from grader.bootstrap import COMPILERS
 from grader.diagnosis.build_error import EMPTY_HINT, BuildError
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.findings.finding import Evidence
+from grader.findings.finding import Evidence, Finding, Status
 from grader.findings.wording import code, codes
 from grader.spec.name import package_name
 from grader.spec.nearest_name import nearest
@@ -40,7 +39,7 @@ _OURS = re.compile(r"\n\[rosgrade: (.+)\]\n\Z")
 
 
 @dataclass(frozen=True)
-class NoPackage(Symptom[Cause], concept="packages"):
+class NoPackage(Symptom[Finding], concept="packages"):
     """A package is missing."""
 
     submission: SubmissionRecord
@@ -57,7 +56,7 @@ class NoPackage(Symptom[Cause], concept="packages"):
         return dict(self.submission.stand_ins).get(self.name) or nearest(self.name, self.names)
 
 
-def why_no_package(submission: SubmissionRecord, name: str) -> Cause | None:
+def why_no_package(submission: SubmissionRecord, name: str) -> Finding | None:
     """Why the submission has no package of a name and none instead, or None if it has one."""
     if submission.problem is None and submission.package(name) is not None:
         return None
@@ -65,12 +64,12 @@ def why_no_package(submission: SubmissionRecord, name: str) -> Cause | None:
 
 
 @explanation(NoPackage)
-def no_workspace(symptom: NoPackage) -> Cause | None:
+def no_workspace(symptom: NoPackage) -> Finding | None:
     """There is no package.xml (an empty archive), or two packages have the same name."""
     problem = symptom.submission.problem
     if problem is None and symptom.names:
         return None
-    return Cause(
+    return Finding(
         problem or "no package.xml was found",
         "Hand in the packages that the task asks for, each of them once. colcon leaves out a "
         "folder with a file COLCON_IGNORE in it."
@@ -81,7 +80,7 @@ def no_workspace(symptom: NoPackage) -> Cause | None:
 
 
 @explanation(NoPackage)
-def broken_package_xml(symptom: NoPackage) -> Cause | None:
+def broken_package_xml(symptom: NoPackage) -> Finding | None:
     """package.xml cannot be read: broken XML or an invalid e-mail address."""
     errors = [item.manifest_error for item in symptom.submission.packages if item.manifest_error]
     if not errors or symptom.match is not None:
@@ -91,7 +90,7 @@ def broken_package_xml(symptom: NoPackage) -> Cause | None:
 
 
 @explanation(NoPackage, general=True)
-def other_package_name(symptom: NoPackage) -> Cause:
+def other_package_name(symptom: NoPackage) -> Finding:
     """The package has another name, or lies inside another package."""
     name, match = symptom.name, symptom.match
     places = tuple(
@@ -106,7 +105,7 @@ def other_package_name(symptom: NoPackage) -> Cause:
         else "in setup.py, setup.cfg, resource/ and the folder of the Python module"
     )
     seen = f"found package {code(match)}" if match else f"found {codes(symptom.names)} only"
-    return Cause(
+    return Finding(
         seen + "".join(map(breach_of_rep_144, [match] if match else symptom.names)),
         f"Write <name>{name}</name> in package.xml, and the same name {others}."
         + ("" if match else " A package inside another one is not found: put them side by side."),
@@ -114,7 +113,7 @@ def other_package_name(symptom: NoPackage) -> Cause:
     )
 
 
-def why_misnamed(submission: SubmissionRecord, name: str) -> Cause | None:
+def why_misnamed(submission: SubmissionRecord, name: str) -> Finding | None:
     """Why a package has another name than that which it stands in for, or None if it has not."""
     if existing_package(submission, name).name == name:
         return None
@@ -130,7 +129,7 @@ def breach_of_rep_144(name: str) -> str:
     return ""
 
 
-def why_no_manifest(submission: SubmissionRecord, name: str) -> Cause | None:
+def why_no_manifest(submission: SubmissionRecord, name: str) -> Finding | None:
     """Why the submission has no package of a name with a package.xml that can be used."""
     cause = why_no_package(submission, name)
     if cause is not None:
@@ -139,11 +138,11 @@ def why_no_manifest(submission: SubmissionRecord, name: str) -> Cause | None:
     return _unusable(f"package.xml cannot be used: {error}", [error]) if error else None
 
 
-def _unusable(seen: str, errors: list[SourceError]) -> Cause:
+def _unusable(seen: str, errors: list[SourceError]) -> Finding:
     hint = "Correct package.xml at the line that is named here."
     if any(error.message == EMPTY for error in errors):
         hint = EMPTY_HINT
-    return Cause(seen, hint, Evidence(places=tuple(errors)))
+    return Finding(seen, hint, Evidence(places=tuple(errors)))
 
 
 def existing_package(submission: SubmissionRecord, name: str) -> PackageRecord:
@@ -154,20 +153,19 @@ def existing_package(submission: SubmissionRecord, name: str) -> PackageRecord:
     return package
 
 
-def why_too_new(package: PackageRecord) -> Cause | None:
+def why_too_new(package: PackageRecord) -> Finding | None:
     """Code that the Python of ROS 2 Jazzy can read, but not the one that grades."""
     if not package.newer_syntax:
         return None
-    return Cause(
+    return Finding.ours(
         f"the Python of this machine cannot read {package.newer_syntax[0]}",
         "It is right in ROS 2 Jazzy, which has Python 3.12, so you lose no points. Tell your "
         "instructor that it needs Python 3.12, or do without this syntax.",
-        ours=True,
     )
 
 
 @dataclass(frozen=True)
-class NotBuilt(Symptom[Cause], concept="packages"):
+class NotBuilt(Symptom[Finding], concept="packages"):
     """A package was not built."""
 
     submission: SubmissionRecord
@@ -175,7 +173,7 @@ class NotBuilt(Symptom[Cause], concept="packages"):
     build: BuildRecord
 
 
-def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
+def why_not_built(submission: SubmissionRecord, name: str) -> Finding | None:
     """Why a package was not built, or None if it was."""
     cause = why_no_package(submission, name)
     cause = cause or why_too_new(existing_package(submission, name))
@@ -183,7 +181,7 @@ def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
         return cause
     build, name = submission.build, existing_package(submission, name).name
     if build is None:
-        return Cause("nothing was built, so this cannot be judged", ours=True)
+        return Finding.ours("nothing was built, so this cannot be judged")
     # A package that is not among the failed ones was built, even if others failed.
     if build.succeeded or (build.failed_packages and name not in build.failed_packages):
         return None
@@ -191,7 +189,7 @@ def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
 
 
 @explanation(NotBuilt)
-def build_takes_too_long(symptom: NotBuilt) -> Cause | None:
+def build_takes_too_long(symptom: NotBuilt) -> Finding | None:
     """The build does not end: a sleep or an endless loop in setup.py or CMakeLists.txt."""
     build, name = symptom.build, symptom.name
     begun = [one for one in build.failed_packages if _failed_itself(build, one)]
@@ -205,7 +203,7 @@ def build_takes_too_long(symptom: NotBuilt) -> Cause | None:
         False: "It kept computing: look for an endless loop or a long computation in setup.py or "
         "CMakeLists.txt.",
     }
-    return Cause(
+    return Finding(
         "`colcon build` did not finish within its time limit and was ended",
         looked_for[build.waited],
         _evidence(build, name),
@@ -213,7 +211,7 @@ def build_takes_too_long(symptom: NotBuilt) -> Cause | None:
 
 
 @explanation(NotBuilt)
-def machine_lacks_a_package(symptom: NotBuilt) -> Cause | None:
+def machine_lacks_a_package(symptom: NotBuilt) -> Finding | None:
     """The build needs something that the machine lacks; this is an error and costs no points."""
     if not _failed_itself(symptom.build, symptom.name):
         return None
@@ -222,7 +220,7 @@ def machine_lacks_a_package(symptom: NotBuilt) -> Cause | None:
 
 
 @explanation(NotBuilt)
-def build_failed(symptom: NotBuilt) -> Cause | None:
+def build_failed(symptom: NotBuilt) -> Finding | None:
     """The build fails: the first error is shown, with its file and line."""
     build, name = symptom.build, symptom.name
     if not _failed_itself(build, name):
@@ -236,7 +234,7 @@ def build_failed(symptom: NotBuilt) -> Cause | None:
 
 
 @explanation(NotBuilt, general=True)
-def depends_on_another(symptom: NotBuilt) -> Cause:
+def depends_on_another(symptom: NotBuilt) -> Finding:
     """Another package, on which it depends, failed to build."""
     submission, build, name = symptom.submission, symptom.build, symptom.name
     failed = [one for one in build.failed_packages if one != name and _failed_itself(build, one)]
@@ -246,7 +244,7 @@ def depends_on_another(symptom: NotBuilt) -> Cause:
     broken = [one for one in blamed if not _lacking(submission, build, one)]
     if broken:
         why = f": {build.culprit}" if build.culprit and broken == blamed else ""
-        return Cause(
+        return Finding(
             f"it was not built, because {codes(broken)} failed to build{why}",
             f"Correct {codes(broken)} first: `colcon build --packages-select {broken[0]}`.",
             _evidence(build, broken[0]),
@@ -255,24 +253,23 @@ def depends_on_another(symptom: NotBuilt) -> Cause:
     return _not_here(lacking).after(f"it was not built, because it depends on {codes(blamed)}")
 
 
-def why_lacking(submission: SubmissionRecord, name: str) -> Cause | None:
+def why_lacking(submission: SubmissionRecord, name: str) -> Finding | None:
     """What this machine lacks for a package, or for what the package rests on; else None."""
     for one in (name, *_needs(submission, name)):
         cause = why_not_built(submission, one)
-        if cause is not None and cause.ours:
+        if cause is not None and cause.status is Status.ERROR:
             return cause
     return None
 
 
-def _not_here(lacking: list[str]) -> Cause:
+def _not_here(lacking: list[str]) -> Finding:
     named = " ".join(filter(None, map(apt_package, lacking)))
     ways = (named and f"`sudo apt install --reinstall {named}`", ways_to_get(lacking))
-    return Cause(
+    return Finding.ours(
         f"it needs {codes(lacking)} to build: ROS 2 Jazzy has it, but it is missing or damaged on "
         "the machine that grades",
         "You lose no points for it. Tell your instructor that a full ROS 2 Jazzy builds it"
         f"{''.join(f', or {way}' for way in ways if way)}.",
-        ours=True,
     )
 
 
@@ -296,14 +293,14 @@ def _needs(submission: SubmissionRecord, name: str) -> list[str]:
     return found[1:]
 
 
-def _failed(submission: SubmissionRecord, build: BuildRecord, name: str) -> Cause:
+def _failed(submission: SubmissionRecord, build: BuildRecord, name: str) -> Finding:
     ended = _OURS.search(build.log)
     error = build.culprit or SourceError("", None, ended[1] if ended else "")
     package = existing_package(submission, name)
     # setuptools names no line of what setup() refuses, and CMake one beyond an empty file.
     of_file = (one for one in package.syntax_errors if one.file == error.file)
     error = next((one for one in of_file if not error.line or one.message == EMPTY), error)
-    return Cause(
+    return Finding(
         f"`colcon build` failed: {error if error.file else error.message}".removesuffix(": "),
         cause_of(BuildError(error, package)),
         replace(_evidence(build, name), places=(error,) if error.file else ()),

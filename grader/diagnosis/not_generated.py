@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import PurePosixPath
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
 from grader.diagnosis.not_built import existing_package, why_no_package, why_not_built
-from grader.findings.finding import Evidence
+from grader.findings.finding import Evidence, Finding, Status
 from grader.findings.wording import code, codes
 from grader.recording.interface import DefinitionError, sections_of
 from grader.spec.nearest_name import nearest
@@ -56,17 +55,17 @@ class InterfaceName:
 
 
 @dataclass(frozen=True)
-class NoDefinition(Symptom[Cause], concept="interfaces"):
+class NoDefinition(Symptom[Finding], concept="interfaces"):
     """The definition of an interface is missing."""
 
     submission: SubmissionRecord
     package: PackageRecord
     interface: InterfaceName
 
-    def found(self, item: Definition, what: str) -> Cause:
+    def found(self, item: Definition, what: str) -> Finding:
         """The cause if a definition lies at another place, or has another name."""
         wanted, file = self.package.file(self.interface.file), self.interface.file
-        return Cause(
+        return Finding(
             f"found {code(item.file)}: {what}",
             f"Name it {code(wanted)}, and write {code(file)} in CMakeLists.txt.",
             Evidence(places=(SourceError(item.file, None, what),)),
@@ -74,7 +73,7 @@ class NoDefinition(Symptom[Cause], concept="interfaces"):
 
 
 @dataclass(frozen=True)
-class NotGenerated(Symptom[Cause], concept="interfaces"):
+class NotGenerated(Symptom[Finding], concept="interfaces"):
     """The build generated no code for an interface."""
 
     package: PackageRecord
@@ -97,13 +96,13 @@ class NotGenerated(Symptom[Cause], concept="interfaces"):
         loop = any("${" in name for names in found for name in names)
         return (package,) in found or loop or bool(self.calls(_FINDS_ALL))
 
-    def cause(self, line: int | None, observed: str, hint: str) -> Cause:
+    def cause(self, line: int | None, observed: str, hint: str) -> Finding:
         """A cause in CMakeLists.txt."""
         place = SourceError(self.package.file("CMakeLists.txt"), line, observed.replace("`", ""))
-        return Cause(f"CMakeLists.txt {observed}", hint, Evidence(places=(place,)))
+        return Finding(f"CMakeLists.txt {observed}", hint, Evidence(places=(place,)))
 
 
-def find_definition(submission: SubmissionRecord, interface: InterfaceName) -> Definition | Cause:
+def find_definition(submission: SubmissionRecord, interface: InterfaceName) -> Definition | Finding:
     """The definition of an interface, as the build took it or else as it was handed in.
 
     Returns:
@@ -135,7 +134,7 @@ def used_packages(interface: InterfaceName, definition: Definition) -> tuple[str
 
 def why_not_generated(
     submission: SubmissionRecord, interface: InterfaceName, definition: Definition
-) -> Cause | None:
+) -> Finding | None:
     """Why the build made no code for an interface, or None if it did."""
     cause = why_no_package(submission, interface.package)
     if cause is not None:
@@ -146,15 +145,15 @@ def why_not_generated(
     cause = explain(NotGenerated(package, interface, definition))
     built = None if package.build_type != "ament_cmake" else why_not_built(submission, package.name)
     if built is not None:
-        if cause is None or built.ours:
+        if cause is None or built.status is Status.ERROR:
             return built
         # The end of the log shows what became of what is missing.
         return replace(cause, evidence=replace(cause.evidence, log=built.evidence.log))
     build = submission.build
     if cause is None and build is not None and build.timed_out and build.waited is None:
         # A recording of before, when nothing was kept of such a build.
-        return Cause("the build was ended, and nothing was kept of it: grade again", ours=True)
-    return cause or Cause(
+        return Finding.ours("the build was ended, and nothing was kept of it: grade again")
+    return cause or Finding(
         f"the build installed no code for {code(interface.file)}",
         f"List {code(interface.file)} in {_GENERATE}() in CMakeLists.txt.",
         Evidence(places=(SourceError(package.file("CMakeLists.txt"), None, _GENERATE),)),
@@ -162,7 +161,7 @@ def why_not_generated(
 
 
 @explanation(NoDefinition)
-def near_definition(symptom: NoDefinition) -> Cause | None:
+def near_definition(symptom: NoDefinition) -> Finding | None:
     """The file is in the wrong folder or package, or has the wrong name or suffix."""
     file, name = PurePosixPath(symptom.interface.file), symptom.interface.name
     found = {
@@ -184,11 +183,11 @@ def near_definition(symptom: NoDefinition) -> Cause | None:
 
 
 @explanation(NoDefinition, general=True)
-def no_definition(symptom: NoDefinition) -> Cause:
+def no_definition(symptom: NoDefinition) -> Finding:
     """There is no such file."""
     interface = symptom.interface
     there = [item.file for item in symptom.package.definitions]
-    return Cause(
+    return Finding(
         f"there is no {code(interface.file)}"
         + (f"; found {codes(there)} only" if there else f", and no .{interface.kind} file at all"),
         f"Make the folder {code(interface.kind)} beside package.xml, and in it the file "
@@ -197,7 +196,7 @@ def no_definition(symptom: NoDefinition) -> Cause:
 
 
 @explanation(NotGenerated)
-def no_cmake(symptom: NotGenerated) -> Cause | None:
+def no_cmake(symptom: NotGenerated) -> Finding | None:
     """The package does not use CMake. Only CMake generates code for interfaces."""
     package = symptom.package
     if package.build_type == "ament_cmake" and package.cmake is not None:
@@ -205,7 +204,7 @@ def no_cmake(symptom: NotGenerated) -> Cause | None:
     there = "there is no CMakeLists.txt beside package.xml"
     if package.build_type != "ament_cmake":
         there = f"the build type of {code(package.name)} is {package.build_type}"
-    return Cause(
+    return Finding(
         f"{there}, and code for interfaces is generated by CMake only",
         "Make a package of its own for interfaces: "
         f"`ros2 pkg create --build-type ament_cmake {package.name}`.",
@@ -214,7 +213,7 @@ def no_cmake(symptom: NotGenerated) -> Cause | None:
 
 
 @explanation(NotGenerated)
-def generates_nothing(symptom: NotGenerated) -> Cause | None:
+def generates_nothing(symptom: NotGenerated) -> Finding | None:
     """CMakeLists.txt does not call rosidl_generate_interfaces(), or after ament_package()."""
     calls, ended = symptom.calls(_GENERATE), symptom.calls("ament_package")
     if calls and not (ended and ended[0].line < calls[0].line):
@@ -230,7 +229,7 @@ def generates_nothing(symptom: NotGenerated) -> Cause | None:
 
 
 @explanation(NotGenerated)
-def not_listed(symptom: NotGenerated) -> Cause | None:
+def not_listed(symptom: NotGenerated) -> Finding | None:
     """rosidl_generate_interfaces() does not list the file."""
     calls, file = symptom.calls(_GENERATE), symptom.interface.file
     listed = [item for call in calls for item in call.arguments[1:] if item.endswith(_KINDS)]
@@ -245,7 +244,7 @@ def not_listed(symptom: NotGenerated) -> Cause | None:
 
 
 @explanation(NotGenerated)
-def undeclared_package(symptom: NotGenerated) -> Cause | None:
+def undeclared_package(symptom: NotGenerated) -> Finding | None:
     """A package with used messages is not found, or is not listed under DEPENDENCIES."""
     calls = symptom.calls(_GENERATE)
     after = [call.after("DEPENDENCIES", _GENERATE_KEYWORDS) or () for call in calls]

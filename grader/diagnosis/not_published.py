@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import explanation
 from grader.diagnosis.no_answer import why_raised
 from grader.diagnosis.no_messages import (
@@ -12,6 +11,8 @@ from grader.diagnosis.no_messages import (
     FewMessages,
     NoMessages,
     OnTopic,
+    nothing_to_answer,
+    publisher_destroyed,
     seconds_hint,
     why_not_delivered,
 )
@@ -23,7 +24,7 @@ from grader.diagnosis.process.blocked_executor import (
 )
 from grader.diagnosis.process.raised import defined_at
 from grader.diagnosis.process.standing import where_it_stands
-from grader.findings.finding import Evidence, Moment
+from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import until_the_end
 from grader.findings.wording import code, counted, listing
 from grader.measure import declarations
@@ -38,15 +39,15 @@ _STARVED = 0.5
 _OWN_S = 2.0
 
 
-@explanation(NoMessages, concept="timers")
-def slow_timer(symptom: NoMessages) -> Cause | None:
+@explanation(NoMessages, after=(nothing_to_answer,), concept="timers")
+def slow_timer(symptom: NoMessages) -> Finding | None:
     """The timer's period is longer than the observation: milliseconds were given as seconds."""
     recording, timers = symptom.recording, declarations.timers(symptom.recording)
     if symptom.asked or not timers or _firing(recording):
         return None
     timer = min(timers, key=lambda one: one.period_s)
     watched_s = recording.since_launch_s(recording.stop_ns)
-    return Cause(
+    return Finding(
         f"{symptom.seen} in {format_duration(watched_s)}: the process declared a "
         f"timer of {format_duration(timer.period_s)}",
         seconds_hint(),
@@ -60,7 +61,7 @@ def slow_timer(symptom: NoMessages) -> Cause | None:
 
 
 @explanation(NoMessages)
-def no_cpu_time(symptom: NoMessages) -> Cause | None:
+def no_cpu_time(symptom: NoMessages) -> Finding | None:
     """The machine gave the process too little CPU time; this is an error and costs no points."""
     recording = symptom.recording
     if symptom.stolen_s < _STARVED * symptom.watched_s:
@@ -72,11 +73,11 @@ def no_cpu_time(symptom: NoMessages) -> Cause | None:
         guilty = no_answer(symptom)
     if guilty:
         return replace(guilty, disturbed=True)
-    return Cause.held_up(symptom.seen, symptom.stolen_s)
+    return Finding.held_up(symptom.seen, symptom.stolen_s)
 
 
 @explanation(NoMessages)
-def publish_never_called(symptom: NoMessages) -> Cause | None:
+def publish_never_called(symptom: NoMessages) -> Finding | None:
     """No line of the program calls publish()."""
     sources = [file for one in symptom.recording.submission.packages for file in one.sources]
     of_python = not any(
@@ -90,7 +91,7 @@ def publish_never_called(symptom: NoMessages) -> Cause | None:
     names = [timer.callback for timer in declarations.timers(symptom.recording)][:1]
     message = "this is called, and should publish"
     places = (defined_at(name, message, symptom.recording.submission) for name in names)
-    return Cause(
+    return Finding(
         f"{symptom.seen}: no line of the program calls publish()",
         "A message is sent only by publish(msg) of the publisher: call it after the message is "
         "filled. Logging a message does not send it.",
@@ -98,8 +99,8 @@ def publish_never_called(symptom: NoMessages) -> Cause | None:
     )
 
 
-@explanation(NoMessages, FewMessages, concept="executors")
-def never_spun(symptom: OnTopic) -> Cause | None:
+@explanation(NoMessages, FewMessages, after=(publisher_destroyed,), concept="executors")
+def never_spun(symptom: OnTopic) -> Finding | None:
     """rclpy.spin() is never called, or the node is not given to the executor that spins."""
     # A program may publish without a timer, and needs no spin for that.
     if symptom.recording.on(symptom.topic) and not declarations.timers(symptom.recording):
@@ -108,7 +109,7 @@ def never_spun(symptom: OnTopic) -> Cause | None:
 
 
 @explanation(NoMessages, concept="executors")
-def blocked_executor(symptom: NoMessages) -> Cause | None:
+def blocked_executor(symptom: NoMessages) -> Finding | None:
     """A callback does not return, and blocks the executor."""
     sent = symptom.recording.sent
     begin_ns = [sent[name][0].stamp_ns for name in symptom.asked if sent[name]]
@@ -117,7 +118,7 @@ def blocked_executor(symptom: NoMessages) -> Cause | None:
 
 
 @explanation(NoMessages)
-def no_answer(symptom: NoMessages) -> Cause | None:
+def no_answer(symptom: NoMessages) -> Finding | None:
     """The subscription's callback gets a message, but raises an exception or does not publish."""
     recording = symptom.recording
     name = next((name for name in symptom.asked if recording.sent[name]), None)
@@ -129,7 +130,7 @@ def no_answer(symptom: NoMessages) -> Cause | None:
     )
     return why_raised(recording, seen, sent[0].stamp_ns) or _where_it_stands(
         recording,
-        Cause(
+        Finding(
             seen,
             "Is publish(msg) reached in the subscription's callback? Look for an `if` or a "
             "`return` before it. An `except: pass` hides errors. Log a line right before "
@@ -142,7 +143,7 @@ def no_answer(symptom: NoMessages) -> Cause | None:
 
 
 @explanation(NoMessages, concept="timers")
-def no_timer(symptom: NoMessages) -> Cause | None:
+def no_timer(symptom: NoMessages) -> Finding | None:
     """No timer was created, so nothing calls the callback that publishes."""
     recording = symptom.recording
     traced, timer = declarations.traced(recording), declarations.declares(recording, "timer")
@@ -150,7 +151,7 @@ def no_timer(symptom: NoMessages) -> Cause | None:
         return None
     return _where_it_stands(
         recording,
-        Cause(
+        Finding(
             f"{_idle(symptom)}, and the process declared no timer that would call publish()",
             "Is publish(msg) reached? Look for a condition before it, and whether anything calls "
             "the function that it stands in: a method runs only if it is called.",
@@ -160,7 +161,7 @@ def no_timer(symptom: NoMessages) -> Cause | None:
 
 
 @explanation(NoMessages, general=True)
-def publish_not_reached(symptom: NoMessages) -> Cause:
+def publish_not_reached(symptom: NoMessages) -> Finding:
     """The publisher is there, but the program does not reach its publish()."""
     recording = symptom.recording
     heard = _heard(recording, symptom.topic)
@@ -172,7 +173,7 @@ def publish_not_reached(symptom: NoMessages) -> Cause:
         although = f", although the process declared a timer of {listing(periods)}"
     return _where_it_stands(
         recording,
-        Cause(
+        Finding(
             _idle(symptom) + although,
             "Is publish(msg) reached in the callback? Look for an `if` or a `return` before it. An "
             "`except: pass` hides errors. Log a line at the beginning of the callback, and one "
@@ -183,18 +184,18 @@ def publish_not_reached(symptom: NoMessages) -> Cause:
 
 
 @explanation(FewMessages, general=True, concept="timers")
-def publishing_stopped(symptom: FewMessages) -> Cause:
+def publishing_stopped(symptom: FewMessages) -> Finding:
     """A timer stopped or is too slow, or the program publishes without a timer and stops."""
     recording, evidence = symptom.recording, Evidence(moments=symptom.moments)
     period_s = [timer.period_s for timer in declarations.timers(recording)]
     if not period_s:
-        return Cause(
+        return Finding(
             symptom.seen,
             "Publish as long as the node runs: look for a counter or a condition that ends it.",
             evidence,
         )
     is_slow = symptom.needed * min(period_s) > symptom.watched_s
-    return Cause(
+    return Finding(
         f"{symptom.seen}; the process declared a timer of "
         f"{listing(map(format_duration, period_s))}",
         seconds_hint() if is_slow else ENDED_HINT,
@@ -244,7 +245,7 @@ def _heard(recording: Recording, topic: str) -> str:
     )
 
 
-def _where_it_stands(recording: Recording, cause: Cause) -> Cause:
+def _where_it_stands(recording: Recording, cause: Finding) -> Finding:
     """A cause with the line at which a process did not go on, if one did not."""
     stands = (where_it_stands(recording, process.name) for process in recording.processes)
     stand = next(filter(None, stands), None)

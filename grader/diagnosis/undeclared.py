@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from grader.diagnosis.cause import Cause
-from grader.findings.finding import Evidence, Moment
+from grader.findings.finding import Evidence, Finding, Moment
 from grader.measure import declarations
 from grader.measure.declarations import was_held_up
 from grader.recording.model import Recording
 
 
-def why_undeclared(recording: Recording, what: str) -> Cause:
+def why_undeclared(recording: Recording, what: str) -> Finding:
     """Why the process did not declare what the ROS graph shows of it.
 
     The tracer is in each program of Python that is started by its entry point, in each compiled one
@@ -21,8 +20,8 @@ def why_undeclared(recording: Recording, what: str) -> Cause:
     compiled = compiled and recording.environment.get("compiled_tracer", "lacking") == "lacking"
     launched = any("launch" in item.name.rpartition("/")[2] for item in recording.processes)
     if not declarations.traced(recording) and (compiled or launched):
-        return Cause(f"{seen}: rosgrade sees this in Python programs only", ours=True)
-    return Cause(
+        return Finding.ours(f"{seen}: rosgrade sees this in Python programs only")
+    return Finding(
         f"{seen}: it was created without rclpy, or in a program that was started without the "
         "environment of the first, or after the file descriptors of rosgrade were closed",
         "Create it with the method of rclpy's Node, in the program that `ros2 run` starts. Keep "
@@ -31,7 +30,7 @@ def why_undeclared(recording: Recording, what: str) -> Cause:
     )
 
 
-def why_never_appeared(recording: Recording, what: str) -> Cause:
+def why_never_appeared(recording: Recording, what: str) -> Finding:
     """Why what the process declared is not in the ROS graph."""
     seen = f"the process declared {what}, but it never appeared in the ROS graph"
     names = declarations.changed_environment(recording)
@@ -39,9 +38,9 @@ def why_never_appeared(recording: Recording, what: str) -> Cause:
     if others:
         seen, names = f"the process joined ROS domain {others} and not its own", ["ROS_DOMAIN_ID"]
     if not names and was_held_up(recording):
-        return Cause.to_repeat(f"{seen}, while the machine was busy")
+        return Finding.undecided(f"{seen}, while the machine was busy")
     changed = f": the program changed {', '.join(names)}, which nodes use to find each other"
-    return Cause(
+    return Finding(
         seen + (changed if names else ""),
         "A node must stay in the ROS domain that it is given. In the environment and in the code, "
         "do not set ROS_DOMAIN_ID, domain_id, a discovery server or a profile of the middleware. "

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_answer import why_late, why_raised, why_taken, why_unanswered
 from grader.diagnosis.no_endpoint import ACTION
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.fields import the_goal
-from grader.findings.finding import Evidence
+from grader.findings.finding import Evidence, Finding
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
 from grader.spec.unit import format_duration
@@ -27,7 +26,7 @@ _LOOK = (
 
 
 @dataclass(frozen=True)
-class NotCanceled(Symptom[Cause], concept="executors"):
+class NotCanceled(Symptom[Finding], concept="executors"):
     """A goal was not canceled after a cancel request."""
 
     recording: Recording
@@ -55,7 +54,7 @@ class NotCanceled(Symptom[Cause], concept="executors"):
 
 def why_not_canceled(
     recording: Recording, goal: Goal, within_s: float, evidence: Evidence
-) -> Cause | None:
+) -> Finding | None:
     """Why a goal that was asked to cancel was not canceled in time, or None if it was."""
     asked_ns, end_ns = goal.canceled_ns or 0, goal.result_ns
     if goal.status != "canceled" or end_ns is None:
@@ -68,11 +67,11 @@ def why_not_canceled(
 
 
 @explanation(NotCanceled)
-def cancel_refused(symptom: NotCanceled) -> Cause | None:
+def cancel_refused(symptom: NotCanceled) -> Finding | None:
     """The server refuses to cancel: it has no cancel_callback that accepts."""
     if symptom.goal.cancel_accepted is not False or symptom.is_untaken:
         return None
-    return Cause(
+    return Finding(
         f"the server refused to cancel {the_goal(symptom.goal)}",
         "Give the ActionServer a cancel_callback that returns CancelResponse.ACCEPT. Without one "
         "rclpy refuses.",
@@ -81,7 +80,7 @@ def cancel_refused(symptom: NotCanceled) -> Cause | None:
 
 
 @explanation(NotCanceled)
-def execute_callback_raised(symptom: NotCanceled) -> Cause | None:
+def execute_callback_raised(symptom: NotCanceled) -> Finding | None:
     """The execute callback raised an exception."""
     if symptom.goal.result_ns is None:
         return None
@@ -89,14 +88,14 @@ def execute_callback_raised(symptom: NotCanceled) -> Cause | None:
 
 
 @explanation(NotCanceled)
-def executor_busy_with_the_goal(symptom: NotCanceled) -> Cause | None:
+def executor_busy_with_the_goal(symptom: NotCanceled) -> Finding | None:
     """The executor cannot process the cancel request while the execute callback runs."""
     if not symptom.is_untaken:
         return None
     goal, recording = symptom.goal, symptom.recording
     seen = f"{symptom.seen}: the server did not handle the request to cancel"
     text = f"{seen}: its executor is busy while the execute callback runs"
-    busy = Cause(text, _TWO_THREADS, symptom.evidence)
+    busy = Finding(text, _TWO_THREADS, symptom.evidence)
     if goal.result_ns is not None:
         return busy
     asked_ns, within_s = goal.canceled_ns or 0, symptom.within_s
@@ -104,31 +103,31 @@ def executor_busy_with_the_goal(symptom: NotCanceled) -> Cause | None:
 
 
 @explanation(NotCanceled, general=True)
-def request_ignored(symptom: NotCanceled) -> Cause:
+def request_ignored(symptom: NotCanceled) -> Finding:
     """The loop of the execute callback never checks whether the goal should be canceled."""
     if symptom.goal.result_ns is not None:
         seen = f"{symptom.seen}, although the server agreed to cancel"
-        return Cause(seen, _LOOK, symptom.evidence)
+        return Finding(seen, _LOOK, symptom.evidence)
     asked_ns = symptom.goal.canceled_ns or 0
     never = why_no_end(symptom.recording, symptom.seen, asked_ns, symptom.within_s)
     seen = f"{symptom.seen}: the execute callback goes on"
-    return never or Cause(seen, _LOOK, symptom.evidence)
+    return never or Finding(seen, _LOOK, symptom.evidence)
 
 
-def why_no_end(recording: Recording, seen: str, asked_ns: int, within_s: float) -> Cause | None:
+def why_no_end(recording: Recording, seen: str, asked_ns: int, within_s: float) -> Finding | None:
     """Why a goal never ended, if its process ended or had no time."""
     taken = why_taken(recording, seen, asked_ns, recording.stop_ns, within_s)
     return why_ended(recording, seen) or taken
 
 
-def ended_alone(recording: Recording, goal: Goal, evidence: Evidence) -> Cause:
+def ended_alone(recording: Recording, goal: Goal, evidence: Evidence) -> Finding:
     """A goal came to an end before the probe could end it."""
     lasted_s = ((goal.result_ns or 0) - (goal.answered_ns or goal.sent_ns)) / NS
     seen = (
         f"{the_goal(goal)} {goal.status} {format_duration(lasted_s)} after it was accepted: too "
         "early for this check"
     )
-    return why_raised(recording, seen, goal.sent_ns) or Cause(
+    return why_raised(recording, seen, goal.sent_ns) or Finding(
         seen,
         "The execute callback returns too early: it must work on the goal step by step, with a "
         "pause after each step.",

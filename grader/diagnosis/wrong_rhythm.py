@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from statistics import mean
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, explanation
 from grader.diagnosis.no_messages import seconds_hint
 from grader.diagnosis.process.blocked_executor import left_s
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.process.standing import slow_callback
-from grader.findings.finding import Evidence, Moment
+from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import counted, listing
 from grader.measure import declarations
 from grader.measure.period import Interval, PeriodLimits, PeriodVerdict
@@ -32,7 +31,7 @@ _ONCE = "Create one publisher and one timer in the constructor, and publish once
 
 
 @dataclass(frozen=True)
-class WrongRhythm(Symptom[Cause], concept="timers"):
+class WrongRhythm(Symptom[Finding], concept="timers"):
     """Messages come at the wrong period, or irregularly.
 
     What a cause observes is a clause that follows the figures, or nothing.
@@ -58,7 +57,7 @@ class WrongRhythm(Symptom[Cause], concept="timers"):
 
 
 @explanation(WrongRhythm)
-def several_in_each_period(symptom: WrongRhythm) -> Cause | None:
+def several_in_each_period(symptom: WrongRhythm) -> Finding | None:
     """Two to five messages come in each period: two publishers, two timers or two publish()."""
     average_s = mean(item.seconds for item in symptom.measured)
     if average_s <= 0.0:
@@ -72,26 +71,26 @@ def several_in_each_period(symptom: WrongRhythm) -> Cause | None:
     words = f"messages come {times} times as often as expected"
     publishers = symptom.recording.student_endpoints(Kind.PUBLISHER, symptom.topic)
     if len(publishers) > 1:
-        return Cause(f"{words}, from {len(publishers)} publishers on the topic", _ONCE)
+        return Finding(f"{words}, from {len(publishers)} publishers on the topic", _ONCE)
     if len(symptom.timers_s) == 1 and symptom.declares(average_s):
         words += f": the process declared a timer of {format_duration(symptom.timers_s[0])}"
-        return Cause(words, seconds_hint(symptom.limits.period_s))
+        return Finding(words, seconds_hint(symptom.limits.period_s))
     several = f", and the process declared {len(symptom.timers_s)} timers"
-    return Cause(words + (several if len(symptom.timers_s) > 1 else ""), _ONCE)
+    return Finding(words + (several if len(symptom.timers_s) > 1 else ""), _ONCE)
 
 
 @explanation(WrongRhythm, concept="executors")
-def slow_call(symptom: WrongRhythm) -> Cause | None:
+def slow_call(symptom: WrongRhythm) -> Finding | None:
     """A callback sleeps or works for long, so the timer has to wait for it."""
     stand, period_s = slow_callback(symptom.recording), symptom.limits.period_s
     is_late = symptom.verdict.median_s > period_s or not symptom.verdict.regular
     if stand is None or not is_late or (stand.lasted_s or 0.0) < _LONG * period_s:
         return None
-    return Cause(stand.words, stand.hint, Evidence(places=(stand.place,)))
+    return Finding(stand.words, stand.hint, Evidence(places=(stand.place,)))
 
 
 @explanation(WrongRhythm)
-def condition_in_a_faster_timer(symptom: WrongRhythm) -> Cause | None:
+def condition_in_a_faster_timer(symptom: WrongRhythm) -> Finding | None:
     """A timer is faster, and a condition in its callback lets only every n-th call publish."""
     wanted_s = symptom.limits.period_s
     for timer_s in symptom.timers_s:
@@ -101,7 +100,7 @@ def condition_in_a_faster_timer(symptom: WrongRhythm) -> Cause | None:
         )
         if 2.0 * timer_s <= wanted_s and min(calls) > 1 and off_s <= _OFF * timer_s:
             some = listing(map(str, sorted(set(calls))), "or")
-            return Cause(
+            return Finding(
                 f"the process declared a timer of {format_duration(timer_s)}, and publishes in "
                 f"one of {some} calls",
                 f"Give the timer the period itself, self.create_timer({wanted_s:g}, ...), and "
@@ -112,18 +111,20 @@ def condition_in_a_faster_timer(symptom: WrongRhythm) -> Cause | None:
 
 
 @explanation(WrongRhythm)
-def irregular(symptom: WrongRhythm) -> Cause | None:
+def irregular(symptom: WrongRhythm) -> Finding | None:
     """The period is right, but not all intervals: a callback takes long, a condition, a loop."""
     if not symptom.verdict.period_good:
         return None
     hint = "Publish in every call of the timer's callback, without a condition. "
     if not symptom.timers_s:
         hint = "Let a timer call the callback: self.create_timer(...). "
-    return Cause("", f"{hint}No callback may work or sleep for long: the timer has to wait for it.")
+    return Finding(
+        "", f"{hint}No callback may work or sleep for long: the timer has to wait for it."
+    )
 
 
 @explanation(WrongRhythm)
-def other_timer(symptom: WrongRhythm) -> Cause | None:
+def other_timer(symptom: WrongRhythm) -> Finding | None:
     """The timer has another period, such as 10 times the expected one, or 0 from int(0.3)."""
     median_s = symptom.verdict.median_s
     ratio = median_s / symptom.limits.period_s
@@ -135,17 +136,17 @@ def other_timer(symptom: WrongRhythm) -> Cause | None:
     if median_s <= symptom.limits.period_s and declarations.timer_of_zero(symptom.recording):
         same = [0.0]
     words += [f"the process declared a timer of {format_duration(item)}" for item in same[:1]]
-    return Cause("; ".join(words), seconds_hint(symptom.limits.period_s)) if words else None
+    return Finding("; ".join(words), seconds_hint(symptom.limits.period_s)) if words else None
 
 
 @explanation(WrongRhythm)
-def right_timer_too_late(symptom: WrongRhythm) -> Cause | None:
+def right_timer_too_late(symptom: WrongRhythm) -> Finding | None:
     """The timer is right, but is created again or reset, or the executor does not call it."""
     wanted_s, late_s = symptom.limits.period_s, symptom.verdict.median_s - symptom.limits.period_s
     right = symptom.declares(wanted_s)
     if not right or late_s < 0.0:
         return None
-    return Cause(
+    return Finding(
         f"{format_duration(late_s)} too long, although the process declared "
         f"{counted(len(right), 'timer')} of {format_duration(wanted_s)}",
         "Keep callbacks short: no sleep, no loop that waits, no long computation. Create the timer "
@@ -155,7 +156,7 @@ def right_timer_too_late(symptom: WrongRhythm) -> Cause | None:
 
 
 @explanation(WrongRhythm)
-def sleeping_loop(symptom: WrongRhythm) -> Cause | None:
+def sleeping_loop(symptom: WrongRhythm) -> Finding | None:
     """A loop sleeps for the period, and its work takes additional time."""
     wanted_s, median_s = symptom.limits.period_s, symptom.verdict.median_s
     longer = wanted_s < median_s < 2.0 * wanted_s
@@ -164,7 +165,7 @@ def sleeping_loop(symptom: WrongRhythm) -> Cause | None:
     recording = symptom.recording
     no_timer = declarations.traced(recording) and not declarations.declares(recording, "timer")
     beginning = "the process declared no timer: " if no_timer else ""
-    return Cause(
+    return Finding(
         f"{beginning}it looks like {format_duration(wanted_s)} of sleeping plus "
         f"{format_duration(median_s - wanted_s)} of work",
         f"Use a timer: self.create_timer({wanted_s:g}, self.callback) keeps its period however "
@@ -173,11 +174,11 @@ def sleeping_loop(symptom: WrongRhythm) -> Cause | None:
 
 
 @explanation(WrongRhythm, general=True)
-def other_period(symptom: WrongRhythm) -> Cause:
+def other_period(symptom: WrongRhythm) -> Finding:
     """Messages come too often or too rarely."""
     if symptom.verdict.median_s < symptom.limits.period_s:
-        return Cause("messages come too often", _ONCE)
-    return Cause(
+        return Finding("messages come too often", _ONCE)
+    return Finding(
         f"{format_duration(symptom.verdict.median_s)} instead of "
         f"{format_duration(symptom.limits.period_s)}",
         seconds_hint(symptom.limits.period_s),
@@ -186,7 +187,7 @@ def other_period(symptom: WrongRhythm) -> Cause:
 
 def why_paused(
     recording: Recording, pause_ns: tuple[int, int], allowed_s: float, seen: str, hint: str
-) -> Cause | None:
+) -> Finding | None:
     """Why nothing came for longer than allowed, or None where the pause is short enough.
 
     Args:
@@ -201,6 +202,6 @@ def why_paused(
     if ended is not None:
         return ended
     if left_s(recording, begin_ns, end_ns) <= allowed_s:
-        return Cause.to_repeat(f"{seen}, but the machine took the time from the process")
+        return Finding.undecided(f"{seen}, but the machine took the time from the process")
     moment = Moment("nothing from here on", recording.since_launch_s(begin_ns))
-    return Cause(seen, hint, Evidence(moments=(moment,)))
+    return Finding(seen, hint, Evidence(moments=(moment,)))

@@ -6,13 +6,12 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.explanation import Symptom, explanation
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.no_messages import NoMessages, never_matched, why_silent
 from grader.diagnosis.process.process_exit import ended_early, why_crashed, why_ended
-from grader.findings.finding import Evidence, Moment
+from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen
 from grader.findings.wording import code, codes, counted
 from grader.measure import declarations
@@ -33,7 +32,7 @@ _NAMES = "Set header.frame_id = '{0.parent}' and child_frame_id = '{0.child}', w
 
 
 @dataclass(frozen=True)
-class NoTransform(Symptom[Cause], concept="frames"):
+class NoTransform(Symptom[Finding], concept="frames"):
     """A transform between two frames is not on its topic."""
 
     recording: Recording
@@ -62,16 +61,16 @@ class NoTransform(Symptom[Cause], concept="frames"):
         """What publishes on the topic as tf2 requests it."""
         return _STATIC if is_static(self.topic) else _MOVING
 
-    def instead(self, one: Sent | None, why: str, hint: str = _NAMES) -> Cause | None:
+    def instead(self, one: Sent | None, why: str, hint: str = _NAMES) -> Finding | None:
         """Another transform is there, if it is."""
         if one is None:
             return None
         seen = f"{edge(one.parent, one.child)} on {code(one.message.topic)} {why}"
-        return Cause(seen, hint.format(self), moment(self.recording, one, "sent"))
+        return Finding(seen, hint.format(self), moment(self.recording, one, "sent"))
 
 
 @dataclass(frozen=True)
-class BadTransform(Symptom[Cause], concept="frames"):
+class BadTransform(Symptom[Finding], concept="frames"):
     """A transform that may be of no use to tf2.
 
     Attributes:
@@ -95,24 +94,24 @@ def moment(recording: Recording, one: Sent, what: str) -> Evidence:
 
 
 @explanation(NoTransform)
-def process_crashed(symptom: NoTransform) -> Cause | None:
+def process_crashed(symptom: NoTransform) -> Finding | None:
     """The process ended with a failure, perhaps of a lookup before the first transform."""
     return why_crashed(symptom.recording)
 
 
 @explanation(NoTransform)
-def refused_by_tf2(symptom: NoTransform) -> Cause | None:
+def refused_by_tf2(symptom: NoTransform) -> Finding | None:
     """The publisher's QoS is not what tf2 requests: on /tf_static transient_local."""
     own = symptom.recording.student_endpoints(Kind.PUBLISHER, symptom.topic)
     requested = Qos("reliable", "transient_local" if is_static(symptom.topic) else "volatile")
     refused = [", ".join(refusals(one.qos, requested)) for one in own]
     seen = f"tf2 gets nothing from the publisher on {code(symptom.topic)}"
     evidence = Evidence(moments=endpoints_seen(symptom.recording, own))
-    return Cause(f"{seen} ({max(refused)})", symptom.hint, evidence) if any(refused) else None
+    return Finding(f"{seen} ({max(refused)})", symptom.hint, evidence) if any(refused) else None
 
 
 @explanation(NoTransform)
-def overwritten(symptom: NoTransform) -> Cause | None:
+def overwritten(symptom: NoTransform) -> Finding | None:
     """Late joiners miss it on /tf_static: its publisher keeps only messages that came later."""
     recording, topic = symptom.recording, symptom.topic
     queues = declarations.queues(recording, Kind.PUBLISHER, topic)
@@ -122,7 +121,7 @@ def overwritten(symptom: NoTransform) -> Cause | None:
     kept = recording.on(topic)[-(depth or 0) :]
     if not is_static(topic) or not symptom.wanted or symptom.wanted[-1].message in kept:
         return None
-    return Cause(
+    return Finding(
         "a node that starts later does not get it: the publisher keeps "
         f"{counted(len(kept), 'message')}, and published others after it",
         "Publish all static transforms in one message: sendTransform() takes a list.",
@@ -131,21 +130,21 @@ def overwritten(symptom: NoTransform) -> Cause | None:
 
 
 @explanation(NoTransform)
-def other_topic(symptom: NoTransform) -> Cause | None:
+def other_topic(symptom: NoTransform) -> Finding | None:
     """It is on /tf instead of /tf_static, or the other way round."""
     found = symptom.edges.get((symptom.parent, symptom.child))
     return symptom.instead(found, f"instead of {code(symptom.topic)}", symptom.hint)
 
 
 @explanation(NoTransform)
-def exchanged_frames(symptom: NoTransform) -> Cause | None:
+def exchanged_frames(symptom: NoTransform) -> Finding | None:
     """Parent and child are exchanged."""
     found = symptom.edges.get((symptom.child, symptom.parent))
     return symptom.instead(found, "is the other way round: parent and child are exchanged")
 
 
 @explanation(NoTransform)
-def no_transform_at_all(symptom: NoTransform) -> Cause | None:
+def no_transform_at_all(symptom: NoTransform) -> Finding | None:
     """Nothing is published on the topic, or only by others, such as the simulated robot."""
     recording, topic = symptom.recording, symptom.topic
     found = why_no_endpoint(recording, Kind.PUBLISHER, topic)
@@ -154,7 +153,7 @@ def no_transform_at_all(symptom: NoTransform) -> Cause | None:
 
 
 @explanation(NoTransform)
-def other_frame(symptom: NoTransform) -> Cause | None:
+def other_frame(symptom: NoTransform) -> Finding | None:
     """The frame has another parent, or a name is misspelt."""
     names = {" ".join(names): one for names, one in symptom.edges.items()}
     likely = names.get(nearest(f"{symptom.parent} {symptom.child}", names) or "")
@@ -163,7 +162,7 @@ def other_frame(symptom: NoTransform) -> Cause | None:
 
 
 @explanation(NoTransform, general=True)
-def other_transforms_only(symptom: NoTransform) -> Cause | None:
+def other_transforms_only(symptom: NoTransform) -> Finding | None:
     """Only transforms of other frames are published."""
     first = next(iter(symptom.there), None)
     others = codes(child for _, child in symptom.edges)
@@ -171,14 +170,14 @@ def other_transforms_only(symptom: NoTransform) -> Cause | None:
 
 
 @explanation(BadTransform)
-def no_quaternion(symptom: BadTransform) -> Cause | None:
+def no_quaternion(symptom: BadTransform) -> Finding | None:
     """The quaternion does not have the length 1: w is not set, or all four are 0."""
     if symptom.one.is_valid:
         return None
     *axis, w = (symptom.one.value["rotation"][part] for part in "xyzw")
     numbers = ", ".join(f"{part:.4g}" for part in (*axis, w))
     clause = ": w is not set" if w in (0.0, 1.0) and any(axis) else ""
-    return Cause(
+    return Finding(
         f"tf2 ignores the transform, for its quaternion (x, y, z, w) = ({numbers}) does not have "
         f"the length 1{clause}",
         "Set all four: without a rotation w is 1; about the z axis z = sin(yaw / 2) and "
@@ -188,7 +187,7 @@ def no_quaternion(symptom: BadTransform) -> Cause | None:
 
 
 @explanation(BadTransform, concept="stamps")
-def wrong_stamp(symptom: BadTransform) -> Cause | None:
+def wrong_stamp(symptom: BadTransform) -> Finding | None:
     """The stamp is 0, always the same, or of another clock."""
     sent_ns, stamp_ns = symptom.one.message.stamp_ns, symptom.one.stamp_ns
     stolen_s = symptom.recording.stolen_s(min(stamp_ns, sent_ns), sent_ns)
@@ -198,7 +197,7 @@ def wrong_stamp(symptom: BadTransform) -> Cause | None:
         return None
     off = f"{format_duration(abs(late_s))} {'before' if late_s > 0.0 else 'after'}"
     seen = f"the stamp is {off} the moment of publishing: always the same, or of another clock"
-    return Cause(
+    return Finding(
         seen if stamp_ns else "the stamp is 0: it is not set",
         "Set header.stamp = self.get_clock().now().to_msg() for each transform, or copy the stamp "
         "of the message that it is made of: tf2 looks transforms up by their time.",
@@ -206,7 +205,7 @@ def wrong_stamp(symptom: BadTransform) -> Cause | None:
     )
 
 
-def why_gone(recording: Recording, topic: str, seen: str) -> Cause | None:
+def why_gone(recording: Recording, topic: str, seen: str) -> Finding | None:
     """Why no publisher on a topic stayed until the end, or None if one did."""
     own = recording.student_endpoints(Kind.PUBLISHER, topic)
     processes = [declarations.process_of(recording, one.node) for one in own]

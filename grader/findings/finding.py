@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
+from grader.spec.unit import format_duration
 from grader.submission.record import SourceError
 
 
@@ -162,16 +163,19 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Finding:
-    """The verdict of a check on one recording or on the submission.
+    """What a check says of one recording or of the submission, and an explanation of a symptom.
+
+    Without a status it is a failure, the student's fault.
 
     Attributes:
-        status: See :class:`Status`.
-        expected: What is expected, a short phrase with units.
         observed: What was observed, and the deepest cause.
         hint: What to try next, in the words of the ROS docs. The author's hint in the YAML is
             shown too.
-        credit: Share of the points in [0, 1].
         evidence: What to show.
+        status: See :class:`Status`.
+        expected: What is expected, a short phrase with units; empty for what the parameters of
+            the check ask for.
+        credit: Share of the points in [0, 1].
         disturbed: The run should be repeated. For an error: the delays of the machine were too
             large for a fair verdict. For a failure: the machine may be part of the cause.
         remap: If wrong names are the only cause of the failure: the rules that correct them, such
@@ -180,12 +184,12 @@ class Finding:
         stands_alone: Whether the checks that require this one can be judged although it failed.
     """
 
-    status: Status
-    expected: str
     observed: str
     hint: str = ""
-    credit: float = 0.0
     evidence: Evidence = field(default_factory=Evidence)
+    status: Status = Status.FAILED
+    expected: str = ""
+    credit: float = 0.0
     disturbed: bool = False
     remap: str = ""
     concept: str = ""
@@ -194,7 +198,7 @@ class Finding:
     @classmethod
     def passed(cls, expected: str, observed: str, evidence: Evidence | None = None) -> Finding:
         """Full credit."""
-        return cls(Status.PASSED, expected, observed, "", 1.0, evidence or Evidence())
+        return cls(observed, "", evidence or Evidence(), Status.PASSED, expected, 1.0)
 
     @classmethod
     def failed(
@@ -206,16 +210,36 @@ class Finding:
         credit: float = 0.0,
     ) -> Finding:
         """The student's fault; ``credit`` may be partial."""
-        return cls(Status.FAILED, expected, observed, hint, credit, evidence or Evidence())
+        return cls(observed, hint, evidence or Evidence(), expected=expected, credit=credit)
 
     @classmethod
     def error(
         cls, expected: str, observed: str, *, disturbed: bool = False, hint: str = ""
     ) -> Finding:
         """Not judged, through no fault of the student's."""
-        return cls(Status.ERROR, expected, observed, hint, 0.0, Evidence(), disturbed)
+        return replace(cls.ours(observed, hint, disturbed=disturbed), expected=expected)
 
     @classmethod
     def to_repeat(cls, expected: str, observed: str) -> Finding:
         """Not judged because of rosgrade or the machine: the run should be repeated."""
         return cls.error(expected, observed, disturbed=True)
+
+    @classmethod
+    def ours(cls, observed: str, hint: str = "", *, disturbed: bool = False) -> Finding:
+        """A cause in rosgrade, the assignment or the machine: nothing is judged."""
+        return cls(observed, hint, status=Status.ERROR, disturbed=disturbed)
+
+    @classmethod
+    def undecided(cls, observed: str) -> Finding:
+        """A cause in the machine or in rosgrade: the run should be repeated."""
+        return cls.ours(observed, disturbed=True)
+
+    @classmethod
+    def held_up(cls, observed: str, stolen_s: float) -> Finding:
+        """What may be so only because the machine took time from the process meanwhile."""
+        took = f"the machine took up to {format_duration(stolen_s)} meanwhile"
+        return cls.undecided(f"{observed}; {took}, which may explain it")
+
+    def after(self, beginning: str) -> Finding:
+        """The same with a text before what was observed."""
+        return replace(self, observed=f"{beginning}: {self.observed}")

@@ -163,7 +163,9 @@ def _skipped(roots: Sequence[CheckResult]) -> ScenarioFinding:
     else:
         observed = f"{titles} did not pass, so this could not be judged"
         hint = f"Fix {titles} first: this is not a second mistake."
-    return ScenarioFinding(None, Finding(Status.SKIPPED, f"{titles} to pass first", observed, hint))
+    return ScenarioFinding(
+        None, Finding(observed, hint, status=Status.SKIPPED, expected=f"{titles} to pass first")
+    )
 
 
 def _about(bound: BoundCheck, loaded: LoadedAssignment) -> list[str]:
@@ -231,8 +233,9 @@ def why_not_run(submission: SubmissionRecord, packages: Iterable[str]) -> Findin
     for package in packages:
         cause = why_not_built(submission, package)
         if cause is not None:
-            return cause.after("was not run because the package was not built").finding(
-                f"the package {package} to build, so that its nodes can be launched"
+            return replace(
+                cause.after("was not run because the package was not built"),
+                expected=f"the package {package} to build, so that its nodes can be launched",
             )
     return None
 
@@ -244,7 +247,7 @@ def _why_incomplete(
     for package in packages:
         cause = why_lacking(submission, package)
         if cause is not None:
-            return cause.after(f"`{package}` could not run here").finding(expected)
+            return replace(cause.after(f"`{package}` could not run here"), expected=expected)
     return None
 
 
@@ -303,8 +306,8 @@ def _with_what_was_not_taken(finding: Finding, recording: Recording) -> Finding:
     cause = why_not_taken(recording, set(recording.given_parameters) - right)
     if cause is None or finding.remap or finding.observed.startswith(cause.observed):
         return finding
-    hint = cause.finding(finding.expected).hint
-    return replace(finding, observed=f"{cause.observed}; {finding.observed}", hint=hint)
+    seen = f"{cause.observed}; {finding.observed}"
+    return replace(finding, observed=seen, hint=cause.hint)
 
 
 def _found(

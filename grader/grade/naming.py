@@ -229,7 +229,7 @@ def _unnamed(
     if noun == "executable" and of and not offered:
         cause = why_no_executable(submission, of, str(variable.example))
         if cause is not None:
-            return cause.finding(asked)
+            return replace(cause, expected=asked)
     places = tuple(
         SourceError(item.file(_defining(item, noun)), None, f"the package {code(item.name)}")
         for item in submission.packages[:_MOST_PLACES]

@@ -8,7 +8,6 @@ from typing import Any
 
 from grader.checks.lifecycle.lifecycle import transition, why_not_managed
 from grader.checks.window import Phase, Window
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_unanswered
 from grader.diagnosis.no_endpoint import SERVICE
 from grader.diagnosis.no_messages import why_not_sent, why_silent
@@ -31,13 +30,14 @@ def judged_in(
     """The worst finding of all windows; if there is none, why."""
     intervals = window.intervals(recording)
     if not intervals:
-        return _why_never(recording, window).finding(f"a time {window}: this is judged then")
+        expected = f"a time {window}: this is judged then"
+        return replace(_why_never(recording, window), expected=expected)
     found = [judge(cut(recording, *one), parameters) for one in intervals]
     worst = min(found, key=lambda one: (SEVERITY.index(one.status), one.credit))
     return replace(worst, expected=f"{window}: {worst.expected}")
 
 
-def _why_never(recording: Recording, window: Window) -> Cause:
+def _why_never(recording: Recording, window: Window) -> Finding:
     for phase in (window.after, window.while_):
         if phase is not None and not phase.intervals(recording):
             return _why_not(recording, phase)
@@ -46,10 +46,11 @@ def _why_never(recording: Recording, window: Window) -> Cause:
     # A window of times alone does not depend on the student: the mistake is the assignment's.
     shown = Evidence(moments=(until_the_end(recording),))
     hint = "Look at the order in which this happens, and whether it happens at all."
-    return why_ended(recording, seen) or Cause(seen, hint, shown, ours=not window.phases)
+    never = Finding(seen, hint, shown) if window.phases else Finding.ours(seen, hint)
+    return why_ended(recording, seen) or never
 
 
-def _why_not(recording: Recording, phase: Phase) -> Cause:
+def _why_not(recording: Recording, phase: Phase) -> Finding:
     """Why something never happened, or was never so."""
     topic, seen, hint = phase.message, f"never: {phase.asked_for}", "Does the node get so far?"
     shown = Evidence(moments=(until_the_end(recording),))
@@ -79,7 +80,7 @@ def _why_not(recording: Recording, phase: Phase) -> Cause:
         seen = f"{code(phase.node)} was never {phase.lifecycle}"
         seen += f": {listing(steps, 'then')}" if steps else ""
         if True in results and not recording.on(f"{phase.node}/transition_event"):
-            return Cause.to_repeat(f"{seen}, but the probe received none of its events")
+            return Finding.undecided(f"{seen}, but the probe received none of its events")
         bad = [one for one, result in zip(changes, results, strict=True) if result is not True]
         if bad and bad[0].answered_ns is None:
             asked = (SERVICE, bad[0].service, bad[0].requested_ns, _ANSWER_S)
@@ -90,5 +91,5 @@ def _why_not(recording: Recording, phase: Phase) -> Cause:
                 "TransitionCallbackReturn.SUCCESS."
             )
             # What failed later, or ended the process, came of it.
-            return Cause(seen, hint, shown)
-    return why_ended(recording, seen) or Cause(seen, hint, shown)
+            return Finding(seen, hint, shown)
+    return why_ended(recording, seen) or Finding(seen, hint, shown)

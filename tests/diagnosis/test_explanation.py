@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
+from typing import Any
 
 import pytest
 
-from grader.diagnosis.explanation import Explanation, cause_of, explanations
+from grader.diagnosis.explanation import Explanation, cause_of, explanations, in_order
 from grader.diagnosis.no_messages import FewMessages, NoMessages
 from grader.diagnosis.process.exceptions import CPP_ROWS, TABLE, Raised, Row
 from grader.diagnosis.process.failure import Failure, Frame
@@ -156,3 +158,35 @@ def test_a_module_of_nobody_is_not_looked_for_in_a_package_at_the_top() -> None:
     run = recording(submission=submission(package(path="."), files=("bot_publisher/node.py",)))
     hint = cause_of(Raised(Failure("ModuleNotFoundError", "No module named 'pydantic'", ()), run))
     assert hint.startswith("Python does not find this module: check its spelling")
+
+
+def in_turn(*entries: Explanation) -> list[str]:
+    return [entry.name for entry in in_order(entries)]
+
+
+def found(name: str, module: str = "here", **changes: Any) -> Explanation:
+    entry = Explanation(NoMessages, name, changes.pop("apply", str), module, "It is so.")
+    return replace(entry, **changes)
+
+
+def test_two_explanations_that_could_both_apply_have_a_declared_order() -> None:
+    one, other = found("one", "a", apply=abs), found("other", "b", apply=len)
+    with pytest.raises(LookupError, match=r"before= or after= .+ a\.one, b\.other"):
+        in_turn(one, other)
+    assert in_turn(one, replace(other, before=(abs,))) == ["other", "one"]
+    assert in_turn(one, replace(other, after=(abs,))) == ["one", "other"]
+    assert in_turn(replace(one, is_general=True), other) == ["other", "one"]
+
+
+def test_explanations_of_one_module_are_asked_as_they_stand_there() -> None:
+    entries = [found(name, apply=abs if name == "b" else str) for name in "abc"]
+    assert in_turn(*entries) == ["a", "b", "c"]
+    between = found("between", "elsewhere", apply=len, after=(abs,))
+    with pytest.raises(LookupError):
+        in_turn(between, *entries)
+
+
+def test_an_explanation_serves_the_symptoms_that_are_derived_from_its_own() -> None:
+    for symptom, entries in explanations().items():
+        for base in symptom.__mro__[1:]:
+            assert set(explanations().get(base, ())) <= set(entries)

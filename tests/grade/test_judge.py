@@ -239,7 +239,7 @@ class TestOurFaults:
             (None, "the check 'told.told' returned NoneType instead of a Finding"),
             (True, "the check 'told.told' returned bool instead of a Finding"),
             (
-                Finding(Status.SKIPPED, "", ""),
+                Finding("", status=Status.SKIPPED),
                 "the check 'told.told' returned 'skipped', which only its requirements may decide",
             ),
             (

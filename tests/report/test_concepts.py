@@ -10,7 +10,6 @@ from typer.testing import CliRunner
 from grader.assignment.own_check import all_checks
 from grader.checks.check import NoParameters, Subject, check
 from grader.cli.app import app
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import explanations
 from grader.errors import UsageError
 from grader.findings.finding import Finding
@@ -50,12 +49,12 @@ def test_a_page_has_its_picture_described_and_no_links_that_lead_nowhere(name: s
 
 
 def test_what_a_cause_explains_comes_before_what_its_check_explains() -> None:
-    cause = Cause("nothing came", concept="qos")
+    cause = Finding("nothing came", concept="qos")
 
     @check("sample.cause", Subject.SUBMISSION, NoParameters, concept="timers")
     def by_cause(submission: object, parameters: NoParameters) -> Finding:
         """A message comes."""
-        return cause.finding("a message")
+        return cause
 
     @check("sample.plain", Subject.SUBMISSION, NoParameters, concept="timers")
     def plain(submission: object, parameters: NoParameters) -> Finding:

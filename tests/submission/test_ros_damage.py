@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from grader.diagnosis.not_built import why_not_built
+from grader.findings.finding import Status
 from grader.ros import RosInstallation
 from grader.submission.build.ros_damage import damaged
 from grader.submission.prepare import Prepared, prepare
@@ -161,7 +162,7 @@ def test_a_build_that_a_damaged_package_stops_costs_nothing_and_is_not_kept(
 
     found = built()
     cause = why_not_built(found.record, "bot_publisher")
-    assert cause is not None and cause.ours, found.record.build
+    assert cause is not None and cause.status is Status.ERROR, found.record.build
     assert "missing or damaged on the machine" in cause.observed
     assert "sudo apt install --reinstall ros-jazzy-nav2-util" in cause.hint
     library = ["cc", "-shared", "-o", str(prefix / "lib/libnav2_util.so"), "-x", "c", "/dev/null"]

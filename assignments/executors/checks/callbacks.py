@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -89,7 +90,7 @@ def run(recording: Recording, parameters: Runs) -> Finding:
         parameters.at_least if free else 1,
     )
     if cause is not None:
-        return cause.finding(expected)
+        return replace(cause, expected=expected)
     for callback in () if free else parameters.callbacks:
         if parameters.period is not None:
             finding = _judge_period(recording, parameters, reports, callback, parameters.period)
@@ -168,7 +169,7 @@ def _judge_period(
     cause = why_reports_are_missing(
         recording, parameters.topic, parameters.callbacks, reports, parameters.at_least
     )
-    return None if cause is None else cause.finding(expected)
+    return None if cause is None else replace(cause, expected=expected)
 
 
 def _declares(recording: Recording, parameters: Runs, limits: PeriodLimits) -> bool:
@@ -278,7 +279,7 @@ def _judge_messages(
     expected = _run_words(parameters)
     sent = recording.sent.get(parameters.stimulus or "", ())
     if not sent:
-        return why_not_sent(recording, parameters.stimulus or "").finding(expected)
+        return replace(why_not_sent(recording, parameters.stimulus or ""), expected=expected)
     begun, ended = len(reports.of(callback)), len(reports.ended([callback]))
     evidence = Evidence(spans=spans(recording, reports, reports.of(callback)))
     observed = (
@@ -299,7 +300,7 @@ def _judge_messages(
         recording, parameters.stimulus or "", observed, sent[-1].stamp_ns
     )
     if cause is not None:
-        return cause.finding(expected)
+        return replace(cause, expected=expected)
     work_s = max((item.seconds or 0.0 for item in reports.ended([callback])), default=0.0)
     missing_s = (len(sent) - ended) * work_s
     if recording.stolen_s(sent[0].stamp_ns, recording.stop_ns) >= missing_s > 0.0:
@@ -351,7 +352,7 @@ def work(recording: Recording, parameters: Work) -> Finding:
     reports = read_reports(recording.on(parameters.topic))
     cause = why_reports_are_missing(recording, parameters.topic, parameters.callbacks, reports)
     if cause is not None:
-        return cause.finding(expected)
+        return replace(cause, expected=expected)
     allowed_s = parameters.tolerance.of(parameters.duration)
     parts = []
     for callback in parameters.callbacks:

@@ -8,10 +8,9 @@ from typing import ClassVar
 from pydantic import Field
 
 from grader.checks.check import Parameters
-from grader.findings.finding import Evidence, Moment, Table
+from grader.findings.finding import Evidence, Moment, Table, Finding
 from grader.checks.need import Need, Recorded
 from grader.findings.wording import code, codes, counted, value_text
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Recording
@@ -46,7 +45,7 @@ def why_reports_are_missing(
     callbacks: Sequence[str],
     reports: Reports,
     at_least: int = 1,
-) -> Cause | None:
+) -> Finding | None:
     """Why a callback did not report enough complete runs, or None if all did.
 
     Args:
@@ -66,7 +65,7 @@ def why_reports_are_missing(
     )
     name = missing[0]
     if reports.strange and not reports.runs:
-        return Cause(
+        return Finding(
             f"no message on {code(topic)} is a report of a callback: there is "
             f"{value_text(reports.strange[0])}, for example",
             _FORMAT_HINT,
@@ -76,7 +75,7 @@ def why_reports_are_missing(
     # Something may have been put before or after the name, such as that of the node.
     other = nearest(name, strangers) or next((item for item in strangers if name in item), None)
     if other is not None and not reports.of(name):
-        return Cause(
+        return Finding(
             f"no report of {code(name)}, but reports of {code(other)}",
             f"A report is {code(f'{name} start')} or {code(f'{name} end')}, exactly so, with "
             "nothing before it or after it.",
@@ -89,19 +88,19 @@ def why_reports_are_missing(
 
 def _incomplete(
     recording: Recording, reports: Reports, name: str, at_least: int, evidence: Evidence
-) -> Cause:
+) -> Finding:
     begun, ended = len(reports.of(name)), len(reports.ended([name]))
     begin_ns = recording.matched_ns or recording.launched_ns
     watched_s = (recording.stop_ns - begin_ns) / NS
     stolen_s = recording.stolen_s(begin_ns, recording.stop_ns)
     # With the time that was taken from it, the node may have come to as many as are needed.
     if stolen_s > 0.0 and ended * watched_s >= at_least * (watched_s - stolen_s):
-        return Cause.to_repeat(
+        return Finding.undecided(
             f"{code(name)} ran {counted(ended, 'time')}, but the machine took "
             f"{format_duration(stolen_s)} of {format_duration(watched_s)} from the process"
         )
     if begun > ended:
-        return Cause(
+        return Finding(
             f"{code(name)} reported {counted(begun, 'start')}, but {ended or 'no'} "
             f"{'end' if ended == 1 else 'ends'}",
             "Publish the end as the last thing in the callback; it must return. Look for a loop, "
@@ -110,18 +109,18 @@ def _incomplete(
             evidence,
         )
     if name in reports.orphans:
-        return Cause(f"{code(name)} reported its end, but never its start", _FORMAT_HINT, evidence)
+        return Finding(f"{code(name)} reported its end, but never its start", _FORMAT_HINT, evidence)
     if not begun:
         others = [item for item in reports.callbacks if item != name]
         seen = f"; reports came of {codes(others)}" if others else ""
-        return Cause(
+        return Finding(
             f"{code(name)} never ran{seen}",
             "Is its timer or its subscription created in the constructor, with the period in "
             "seconds, and does it report under this name? A callback that does not return keeps "
             "the others of its group from running.",
             evidence,
         )
-    return Cause(
+    return Finding(
         f"{code(name)} ran only {counted(ended, 'time')} in {format_duration(watched_s)}, of "
         f"{at_least} that are needed",
         f"{SECONDS_HINT} A callback that works for long lets the others of its group wait.",

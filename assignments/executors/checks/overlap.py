@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from collections.abc import Sequence
 
 from pydantic import Field
@@ -44,7 +45,7 @@ def never_overlap(recording: Recording, parameters: NeverOverlap) -> Finding:
         recording, parameters.topic, parameters.callbacks, reports, parameters.at_least
     )
     if cause is not None:
-        return cause.finding(expected)
+        return replace(cause, expected=expected)
     runs = reports.ended(names)
     found = list(overlaps(runs))
     if not found:
@@ -142,7 +143,7 @@ def overlap(recording: Recording, parameters: Overlapping) -> Finding:
     names = (*parameters.callbacks, *parameters.others)
     cause = why_reports_are_missing(recording, parameters.topic, names, reports)
     if cause is not None:
-        return cause.finding(expected)
+        return replace(cause, expected=expected)
     parts = []
     for callback in parameters.callbacks:
         number = len(_with_others(reports, callback, parameters, parameters.by))

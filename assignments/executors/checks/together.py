@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from collections.abc import Iterable, Sequence
 from functools import reduce
 
@@ -50,7 +51,7 @@ def together(recording: Recording, parameters: Together) -> Finding:
     reports = read_reports(recording.on(parameters.topic))
     cause = why_reports_are_missing(recording, parameters.topic, names, reports)
     if cause is not None:
-        return cause.finding(expected)
+        return replace(cause, expected=expected)
     found = [item for item in _all_at_once(reports, names) if _seconds(item) >= parameters.by]
     if len(found) >= parameters.at_least:
         return Finding.passed(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
 from collections.abc import Sequence
 from typing import Literal
@@ -18,7 +19,6 @@ from grader.measure.motion.quantities import metres, speed
 from grader.checks.motion.robot_check import GoalParameters
 from grader.measure.motion.track import evidence_at
 from grader.findings.wording import counted, percent
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.no_motion import why_cut_short
@@ -74,15 +74,15 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
         f"{parameters.r2:.2g}{_range_words(parameters)})"
     )
     run = approach(recording, parameters.goal)
-    if isinstance(run, Cause):
-        return run.finding(expected)
+    if isinstance(run, Finding):
+        return replace(run, expected=expected)
     topic = command_topic(recording)
     if not recording.on(topic):
-        return why_silent(recording, topic).finding(expected)
+        return replace(why_silent(recording, topic), expected=expected)
     arrival = run.arrival(parameters.position)
     if phase == "align" and arrival is None:
-        cause = why_not_there(run, parameters.position)
-        return (cause or Cause("never near the goal")).finding(expected)
+        never = why_not_there(run, parameters.position) or Finding("never near the goal")
+        return replace(never, expected=expected)
     scene = recording.scene
     limit_rad_s = scene.max_angular_rad_s if scene is not None else math.inf
     tried = [_samples(run, parameters, behind, limit_rad_s) for behind in range(MOST_BEHIND + 1)]
@@ -99,7 +99,7 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     idle = verdict.law is Law.NOTHING_TO_DO
     deeper = why_cut_short(recording) if idle else why_off_course(recording)
     if deeper is not None and len(samples) < LEAST_SAMPLES:
-        return deeper.finding(expected)
+        return replace(deeper, expected=expected)
     if idle:
         return Finding.passed(
             expected,
@@ -126,7 +126,7 @@ class ProportionalSpeed(GoalParameters):
 
 
 @check("motion.proportional_speed", Subject.RECORDING, ProportionalSpeed)
-def proportional_speed(recording: Recording, parameters: ProportionalSpeed) -> Finding | Cause:
+def proportional_speed(recording: Recording, parameters: ProportionalSpeed) -> Finding:
     """linear.x is proportional to the distance.
 
     Judged by the published commands with which the robot drives while it looks at the goal, since
@@ -156,7 +156,7 @@ def proportional_speed(recording: Recording, parameters: ProportionalSpeed) -> F
     if line.r2 >= parameters.r2 or rounded:
         seen = f"gain {line.gain:.3g} 1/s, R² {line.r2:.3f}, {counted(line.used, 'command')}"
         return Finding.passed(parameters.asked_for, seen, Evidence(plots=(plot,)))
-    return why_off_course(recording) or Cause(
+    return why_off_course(recording) or Finding(
         f"linear.x is {speed(far.command)} at {metres(far.error)}, but {speed(near.command)} at "
         f"{metres(near.error)}: {far.command / far.error:.2g} and "
         f"{near.command / near.error:.2g} times the distance",

@@ -16,7 +16,6 @@ from grader.findings.first_seen import first_seen
 from grader.measure.numbering import published
 from grader.checks.need import PUBLISHED, Recorded
 from grader.findings.wording import code, counted, listing
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.wrong_value import MISREAD, was_integer
 from grader.diagnosis.no_messages import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
@@ -130,10 +129,10 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     sent = recording.sent.get(parameters.stimulus, ())
     received = recording.on(parameters.topic)
     if not sent:
-        return why_not_sent(recording, parameters.stimulus).finding(expected)
+        return replace(why_not_sent(recording, parameters.stimulus), expected=expected)
     if not received:
         cause = _elsewhere(recording, parameters) or why_silent(recording, parameters.topic)
-        return cause.finding(expected)
+        return replace(cause, expected=expected)
     try:
         found = cases(parameters.conversion, sent, received, parameters.limits)
     except WrongMessage as error:
@@ -146,7 +145,7 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     )
     elsewhere = _elsewhere(recording, parameters) if wrong or missing else None
     if elsewhere is not None:
-        return elsewhere.finding(expected)
+        return replace(elsewhere, expected=expected)
     if _is_behind(found):
         return Finding.failed(
             expected,
@@ -178,11 +177,11 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
         )
         return Finding.failed(expected, observed, _UNPROMPTED_HINT, evidence)
     if len(judged) < parameters.at_least:
-        return _too_few(recording, parameters, found, judged).finding(expected)
+        return replace(_too_few(recording, parameters, found, judged), expected=expected)
     return Finding.passed(expected, _summary(judged), evidence)
 
 
-def _elsewhere(recording: Recording, parameters: Answers) -> Cause | None:
+def _elsewhere(recording: Recording, parameters: Answers) -> Finding | None:
     """The right answers on another topic, as exchanged publishers give them."""
     for topic, received in recording.messages.items():
         if topic == parameters.topic:
@@ -197,7 +196,7 @@ def _elsewhere(recording: Recording, parameters: Answers) -> Cause | None:
         except WrongMessage:
             continue
         if sum(bool(case.answers) and case.good for case in found) > _ELSEWHERE * len(found):
-            return Cause(
+            return Finding(
                 f"the answers to {code(parameters.stimulus)} are right, but come on {code(topic)}",
                 f"The callback of {code(parameters.stimulus)} publishes on "
                 f"{code(parameters.topic)}: look which publisher has which topic, and which "
@@ -367,17 +366,17 @@ def _missing(
         recording, parameters.stimulus, observed, missing[-1].asked_ns
     )
     if cause is None and len(missing) <= lost:
-        cause = Cause.to_repeat(f"{observed}; {counted(lost, 'answer')} got lost on the way")
+        cause = Finding.undecided(f"{observed}; {counted(lost, 'answer')} got lost on the way")
     if cause is None and any(_starved(recording, case) for case in missing):
-        cause = Cause.to_repeat(f"{observed}, but the machine took the time from the process")
+        cause = Finding.undecided(f"{observed}, but the machine took the time from the process")
     cause = cause or why_raised(recording, observed, missing[0].asked_ns)
-    cause = cause or Cause(
+    cause = cause or Finding(
         observed,
         "Publish once in every call of the callback. Look for an exception that is caught, and "
         "for a condition that leaves cases out.",
         evidence,
     )
-    return cause.finding(expected)
+    return replace(cause, expected=expected)
 
 
 def _starved(recording: Recording, case: Case) -> bool:
@@ -387,7 +386,7 @@ def _starved(recording: Recording, case: Case) -> bool:
 
 def _too_few(
     recording: Recording, parameters: Answers, found: Sequence[Case], judged: list[Case]
-) -> Cause:
+) -> Finding:
     seen = f"only {counted(len(judged), 'case')} of {parameters.at_least} could be sent"
     cause = why_ended(recording, seen) or why_unsubscribed(recording, parameters.stimulus, seen)
     if cause is not None:
@@ -395,12 +394,12 @@ def _too_few(
     if any(case.behind_s is not None for case in found) or _is_slow(recording, found):
         first = found[0]
         sent = Moment(f"case {first.number} is sent", recording.since_launch_s(first.asked_ns))
-        return Cause(
+        return Finding(
             f"{seen}, because the answers come late",
             "A callback must return soon: no time.sleep() and no loop that waits.",
             Evidence(moments=(sent,)),
         )
-    return Cause.to_repeat(seen)
+    return Finding.undecided(seen)
 
 
 def _is_slow(recording: Recording, found: Sequence[Case]) -> bool:

@@ -18,7 +18,6 @@ from grader.checks.check import (
 )
 from grader.checks.need import Doubt, GoalSent
 from grader.checks.requests import judged_requests, timeline, why_other_fields
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_late, why_raised, why_unanswered
 from grader.diagnosis.no_endpoint import ACTION, is_offered
 from grader.findings.fields import FieldTolerance, the_goal, words
@@ -101,11 +100,11 @@ def _is_to_cancel(goal: Goal) -> bool:
     return goal.cancel_after_s is not None
 
 
-def why_rejected(recording: Recording, goal: Goal) -> Cause | None:
+def why_rejected(recording: Recording, goal: Goal) -> Finding | None:
     """Why a goal that should have been accepted was not, or None if it was."""
     if goal.accepted is not False:
         return None
-    return Cause(
+    return Finding(
         f"{the_goal(goal)} was rejected",
         "A goal_callback must return GoalResponse.ACCEPT for a goal that is right; without one "
         "every goal is accepted.",
@@ -136,7 +135,7 @@ class Rejects(OfGoals):
 
 
 @check("action.rejects", Subject.RECORDING, Rejects)
-def rejects(recording: Recording, parameters: Rejects) -> Finding | Cause:
+def rejects(recording: Recording, parameters: Rejects) -> Finding:
     """The goal is rejected.
 
     Judged by the server's answer to the goals that the probe sent.
@@ -145,7 +144,7 @@ def rejects(recording: Recording, parameters: Rejects) -> Finding | Cause:
     for goal in goals:
         if goal.accepted:
             then = f", then {goal.status}" if goal.status else ""
-            return Cause(
+            return Finding(
                 f"{the_goal(goal)} was accepted{then}",
                 "The ActionServer's goal_callback decides: it looks at the request and returns "
                 "GoalResponse.REJECT. Without one every goal is accepted.",
@@ -216,19 +215,21 @@ def _rate_hz(goal: Goal) -> float:
     return (len(goal.feedback) - 1) * NS / span_ns if span_ns > 0 else float("inf")
 
 
-def _why_little_feedback(recording: Recording, goal: Goal, parameters: FeedbackOf) -> Cause | None:
+def _why_little_feedback(
+    recording: Recording, goal: Goal, parameters: FeedbackOf
+) -> Finding | None:
     if len(goal.feedback) >= parameters.at_least:
         return None
     seen = f"{the_goal(goal)} gave {counted(len(goal.feedback), 'message')} of feedback"
     seen += f" and then {goal.status}" if goal.status else ""
-    return why_raised(recording, seen, goal.sent_ns) or Cause(
+    return why_raised(recording, seen, goal.sent_ns) or Finding(
         seen,
         "Call goal_handle.publish_feedback(feedback) in the loop of the execute callback.",
         evidence(recording, goal),
     )
 
 
-def _why_other_rate(recording: Recording, goal: Goal, parameters: FeedbackOf) -> Cause | None:
+def _why_other_rate(recording: Recording, goal: Goal, parameters: FeedbackOf) -> Finding | None:
     if parameters.rate is None:
         return None
     rate_hz = _rate_hz(goal)
@@ -240,12 +241,12 @@ def _why_other_rate(recording: Recording, goal: Goal, parameters: FeedbackOf) ->
     late_s = (end_ns - begin_ns) / NS - due_s * (1.0 + parameters.tolerance)
     stolen_s = recording.stolen_s(begin_ns, end_ns)
     if 0.0 < late_s <= stolen_s:
-        return Cause.held_up(seen, stolen_s)
+        return Finding.held_up(seen, stolen_s)
     hint = f"Each round of the loop should take {format_duration(1.0 / parameters.rate)}."
-    return Cause(seen, hint, evidence(recording, goal))
+    return Finding(seen, hint, evidence(recording, goal))
 
 
-def _why_other_feedback(recording: Recording, goal: Goal, parameters: FeedbackOf) -> Cause | None:
+def _why_other_feedback(recording: Recording, goal: Goal, parameters: FeedbackOf) -> Finding | None:
     shown = evidence(recording, goal)
     hint = "Set the fields of the feedback before each publish_feedback(feedback)."
     for which, index, wanted in (("first", 0, parameters.first), ("last", -1, parameters.last)):
@@ -305,14 +306,14 @@ def result(recording: Recording, parameters: Result) -> Finding:
     return Finding.passed(parameters.asked_for, observed, evidence(recording, goals[0]))
 
 
-def _why_other_status(recording: Recording, goal: Goal, parameters: Result) -> Cause | None:
+def _why_other_status(recording: Recording, goal: Goal, parameters: Result) -> Finding | None:
     if goal.status == parameters.status:
         return None
     seen = f"{the_goal(goal)} {goal.status or 'has no status'}"
     is_aborted = goal.status == "aborted"
     call = {"succeeded": "succeed", "aborted": "abort", "canceled": "canceled"}[parameters.status]
     raised = why_raised(recording, seen, goal.sent_ns) if is_aborted else None
-    return raised or Cause(
+    return raised or Finding(
         seen,
         f"Call goal_handle.{call}() before the execute callback returns its result."
         + (" Without it rclpy aborts the goal." if is_aborted else ""),
@@ -320,7 +321,7 @@ def _why_other_status(recording: Recording, goal: Goal, parameters: Result) -> C
     )
 
 
-def _why_no_result(recording: Recording, goal: Goal, within_s: float) -> Cause | None:
+def _why_no_result(recording: Recording, goal: Goal, within_s: float) -> Finding | None:
     seen, hint = (
         f"the result of {the_goal(goal)} did not come",
         "Look for a sleep that is too long.",
@@ -329,7 +330,7 @@ def _why_no_result(recording: Recording, goal: Goal, within_s: float) -> Cause |
     return why_late(recording, ACTION, goal.action, sent_ns, end_ns, within_s, seen, hint, shown)
 
 
-def _why_other_result(recording: Recording, goal: Goal, parameters: Result) -> Cause | None:
+def _why_other_result(recording: Recording, goal: Goal, parameters: Result) -> Finding | None:
     seen, shown = f"the result of {the_goal(goal)} has", evidence(recording, goal)
     wanted, tolerance = parameters.result, parameters.tolerance
     return why_other_fields(seen, "result", goal.result, wanted, tolerance, shown)

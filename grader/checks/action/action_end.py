@@ -7,7 +7,6 @@ from pydantic import Field
 from grader.checks.action.action import OfGoals, answered_goals, evidence, why_rejected
 from grader.checks.check import Subject, check, stop_if, stop_if_any
 from grader.checks.need import GoalSent
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_late
 from grader.diagnosis.no_endpoint import ACTION
 from grader.diagnosis.process.process_exit import why_ended
@@ -52,15 +51,15 @@ def cancels(recording: Recording, parameters: Cancels) -> Finding:
     return Finding.passed(parameters.asked_for, observed, evidence(recording, goals[0]))
 
 
-def _why_not_asked(recording: Recording, goal: Goal) -> Cause | None:
+def _why_not_asked(recording: Recording, goal: Goal) -> Finding | None:
     """Why the goal was not asked to cancel: it ended too early, or the run did."""
     if goal.canceled_ns is not None:
         return None
     if goal.result_ns is None:
-        late = Cause.to_repeat("the run ended before the goal was asked to cancel")
+        late = Finding.undecided("the run ended before the goal was asked to cancel")
         return why_ended(recording) or late
     if (goal.result_ns - (goal.answered_ns or goal.sent_ns)) / NS > (goal.cancel_after_s or 0.0):
-        return Cause.to_repeat("the probe was too late to ask for it")
+        return Finding.undecided("the probe was too late to ask for it")
     return ended_alone(recording, goal, evidence(recording, goal))
 
 
@@ -78,7 +77,7 @@ class Preempts(OfGoals):
 
 
 @check("action.preempts", Subject.RECORDING, Preempts)
-def preempts(recording: Recording, parameters: Preempts) -> Finding | Cause:
+def preempts(recording: Recording, parameters: Preempts) -> Finding:
     """A new goal ends the goal that is executed.
 
     Judged by the goals that the probe sent while another one was active (`preempt: true`): the
@@ -90,7 +89,7 @@ def preempts(recording: Recording, parameters: Preempts) -> Finding | Cause:
         number = sent.index(goal)
         if number == 0:
             text = "there is no goal before it that it could end"
-            return Cause(text, ours=True)
+            return Finding.ours(text)
         old = sent[number - 1]
         stop_if(why_rejected(recording, old) or why_rejected(recording, goal))
         stop_if(_why_goes_on(recording, old, goal, parameters.within))
@@ -98,7 +97,7 @@ def preempts(recording: Recording, parameters: Preempts) -> Finding | Cause:
     return Finding.passed(parameters.asked_for, "the old goal ended", shown)
 
 
-def _why_goes_on(recording: Recording, old: Goal, new: Goal, within_s: float) -> Cause | None:
+def _why_goes_on(recording: Recording, old: Goal, new: Goal, within_s: float) -> Finding | None:
     """Why the old goal was not ended by the new one, or None if it was."""
     sent_ns, end_ns, shown = new.sent_ns, old.result_ns, evidence(recording, old)
     hint = (
@@ -107,12 +106,12 @@ def _why_goes_on(recording: Recording, old: Goal, new: Goal, within_s: float) ->
     )
     if end_ns is None:
         seen = f"{the_goal(old)} was still worked on at the end"
-        return why_no_end(recording, seen, sent_ns, within_s) or Cause(seen, hint, shown)
+        return why_no_end(recording, seen, sent_ns, within_s) or Finding(seen, hint, shown)
     if end_ns < sent_ns:
         if recording.stolen_s(old.sent_ns, sent_ns) >= (sent_ns - end_ns) / NS:
-            return Cause.to_repeat("the old goal had ended before the new one was sent")
+            return Finding.undecided("the old goal had ended before the new one was sent")
         return ended_alone(recording, old, shown)
     if old.status == "succeeded":
-        return Cause(f"{the_goal(old)} was worked on to its end, and succeeded", hint, shown)
+        return Finding(f"{the_goal(old)} was worked on to its end, and succeeded", hint, shown)
     seen = f"after the new goal was sent, {the_goal(old)} did not end"
     return why_late(recording, ACTION, old.action, sent_ns, end_ns, within_s, seen, hint, shown)

@@ -8,7 +8,6 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.need import Bags
-from grader.diagnosis.cause import Cause
 from grader.findings.finding import Finding
 from grader.findings.wording import code, codes, counted, listing
 from grader.spec.name import InterfaceName, TopicName
@@ -24,7 +23,7 @@ class Clean(Parameters):
 
 
 @check("archive.clean", Subject.SUBMISSION, Clean)
-def clean(submission: SubmissionRecord, parameters: Clean) -> Finding | Cause:
+def clean(submission: SubmissionRecord, parameters: Clean) -> Finding:
     """The submission holds nothing that a build or a run makes.
 
     That is `build`, `install` and `log` of colcon, `CMakeFiles`, `__pycache__`, `*.pyc`,
@@ -33,7 +32,7 @@ def clean(submission: SubmissionRecord, parameters: Clean) -> Finding | Cause:
     """
     if not submission.leftovers:
         return Finding.passed(parameters.asked_for, "there is nothing of that kind")
-    return Cause(
+    return Finding(
         f"it holds {codes(submission.leftovers)}",
         "Hand in the sources only. `git archive HEAD -o handin.zip` packs what is committed; put "
         f"{codes(sorted({one.rpartition('/')[2] for one in submission.leftovers}))} into "
@@ -64,7 +63,7 @@ class File(Parameters):
 
 
 @check("archive.file", Subject.SUBMISSION, File)
-def file(submission: SubmissionRecord, parameters: File) -> Finding | Cause:
+def file(submission: SubmissionRecord, parameters: File) -> Finding:
     """The submission holds the file, with the expected headings.
 
     Headings are those of Markdown (`# Usage`, or underlined with `===` or `---`) and of
@@ -72,7 +71,7 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding | Cause:
     """
     found = [path for path in submission.files if parameters.matches(path)]
     if not found:
-        return Cause(
+        return Finding(
             "there is no such file", f"Add the file {code(parameters.path)} to what you hand in."
         )
     texts = dict(submission.headings)
@@ -82,7 +81,7 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding | Cause:
     headings = [heading for path in found for heading in texts.get(path, ())]
     there = listing(f'"{heading}"' for heading in headings) or "none"
     wanted = listing(f'"{heading}"' for heading in missing)
-    return Cause(
+    return Finding(
         f"{codes(found)} lacks {wanted}; its headings: {there}",
         f"Write a section with the heading `# {missing[0]}`.",
     )
@@ -113,13 +112,13 @@ class Bag(Parameters):
 
 
 @check("archive.bag", Subject.SUBMISSION, Bag)
-def bag(submission: SubmissionRecord, parameters: Bag) -> Finding | Cause:
+def bag(submission: SubmissionRecord, parameters: Bag) -> Finding:
     """The submission holds a recorded bag that can be read.
 
     Judged by reading every message of the bags that `ros2 bag record` wrote, in MCAP or SQLite.
     """
     if submission.bags is None:
-        return Cause("the bags were not read: grade again", ours=True)
+        return Finding.ours("the bags were not read: grade again")
     causes = [(one, _why_not(one, parameters)) for one in submission.bags]
     for one, cause in causes:
         if cause is None:
@@ -128,15 +127,15 @@ def bag(submission: SubmissionRecord, parameters: Bag) -> Finding | Cause:
             return Finding.passed(parameters.asked_for, observed)
     if not causes:
         nothing = "there is no bag, a folder with `metadata.yaml` and an `.mcap` or `.db3` file"
-        return Cause(nothing, "Hand in the whole folder that `ros2 bag record` made.")
+        return Finding(nothing, "Hand in the whole folder that `ros2 bag record` made.")
     return next(cause for _, cause in causes if cause is not None)
 
 
-def _why_not(bag: BagRecord, parameters: Bag) -> Cause | None:
+def _why_not(bag: BagRecord, parameters: Bag) -> Finding | None:
     """Why a bag is not what is asked for, or None."""
     here = code(bag.path)
     if bag.problem is not None:
-        return Cause(
+        return Finding(
             f"{here}: {bag.problem}",
             "End `ros2 bag record` with Ctrl-C and wait until it has ended. `ros2 bag info` must "
             "be able to read the bag.",
@@ -146,13 +145,13 @@ def _why_not(bag: BagRecord, parameters: Bag) -> Cause | None:
         if types.get(topic) != kind:
             there = f"as {code(types[topic])}" if topic in types else "no message"
             others = f"; it has {codes(types)}" if types else ""
-            return Cause(
+            return Finding(
                 f"{here} has {there} on {code(topic)}{others if topic not in types else ''}",
                 f"Record {code(topic)} ({kind}) while the node publishes on it.",
             )
     if parameters.lasts is not None and bag.duration_s < parameters.lasts:
         seen = f"{here} lasts {format_duration(bag.duration_s)}"
-        return Cause(seen, "Record for a longer time.")
+        return Finding(seen, "Record for a longer time.")
     if not types:
-        return Cause(f"{here} has no message", "Record while the node publishes.")
+        return Finding(f"{here} has no message", "Record while the node publishes.")
     return None

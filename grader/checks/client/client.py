@@ -11,7 +11,6 @@ from pydantic import Field
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.need import Doubt, Stimulated
 from grader.checks.requests import why_other_fields
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_taken
 from grader.diagnosis.not_asked import evidence, why_not_asked
 from grader.findings.fields import FieldTolerance, brief, words
@@ -85,19 +84,19 @@ def asks(recording: Recording, parameters: Asks) -> Finding:
     if len(asked) > needed and not parameters.more:
         seen = f"{code(server)} was asked {counted(len(asked), 'time')}, not {needed}"
         hint = "Does a timer or a loop send again, or a callback that is called twice?"
-        stop_if(Cause(seen, hint, shown))
+        stop_if(Finding(seen, hint, shown))
     if parameters.cancels is not None:
         stop_if(_why_not_canceled(recording, asked[needed - 1], parameters.cancels, shown))
     observed = f"asked {counted(len(asked), 'time')}, first for {brief(asked[0].fields)}"
     return Finding.passed(parameters.asked_for, observed, shown)
 
 
-def _why_too_early(before: Asked, after: Asked, shown: Evidence) -> Cause | None:
+def _why_too_early(before: Asked, after: Asked, shown: Evidence) -> Finding | None:
     """Why something was asked before what came before it had ended; None if that is right."""
     ended = before.ended_ns is not None and before.ended_ns <= after.asked_ns
     if ended or before.status == "unanswered":
         return None
-    return Cause(
+    return Finding(
         f"the next one ({brief(after.fields)}) came before the result of {brief(before.fields)}",
         "Send the next one only in the callback that takes the result: of a goal that is the "
         "future of get_result_async(), not that of send_goal_async().",
@@ -107,7 +106,7 @@ def _why_too_early(before: Asked, after: Asked, shown: Evidence) -> Cause | None
 
 def _why_not_canceled(
     recording: Recording, goal: Asked, span_s: tuple[float, float], shown: Evidence
-) -> Cause | None:
+) -> Finding | None:
     """Why a goal was not asked to cancel in time, or None if it was."""
     begin_ns, canceled_ns = goal.accepted_ns or goal.asked_ns, goal.canceled_ns
     took_s = ((canceled_ns or recording.stop_ns) - begin_ns) / NS
@@ -122,4 +121,4 @@ def _why_not_canceled(
     )
     end_ns = canceled_ns or recording.stop_ns
     taken = None if is_early else why_taken(recording, seen, begin_ns, end_ns, span_s[1])
-    return taken or Cause(seen, hint, shown)
+    return taken or Finding(seen, hint, shown)

@@ -12,7 +12,6 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.log.log_content import logged, printed
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.process.blocked_executor import why_not_called
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.undeclared import why_undeclared
@@ -92,7 +91,7 @@ def _is(run: Run, name: str) -> bool:
 
 
 @check("executor.overlap", Subject.RECORDING, Overlap, concept="executors")
-def overlap(recording: Recording, parameters: Overlap) -> Finding | Cause:
+def overlap(recording: Recording, parameters: Overlap) -> Finding:
     """Callbacks run at the same time, or never do.
 
     Each of the named callbacks must overlap with another of them, a single one with itself. With
@@ -118,8 +117,8 @@ def overlap(recording: Recording, parameters: Overlap) -> Finding | Cause:
     kept_apart = sum(not _was_held_up(recording, *pair) for pair in followed)
     # Where one waited for the other, and the machine took nothing, they were kept apart.
     if not never and prevented > kept_apart and min(numbers.values()) + prevented >= least:
-        return Cause.to_repeat(f"{observed}, but the machine held callbacks up")
-    return Cause(observed, _hint(recording, runs, together=not never), evidence)
+        return Finding.undecided(f"{observed}, but the machine held callbacks up")
+    return Finding(observed, _hint(recording, runs, together=not never), evidence)
 
 
 def _was_held_up(recording: Recording, one: Run, other: Run) -> bool:
@@ -139,7 +138,7 @@ def _half_s(one: Run, other: Run) -> float:
 
 def _why_missing(
     recording: Recording, names: Sequence[str], runs: Sequence[Run], least: int, *, declared: bool
-) -> Cause | None:
+) -> Finding | None:
     """Why a callback has not run as often as it must to be judged, or None if each has."""
     numbers = [(sum(run.callback == name for run in runs), name) for name in names]
     number, name = min(numbers, default=(least, ""))
@@ -147,14 +146,14 @@ def _why_missing(
     return _why_not_seen(recording, seen, declared=declared) if number < least else None
 
 
-def _why_not_seen(recording: Recording, seen: str, *, declared: bool = True) -> Cause:
+def _why_not_seen(recording: Recording, seen: str, *, declared: bool = True) -> Finding:
     if declared and hides_calls(recording):
-        return Cause(f"{seen}: an EventsExecutor does not tell when callbacks run", ours=True)
+        return Finding.ours(f"{seen}: an EventsExecutor does not tell when callbacks run")
     if declared and not traced(recording):
         return why_undeclared(recording, "its executor and callbacks")
     others = sorted({f"{run.callback} ({run.serves})" for run in timed(recording)})
     cause = why_ended(recording, seen) or why_not_called(recording, seen, ())
-    return cause or Cause(
+    return cause or Finding(
         seen + (f"; {codes(others)} ran" if others else ""),
         "Look whether it is created in the constructor, with the name or the seconds that are "
         "asked for, and whether every callback returns, and logs what is asked for.",
@@ -200,7 +199,7 @@ class ExecutorKind(Parameters):
 
 
 @check("executor.kind", Subject.RECORDING, ExecutorKind, concept="executors")
-def kind(recording: Recording, parameters: ExecutorKind) -> Finding | Cause:
+def kind(recording: Recording, parameters: ExecutorKind) -> Finding:
     """The executor is of a kind, and callbacks are in the same group or in different ones.
 
     Judged by what the process declared: executors that spin, and groups of callbacks that ran. If
@@ -214,7 +213,7 @@ def kind(recording: Recording, parameters: ExecutorKind) -> Finding | Cause:
         return missing or _why_not_seen(recording, "no executor spun")
     impossible = _impossible(recording)
     if impossible:
-        return Cause(f"the declarations contradict each other: {impossible}", ours=True)
+        return Finding.ours(f"the declarations contradict each other: {impossible}")
     groups = sorted({run.group for run in runs})
     pairs = sorted({(run.callback, groups.index(run.group)) for run in runs})
     exclusive = [group.startswith(_EXCLUSIVE) for group in groups]
@@ -233,7 +232,7 @@ def kind(recording: Recording, parameters: ExecutorKind) -> Finding | Cause:
         return Finding.passed(parameters.asked_for, listing(parts), evidence)
     together = wanted == _MULTI and (not good or parameters.groups != "same")
     hint = _hint(recording, runs, together=together)
-    return Cause(listing(parts), hint, evidence)
+    return Finding(listing(parts), hint, evidence)
 
 
 def _impossible(recording: Recording) -> str:

@@ -10,7 +10,6 @@ from pydantic import Field
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Doubt
 from grader.checks.node.node import target_nodes
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.blocked_executor import (
@@ -22,7 +21,7 @@ from grader.diagnosis.process.blocked_executor import (
 from grader.diagnosis.process.process_exit import ended_early, why_ended, why_it_exited
 from grader.diagnosis.process.standing import slow_callback, where_it_stands
 from grader.diagnosis.undeclared import why_undeclared
-from grader.findings.finding import Evidence, Finding, Moment, Plot
+from grader.findings.finding import Evidence, Finding, Moment, Plot, Status
 from grader.findings.first_seen import first_seen, nodes_seen
 from grader.findings.wording import code, codes, counted
 from grader.measure import callback_runs, declarations
@@ -84,7 +83,7 @@ class _Answers:
 
 
 @check("executor.responsive", Subject.RECORDING, Responsive, concept="executors")
-def responsive(recording: Recording, parameters: Responsive) -> Finding | Cause:
+def responsive(recording: Recording, parameters: Responsive) -> Finding:
     """The executor keeps spinning while the node works.
 
     The probe calls the service `list_parameters` of every node, or `get_type_description` of a node
@@ -111,7 +110,7 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding | Cause:
     # Of the late calls, those that were late for another reason than what the host took.
     own = [sum(_own_s(recording, call) > parameters.within for call in one.late) for one in bad]
     if all(one.enough(late) for one, late in zip(bad, own, strict=True)):
-        return Cause.to_repeat(
+        return Finding.undecided(
             f"{_summary(bad, parameters)}, but the machine took the time from the process"
         )
     worst = max(bad, key=lambda group: len(group.late) / len(group.judged))
@@ -175,7 +174,7 @@ def _own_s(recording: Recording, call: Call) -> float:
 
 def _why_mostly_late(
     recording: Recording, parameters: Responsive, groups: list[_Answers]
-) -> Cause | None:
+) -> Finding | None:
     """Why a node answers in time, but mostly late; or None."""
     allowed_s = parameters.typically
     for group in groups:
@@ -184,9 +183,9 @@ def _why_mostly_late(
             continue
         observed = f"{code(group.node)} answered after {format_duration(median_s)} (median)"
         if median(_own_s(recording, call) for call in group.judged) <= allowed_s:
-            return Cause.to_repeat(f"{observed}, but the machine took the time from the process")
+            return Finding.undecided(f"{observed}, but the machine took the time from the process")
         late = [call for call in group.judged if _wait_s(recording, call) > allowed_s]
-        cause = Cause(
+        cause = Finding(
             f"{observed}: callbacks keep the executor busy most of the time",
             "A callback does its work and returns at once: no time.sleep() in it.",
             _evidence(recording, [_Answers(group.node, group.judged, late)]),
@@ -196,7 +195,7 @@ def _why_mostly_late(
     return None
 
 
-def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> Cause:
+def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> Finding:
     """Why a node does not answer, or too late."""
     process = declarations.process_of(recording, group.node)
     seen = _summary([group], parameters)
@@ -212,11 +211,11 @@ def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> 
         return never_spun
     name = process.name if process else None
     stand = (name and where_it_stands(recording, name)) or slow_callback(recording, name)
-    cause = Cause(f"{seen}: something blocks the executor", HINT, evidence)
+    cause = Finding(f"{seen}: something blocks the executor", HINT, evidence)
     return cause if stand is None else at_its_place(cause, seen, stand)
 
 
-def _unasked(recording: Recording, names: list[str], parameters: Responsive) -> Finding | Cause:
+def _unasked(recording: Recording, names: list[str], parameters: Responsive) -> Finding:
     """The finding where no call counts, from what the process declared."""
     stop_if(why_ended(recording))
     # In this time the graph tells which services a node has, several times over.
@@ -234,14 +233,14 @@ def _unasked(recording: Recording, names: list[str], parameters: Responsive) -> 
     if lacking:
         # Only declarations would be left, and a process can declare anything.
         busy = was_held_up(recording)
-        return Cause(
+        return Finding(
             f"{codes(lacking)} has none of the services "
             f"{codes(EXECUTOR_SERVICES, 'and')} that rclpy makes for every node: "
             "nothing shows from outside whether its executor spins",
             "Leave at least one of them on: do not set both start_parameter_services and "
             "start_type_description_service to False.",
             Evidence(moments=nodes_seen(recording)),
-            ours=busy,
+            Status.ERROR if busy else Status.FAILED,
             disturbed=busy,
         )
     if declarations.declares(recording, "spin") and declarations.declares(recording, "timer"):
@@ -250,10 +249,9 @@ def _unasked(recording: Recording, names: list[str], parameters: Responsive) -> 
             f"{codes(names)} answered no call that could be judged; the process declared a timer "
             "and that its executor spins",
         )
-    return Cause(
+    return Finding.ours(
         f"no call to {codes(executor_services(name)[0] for name in names)} could be judged, of "
         f"{counted(len(recording.calls), 'call')} that the probe sent",
-        ours=True,
     )
 
 
@@ -297,7 +295,7 @@ class Timer(Parameters):
 
 
 @check("executor.timer", Subject.RECORDING, Timer, concept="timers")
-def timer(recording: Recording, parameters: Timer) -> Finding | Cause:
+def timer(recording: Recording, parameters: Timer) -> Finding:
     """The process has a timer.
 
     A thread that sleeps and publishes looks like a timer. So, for a moment after the run, the
@@ -337,10 +335,10 @@ def timer(recording: Recording, parameters: Timer) -> Finding | Cause:
             "such as a thread or a loop"
         )
     evidence = Evidence(moments=first_seen(recording, messages))
-    return Cause(observed, _HINT, evidence)
+    return Finding(observed, _HINT, evidence)
 
 
-def _why_uncalled(recording: Recording, topic: str) -> Cause | None:
+def _why_uncalled(recording: Recording, topic: str) -> Finding | None:
     """Why it is no timer that publishes, from what came while no executor called anything."""
     found = paused(recording, topic)
     if found is None:
@@ -348,22 +346,21 @@ def _why_uncalled(recording: Recording, topic: str) -> Cause | None:
     if not found.uncalled_ns:
         if found.covers(recording, topic) or callback_runs.publishes(recording, topic):
             return None
-        return Cause(
+        return Finding.ours(
             f"the messages on {code(topic)} are too far apart to see in the pause after the run "
             "whether a callback publishes them",
-            ours=True,
             disturbed=was_held_up(recording),
         )
     number = counted(len(found.uncalled_ns), "message was", "messages were")
     observed = f"{number} published outside of every callback, while {_CALLED_NOTHING}"
     if found.is_doubtful(recording):
-        return Cause.to_repeat(f"{observed}, but the machine held messages up")
+        return Finding.undecided(f"{observed}, but the machine held messages up")
     when_s = recording.since_launch_s(found.uncalled_ns[0])
     moment = Moment("published outside of every callback", when_s)
-    return Cause(f"{observed}: a thread or a loop calls publish()", _HINT, Evidence((moment,)))
+    return Finding(f"{observed}: a thread or a loop calls publish()", _HINT, Evidence((moment,)))
 
 
-def _why_not_paused(recording: Recording, topic: str) -> Cause | None:
+def _why_not_paused(recording: Recording, topic: str) -> Finding | None:
     """Why a process that publishes did not pause, where that is not right."""
     publish = {
         one.process
@@ -386,14 +383,13 @@ def _why_not_paused(recording: Recording, topic: str) -> Cause | None:
     if has_ended:
         if callback_runs.publishes(recording, topic):
             return None
-        return Cause(
+        return Finding.ours(
             f"{seen} before it could be judged whether a callback publishes",
             "Let rclpy.spin(node) run until Ctrl+C ends it.",
-            ours=True,
         )
     if not declarations.declares(recording, "spin"):
-        return Cause(f"{seen}: rosgrade does not know its kind", ours=True)
-    return Cause(
+        return Finding.ours(f"{seen}: rosgrade does not know its kind")
+    return Finding(
         seen,
         "Every callback must return, and rclpy.spin() must wait for the next one. Do not "
         "replace the executor's methods, and close only the file descriptors that you opened.",

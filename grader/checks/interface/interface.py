@@ -13,7 +13,6 @@ from grader.checks.interface.definition_differences import (
     constant_differences,
     field_differences,
 )
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_manifest
 from grader.diagnosis.not_generated import (
     GENERATORS,
@@ -67,7 +66,7 @@ def found(submission: SubmissionRecord, parameters: Found) -> Finding:
 def _definition(submission: SubmissionRecord, parameters: OfInterface) -> Definition:
     """The student's definition; ends the check if there is none."""
     definition = find_definition(submission, parameters.parts)
-    if isinstance(definition, Cause):
+    if isinstance(definition, Finding):
         stop_if(definition)
         raise AssertionError
     return definition
@@ -117,7 +116,7 @@ class Fields(Defined):
 
 
 @check("interface.fields", Subject.SUBMISSION, Fields, concept="interfaces")
-def fields(submission: SubmissionRecord, parameters: Fields) -> Finding | Cause:
+def fields(submission: SubmissionRecord, parameters: Fields) -> Finding:
     """The interface has the expected fields.
 
     Compares name, type, array bound and order of all fields. Comments, blanks, default values and
@@ -136,7 +135,7 @@ class Constants(Defined):
 
 
 @check("interface.constants", Subject.SUBMISSION, Constants, concept="interfaces")
-def constants(submission: SubmissionRecord, parameters: Constants) -> Finding | Cause:
+def constants(submission: SubmissionRecord, parameters: Constants) -> Finding:
     """The interface has the expected constants.
 
     Compares name, type and value. Their order and additional constants do not matter.
@@ -148,13 +147,13 @@ def _compared(
     submission: SubmissionRecord,
     parameters: Defined,
     differ: Callable[[Section, Section, str], Iterator[Difference]],
-) -> Finding | Cause:
+) -> Finding:
     name, wanted = parameters.parts, parameters.sections
     definition = _definition(submission, parameters)
     try:
         own = sections_of(str(name), definition.text)
     except DefinitionError as error:
-        return Cause(
+        return Finding(
             f"{definition.file}:{error.line} cannot be read: {error}",
             "A line holds a type and a name, such as `float64 x`, or a constant, such as "
             "`uint8 ON=1`; `#` begins a comment.",
@@ -163,7 +162,7 @@ def _compared(
     title = f"{name.file}: as it should be, and yours"
     sides = (Comparison(title, tuple(_lines(wanted)), tuple(_lines(own))),)
     if len(own) != len(wanted):
-        return Cause(
+        return Finding(
             f"{code(definition.file)} has {len(own) - 1} lines `---`, not {len(wanted) - 1}",
             f"The parts of a .{name.kind} file are {listing(_PARTS[len(wanted)])}, with a line "
             "`---` between them.",
@@ -179,7 +178,7 @@ def _compared(
     places = tuple(
         SourceError(definition.file, line, item.text.replace("`", "")) for item, line in differing
     )
-    return Cause(
+    return Finding(
         "; ".join(item.text for item, _ in differing),
         " ".join(dict.fromkeys(item.hint for item, _ in differing[:2])),
         Evidence(places=places[:10], comparisons=sides),
@@ -201,7 +200,7 @@ class Manifest(OfInterface):
 
 
 @check("interface.manifest", Subject.SUBMISSION, Manifest, concept="interfaces")
-def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding | Cause:
+def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding:
     """package.xml names the packages that an interface package needs.
 
     It must have `rosidl_default_generators` as `buildtool_depend` (or `build_depend`, `depend`),
@@ -216,7 +215,7 @@ def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding | Ca
     package = existing_package(submission, parameters.parts.package)
     missing = tuple(_missing(package, used_packages(parameters.parts, definition)))
     if missing:
-        return Cause(
+        return Finding(
             f"package.xml lacks {listing(f'{code(tag)} ({why})' for tag, why in missing)}",
             f"Add to package.xml: {codes(tag for tag, _ in missing)}.",
             Evidence(

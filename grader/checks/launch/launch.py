@@ -8,7 +8,6 @@ from collections.abc import Iterable
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.process_exit import why_crashed
 from grader.findings.finding import Evidence, Finding, Moment, Table
@@ -41,7 +40,7 @@ class Graph(Parameters):
 
 
 @check("launch.graph", Subject.RECORDING, Graph, concept="names")
-def graph(recording: Recording, parameters: Graph) -> Finding | Cause:
+def graph(recording: Recording, parameters: Graph) -> Finding:
     """Exactly the expected nodes are started, on the expected topics.
 
     Judged by the ROS graph of the whole run, so end the run with `until: {elapsed: 3 s}`, after all
@@ -54,7 +53,7 @@ def graph(recording: Recording, parameters: Graph) -> Finding | Cause:
     nodes = [one for one in recording.student_nodes if not _OF_ROS2.fullmatch(one.name)]
     more = [one for one in nodes if one.name not in parameters.nodes]
     if more:
-        return Cause(
+        return Finding(
             f"{codes(sorted({one.name for one in more}))} is started, too",
             "Look for a condition such as IfCondition that is missing or reversed, and for names "
             "and namespaces that are written in the launch file instead of taken from an argument.",
@@ -66,7 +65,7 @@ def graph(recording: Recording, parameters: Graph) -> Finding | Cause:
     wanted = topics if parameters.topics is None else set(parameters.topics)
     if topics != wanted:
         lacking, others = codes(sorted(wanted - topics)), codes(sorted(topics - wanted))
-        return Cause(
+        return Finding(
             f"lacking: {lacking or 'no topic'}; beyond that there is: {others or 'no topic'}",
             "Look at `remappings` and `namespace` of the nodes in the launch file.",
             Evidence(moments=nodes_seen(recording)),
@@ -110,7 +109,7 @@ def shown_arguments(lines: Iterable[str]) -> dict[str, tuple[str, str]]:
 
 
 @check("launch.arguments", Subject.RECORDING, Arguments)
-def arguments(recording: Recording, parameters: Arguments) -> Finding | Cause:
+def arguments(recording: Recording, parameters: Arguments) -> Finding:
     """The launch file declares its arguments, with defaults and descriptions.
 
     Judged by what `ros2 launch --show-args` prints. It needs a separate scenario with the launch
@@ -120,7 +119,7 @@ def arguments(recording: Recording, parameters: Arguments) -> Finding | Cause:
     lines = [line for line in recording.log if line.stream == "stdout"]
     if not any(line.text.startswith("Arguments (pass") for line in lines):
         stop_if(why_crashed(recording))
-        return Cause("the scenario does not run `ros2 launch --show-args`", ours=True)
+        return Finding.ours("the scenario does not run `ros2 launch --show-args`")
     shown = shown_arguments(line.text for line in lines)
     rows = tuple((name, default, description) for name, (description, default) in shown.items())
     table = Table("ros2 launch --show-args", ("argument", "default", "description"), rows)
@@ -140,7 +139,7 @@ def arguments(recording: Recording, parameters: Arguments) -> Finding | Cause:
             continue
         value = "..." if wanted is None else wanted
         write = f"DeclareLaunchArgument('{name}', default_value='{value}', description='...')"
-        return Cause(seen, f"Write {code(write)}.", evidence)
+        return Finding(seen, f"Write {code(write)}.", evidence)
     return Finding.passed(asked, there, evidence)
 
 

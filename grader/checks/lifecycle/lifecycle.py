@@ -11,7 +11,6 @@ from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Called, Doubt
 from grader.checks.requests import timeline
 from grader.checks.service.service import judged_calls, why_slow
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_endpoint import SERVICE, offered
 from grader.diagnosis.no_node import why_not_node
 from grader.diagnosis.process.process_exit import why_ended
@@ -46,7 +45,7 @@ class State(Parameters):
 
 
 @check("lifecycle.state", Subject.RECORDING, State)
-def state(recording: Recording, parameters: State) -> Finding | Cause:
+def state(recording: Recording, parameters: State) -> Finding:
     """The lifecycle node goes through the expected states.
 
     Judged by the node's answers to the calls of `get_state` in the scenario
@@ -61,7 +60,7 @@ def state(recording: Recording, parameters: State) -> Finding | Cause:
     if len(seen) < len(parameters.states):
         stop_if(why_ended(recording))
         text = f"the scenario asks for the state only {counted(len(seen), 'time')}"
-        return Cause(text, ours=True)
+        return Finding.ours(text)
     changes = [call for call in recording.calls if call.service == f"{node}/change_state"]
     steps = [(call.requested_ns, f"is {label}") for call, label in zip(calls, seen, strict=True)]
     steps += [(call.requested_ns, f"transition {transition(call)}") for call in changes]
@@ -70,11 +69,11 @@ def state(recording: Recording, parameters: State) -> Finding | Cause:
         if label != wanted:
             before = [one for one in changes if one.requested_ns < calls[number].requested_ns]
             observed = f"at call {number + 1} of get_state it is {label}"
-            return _otherwise(parameters, observed, before[-1:], shown)
+            return _otherwise(observed, before[-1:], shown)
     return Finding.passed(parameters.asked_for, listing(seen, "then"), shown)
 
 
-def _otherwise(parameters: State, observed: str, last_change: list[Call], shown: Evidence) -> Cause:
+def _otherwise(observed: str, last_change: list[Call], shown: Evidence) -> Finding:
     """The finding for another state, after the last transition succeeded or failed."""
     hint = "The node must begin unconfigured, and must not change its state by itself."
     for call in last_change:
@@ -84,7 +83,7 @@ def _otherwise(parameters: State, observed: str, last_change: list[Call], shown:
                 "The callback of a transition (on_configure, on_activate, ...) must return "
                 "TransitionCallbackReturn.SUCCESS, and call super() where it activates publishers."
             )
-    return Cause(observed, hint, shown)
+    return Finding(observed, hint, shown)
 
 
 def _state(call: Call) -> str:
@@ -100,13 +99,13 @@ def transition(call: Call) -> str:
     return asked.get("label") or dict(enumerate(_TRANSITIONS)).get(number, str(number))
 
 
-def why_not_managed(recording: Recording, node: str) -> Cause | None:
+def why_not_managed(recording: Recording, node: str) -> Finding | None:
     """Why a lifecycle node is not there, or not one; None if it is."""
     service = f"{node}/get_state"
     missing = why_not_node(recording, node)
     if missing is not None or offered(recording, SERVICE, service):
         return missing
-    return Cause(
+    return Finding(
         f"{code(node)} is no lifecycle node: it has no service {code(service)}",
         "Inherit from rclpy.lifecycle.LifecycleNode instead of Node.",
         Evidence(moments=nodes_seen(recording)),

@@ -10,7 +10,6 @@ from pydantic import Field
 
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.need import SentOrOwn
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_log import why_not_logged
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.blocked_executor import why_slow
@@ -93,7 +92,7 @@ class Follows(Parameters):
 
 
 @check("log.follows", Subject.RECORDING, Follows)
-def follows(recording: Recording, parameters: Follows) -> Finding | Cause:
+def follows(recording: Recording, parameters: Follows) -> Finding:
     """The node logs what it receives, or with `own` what it publishes.
 
     Lines on stdout and stderr (rclpy's loggers write to stderr) must follow messages on the topic
@@ -107,7 +106,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding | Cause:
     if parameters.own:
         stop_if(None if carried else why_silent(recording, parameters.topic))
     elif own:
-        return Cause(
+        return Finding(
             f"the node itself publishes on {code(parameters.topic)}, so its log shows nothing of "
             "what it was sent",
             "Only the robot publishes its sensors: remove this publisher, and subscribe.",
@@ -151,7 +150,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding | Cause:
 
 def _too_seldom(
     recording: Recording, parameters: Follows, wanted: Sequence[Wanted], found: Sequence[Echo]
-) -> Cause | None:
+) -> Finding | None:
     """Why there was no line for too long while messages came, or None."""
     if parameters.every is None:
         return None
@@ -168,13 +167,13 @@ def _too_seldom(
     begin_s = recording.since_launch_s(gap[0])
     observed = f"no such line for {format_duration(gap_s)}, from {begin_s:.2f} s after launch on"
     if excused:
-        return Cause.to_repeat(f"{observed}, but the machine took the time from the process")
+        return Finding.undecided(f"{observed}, but the machine took the time from the process")
     observed += f", although messages came on {code(parameters.topic)}"
     kind = Kind.PUBLISHER if parameters.own else Kind.SUBSCRIPTION
     nodes = {item.node for item in recording.student_endpoints(kind, parameters.topic)}
     hint = "Log in every call of the callback, or at least once in a second."
     moment = Moment("no line from here on", begin_s)
-    return why_slow(recording, observed, nodes) or Cause(
+    return why_slow(recording, observed, nodes) or Finding(
         observed, hint, Evidence(moments=(moment,))
     )
 

@@ -10,7 +10,6 @@ from typing import Annotated, Literal, get_args
 from pydantic import AfterValidator, Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.blocked_executor import left_s, why_not_called
 from grader.diagnosis.process.process_exit import why_ended
@@ -108,7 +107,7 @@ class Records(Parameters):
             if name is None or item.logger == name or item.logger.startswith(f"{name}.")
         ]
 
-    def why_no_node(self, recording: Recording) -> Cause | None:
+    def why_no_node(self, recording: Recording) -> Finding | None:
         """Why nothing can be logged: the node is not there."""
         missing = why_not_node(recording, self.node) if self.node else None
         return missing or why_no_node(recording)
@@ -184,7 +183,7 @@ class Contains(Matching):
 
 
 @check("log.contains", Subject.RECORDING, Contains)
-def contains(recording: Recording, parameters: Contains) -> Finding | Cause:
+def contains(recording: Recording, parameters: Contains) -> Finding:
     """The node logs the expected text at the expected level.
 
     Judged by the log records, on /rosout and in the output. Each record counts once. Printed lines
@@ -195,7 +194,7 @@ def contains(recording: Recording, parameters: Contains) -> Finding | Cause:
     if len(found) < low:
         return _why_lacking(recording, parameters, found)
     if high is not None and len(found) > high:
-        return Cause(
+        return Finding(
             f"{len(found)} of them, such as {quote(found[-1].text)}",
             "Log once where it happens, not in every call of a callback: "
             "self.get_logger().info(..., once=True), or throttle_duration_sec=1.0.",
@@ -205,19 +204,19 @@ def contains(recording: Recording, parameters: Contains) -> Finding | Cause:
     return Finding.passed(parameters.asked_for, what, _evidence(recording, found))
 
 
-def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]) -> Cause:
+def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]) -> Finding:
     level = parameters.level or "INFO"
     call = f"self.get_logger().{'warning' if level == 'WARN' else level.lower()}('...')"
     records = parameters.of(recording)
     other = [item for item in records if parameters.says(item.text) and item not in found]
     if other:
         observed = f"{quote(other[0].text)} is logged as {other[0].level}, not as {level}"
-        return Cause(observed, f"Call {call}.", _evidence(recording, other))
+        return Finding(observed, f"Call {call}.", _evidence(recording, other))
     seen = f"only {len(found)} of them" if found else "none"
     lost = sum(process.dropped_bytes for process in recording.processes)
     cause = parameters.why_no_node(recording) or why_ended(recording, seen)
     if cause is None and lost:
-        return Cause(f"{seen}, but {lost} bytes of output were not kept", "Log less.", ours=True)
+        return Finding.ours(f"{seen}, but {lost} bytes of output were not kept", "Log less.")
     nodes = {node.name for node in recording.student_nodes}
     cause = cause or why_not_called(recording, seen, nodes)
     if cause is not None:
@@ -225,7 +224,7 @@ def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]
     lines = [line for line in printed(recording) if parameters.says(line.text)]
     if lines and not found:
         moment = Moment("printed", recording.since_launch_s(lines[0].time_ns))
-        return Cause(
+        return Finding(
             f"{quote(lines[0].text)} is printed, not logged",
             f"Write {call} in place of print().",
             Evidence(moments=(moment,), log=tuple(line.text for line in lines[:_SHOWN])),
@@ -235,12 +234,12 @@ def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]
         hint += " What a node of a launch file prints is shown with output='screen' only."
     if not records:
         nothing = until_the_end(recording, "nothing logged when the observation ended")
-        return Cause("the node logs nothing", hint, Evidence(moments=(nothing,)))
+        return Finding("the node logs nothing", hint, Evidence(moments=(nothing,)))
     if not found:
         near = nearest(parameters.text or "", [item.text for item in records])
         seen = f"{counted(len(records), 'log message')}, but none of these"
         seen += f"; similar is {quote(near)}" if near else ""
-    return Cause(seen, hint, _evidence(recording, found or records[-_SHOWN:]))
+    return Finding(seen, hint, _evidence(recording, found or records[-_SHOWN:]))
 
 
 class Worst(Records):
@@ -253,7 +252,7 @@ class Worst(Records):
 
 
 @check("log.level", Subject.RECORDING, Worst)
-def level(recording: Recording, parameters: Worst) -> Finding | Cause:
+def level(recording: Recording, parameters: Worst) -> Finding:
     """The node logs nothing more severe than allowed.
 
     Judged by the log records, on /rosout and in the output, until SIGINT.
@@ -266,7 +265,7 @@ def level(recording: Recording, parameters: Worst) -> Finding | Cause:
         seen = f"{counted(len(records), 'log message')}, none above it"
         return Finding.passed(parameters.asked_for, seen)
     observed = f"{counted(len(severe), 'log message')} above it, the first {severe[0].level}"
-    return Cause(
+    return Finding(
         f"{observed}: {quote(severe[0].text)}",
         "Correct what it warns about; what is no problem is logged with "
         "self.get_logger().info('...') or debug('...').",
@@ -307,7 +306,7 @@ class Rate(Matching):
 
 
 @check("log.rate", Subject.RECORDING, Rate)
-def rate(recording: Recording, parameters: Rate) -> Finding | Cause:
+def rate(recording: Recording, parameters: Rate) -> Finding:
     """The node logs at the expected rate.
 
     Judged by the timestamps of the records: their mean rate from the first to the last. With fewer
@@ -341,8 +340,8 @@ def rate(recording: Recording, parameters: Rate) -> Finding | Cause:
     if not found:
         return _why_lacking(recording, parameters, found)
     if rate_hz < low_hz and left_s(recording, begin_ns, end_ns) <= len(found) / low_hz:
-        return Cause.held_up(seen, recording.stolen_s(begin_ns, end_ns))
-    return Cause(
+        return Finding.held_up(seen, recording.stolen_s(begin_ns, end_ns))
+    return Finding(
         seen,
         "Log in a timer of that period, or with throttle_duration_sec=1.0 in a faster callback: "
         "self.get_logger().info('...', throttle_duration_sec=1.0).",

@@ -10,7 +10,6 @@ from pydantic import Field
 from grader.checks.check import NamedFields, Parameters, Subject, check, toleranced
 from grader.checks.messages.derived_messages import DerivedMessages, Sample, mistakes
 from grader.checks.need import Recorded
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import why_few, why_silent
 from grader.findings.fields import FieldTolerance, within_words
 from grader.findings.finding import Evidence, Finding, Moment, Plot
@@ -65,7 +64,7 @@ class Follows(Parameters):
 
 
 @check("messages.follows", Subject.RECORDING, Follows)
-def follows(recording: Recording, parameters: Follows) -> Finding | Cause:
+def follows(recording: Recording, parameters: Follows) -> Finding:
     """The values of the messages follow those of another topic.
 
     Every message must hold the values of one message of the source that was published at most
@@ -77,19 +76,19 @@ def follows(recording: Recording, parameters: Follows) -> Finding | Cause:
     if not messages:
         return why_silent(recording, parameters.topic)
     if not sources:
-        return Cause(f"nothing was recorded on {source}, so it cannot be judged", ours=True)
+        return Finding.ours(f"nothing was recorded on {source}, so it cannot be judged")
     derived = DerivedMessages.of(sources, parameters.fields, parameters.tolerance)
     samples = derived.samples(recording, messages, parameters.within)
     columns = zip(derived.tolerances, zip(*derived.table, strict=True), strict=True)
     if not all(_spread(column) > _CONCLUSIVE * tolerance for tolerance, column in columns):
-        return Cause(f"the values on {source} hardly change: it cannot be judged", ours=True)
+        return Finding.ours(f"the values on {source} hardly change: it cannot be judged")
     right = {sample.number for sample in samples if derived.fitting(sample.errors)}
     judged = _judged(recording, parameters, samples, right)
     if len(judged) < parameters.at_least:
         if len(messages) < parameters.at_least:
             return why_few(recording, parameters.topic, parameters.at_least)
         last_s = recording.since_launch_s(messages[-1].stamp_ns)
-        return Cause(
+        return Finding(
             f"of {counted(len(messages), 'message')} only {len(judged)} came after the first one "
             f"on {source}",
             f"Publish from the callback of {source}, or from a timer that goes on.",
@@ -102,7 +101,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding | Cause:
     # Where the machine took nothing, no message is excused: most of them decide for all.
     undisturbed = sum(not one.excused for one in judged)
     if late and undisturbed < max(parameters.at_least, len(judged) / 2):
-        return Cause.to_repeat(
+        return Finding.undecided(
             f"{len(late)} of {counted(len(judged), 'message')} have older values, but the machine "
             "took the time from the process"
         )
@@ -132,7 +131,7 @@ def _failure(
     derived: DerivedMessages,
     judged: list[Sample],
     wrong: list[Sample],
-) -> Cause:
+) -> Finding:
     sample = wrong[len(wrong) // 2]
     newest = derived.table[sample.window[-1]]
     some = wrong[:: max(1, len(wrong) // _MOST_EXPLAINED)]
@@ -168,7 +167,7 @@ def _failure(
         )
     when_s = recording.since_launch_s(sample.message.stamp_ns)
     shown = bad or range(len(derived.fields))
-    return Cause(
+    return Finding(
         f"{observed} ({len(wrong)} of {counted(len(judged), 'message')} wrong)",
         hint,
         Evidence(

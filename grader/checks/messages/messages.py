@@ -10,7 +10,6 @@ from pydantic import Field, model_validator
 
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if, toleranced
 from grader.checks.need import PUBLISHED, Recorded
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import explain
 from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
 from grader.diagnosis.wrong_value import FLOAT_HINT, WrongValue, accumulates, was_integer
@@ -93,7 +92,7 @@ class Count(Parameters):
 
 
 @check("messages.count", Subject.RECORDING, Count)
-def count(recording: Recording, parameters: Count) -> Finding | Cause:
+def count(recording: Recording, parameters: Count) -> Finding:
     """The right number of messages is published.
 
     Counts the messages on the topic in the whole observation, or since the first message of a
@@ -134,7 +133,7 @@ def count(recording: Recording, parameters: Count) -> Finding | Cause:
         hint = "Publish once, in the constructor: call publish() nowhere else, and in no loop."
     else:
         hint = "Look for a second publish() or a loop around it, and for what calls it too often."
-    return Cause(observed, hint, evidence)
+    return Finding(observed, hint, evidence)
 
 
 class Equal(Parameters):
@@ -169,7 +168,7 @@ class Equal(Parameters):
 
 
 @check("messages.equal", Subject.RECORDING, Equal)
-def equal(recording: Recording, parameters: Equal) -> Finding | Cause:
+def equal(recording: Recording, parameters: Equal) -> Finding:
     """Every message has the expected values.
 
     Compares each field of each message on the topic. It does not matter whether a number is an
@@ -194,7 +193,7 @@ def equal(recording: Recording, parameters: Equal) -> Finding | Cause:
 
 def _wrong(
     recording: Recording, parameters: Equal, by_message: list[tuple[Difference, ...]]
-) -> Cause:
+) -> Finding:
     """The finding of messages of which some have differences."""
     messages = recording.on(parameters.topic)
     wrong = sum(map(bool, by_message))
@@ -214,7 +213,7 @@ def _wrong(
     if len(messages) > 1:
         observed += f" ({wrong} of {counted(len(messages), 'message')} wrong)"
     when_s = recording.since_launch_s(message.stamp_ns)
-    return Cause(
+    return Finding(
         observed,
         _hint(found, len(messages), len(messages) - wrong),
         Evidence(
@@ -286,7 +285,7 @@ class Series(Parameters):
 
 
 @check("messages.sequence", Subject.RECORDING, Series)
-def sequence(recording: Recording, parameters: Series) -> Finding | Cause:
+def sequence(recording: Recording, parameters: Series) -> Finding:
     """The values come in the right order.
 
     Compares one field of each message with the value that it should have at its place: counting by
@@ -314,7 +313,7 @@ def sequence(recording: Recording, parameters: Series) -> Finding | Cause:
     if len(messages) < needed:
         return why_few(recording, parameters.topic, needed)
     if parameters.values and len(parameters.values) - 1 not in places:
-        return Cause.to_repeat("the last of these messages was lost in transit")
+        return Finding.undecided("the last of these messages was lost in transit")
     return Finding.passed(
         parameters.asked_for,
         f"{_text(found[0])} to {_text(found[-1])} in {counted(len(found), 'message')}",
@@ -336,7 +335,7 @@ def _wrong_order(
     found: Sequence[Any],
     wanted: Sequence[Any],
     first: int,
-) -> Cause:
+) -> Finding:
     why, hint = _explain_order(parameters, found)
     when_s = recording.since_launch_s(recording.on(parameters.topic)[first].stamp_ns)
     rows = tuple(
@@ -344,7 +343,7 @@ def _wrong_order(
         for number, (want, have) in enumerate(zip(wanted, found, strict=True), start=1)
     )
     title, header = f"{parameters.field} of {parameters.topic}", ("message", "expected", "observed")
-    return Cause(
+    return Finding(
         f"{code(parameters.field)} is {_text(found[first])} instead of {_text(wanted[first])} in "
         f"message {first + 1} of {len(found)}{why}",
         hint,

@@ -9,7 +9,6 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import (
     why_cut_short,
     why_not_judged,
@@ -50,7 +49,7 @@ class WithinLimits(RobotParameters):
 
 
 @check("motion.within_limits", Subject.RECORDING, WithinLimits)
-def within_limits(recording: Recording, parameters: WithinLimits) -> Finding | Cause:
+def within_limits(recording: Recording, parameters: WithinLimits) -> Finding:
     """Every command is within the limits of the robot.
 
     Judged by the commands as they were published. The simulated robot limits its motion itself, so
@@ -113,7 +112,7 @@ class SlowsDown(RobotParameters):
 
 
 @check("motion.slows_down", Subject.RECORDING, SlowsDown)
-def slows_down(recording: Recording, parameters: SlowsDown) -> Finding | Cause:
+def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     """The robot slows down towards the end of its path.
 
     Judged by linear.x of the commands as they were published: the slowest of the last five that
@@ -129,7 +128,7 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding | Cause:
     if not driving:
         topic = command_topic(recording)
         sent = recording.on(topic)
-        cause = Cause(
+        cause = Finding(
             f"no command on {code(topic)} has a linear.x other than 0",
             "linear.x = gain * distance, on the way to the goal's position.",
             Evidence(moments=first_seen(recording, sent)),
@@ -143,14 +142,14 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding | Cause:
     levels = Counter(round(_size(item), _DIGITS) for item in driving)
     if len(levels) == _SWITCHED and min(levels.values()) >= _SEVERAL and _stays(driving, levels):
         sizes = " and ".join(speed(size) for size in sorted(levels, reverse=True))
-        return Cause(
+        return Finding(
             f"linear.x is switched between {sizes}, whatever the distance is",
             "linear.x = gain * distance, at most the limit: it becomes less with every command.",
             evidence,
         )
     if _size(last) <= parameters.share * fastest:
         return Finding.passed(parameters.asked_for, seen, evidence)
-    return Cause(
+    return Finding(
         seen,
         "linear.x = gain * distance: far from the goal the robot is fast, near it slow.",
         evidence,

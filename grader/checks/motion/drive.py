@@ -11,7 +11,6 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters, moved_in
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
 from grader.diagnosis.wrong_value import factor_words
@@ -72,7 +71,7 @@ class Drives(RobotParameters):
 
 
 @check("motion.drives", Subject.RECORDING, Drives)
-def drives(recording: Recording, parameters: Drives) -> Finding | Cause:
+def drives(recording: Recording, parameters: Drives) -> Finding:
     """The robot drives ahead at the right speed.
 
     Judged by the true speed while nothing is near ahead. The robot has time to speed up: half a
@@ -85,7 +84,7 @@ def drives(recording: Recording, parameters: Drives) -> Finding | Cause:
     steps = _free(recording.truth, scene, parameters)
     plot = speed_plot(recording, (low, high))
     if not steps:
-        return why_interrupted(recording) or Cause(
+        return why_interrupted(recording) or Finding(
             f"the robot drove only {metres(way_m(recording.truth))}, too little to judge its speed",
             "Drive on as long as nothing is near ahead. One command holds until the next.",
             _since_departure(recording),
@@ -102,7 +101,7 @@ def drives(recording: Recording, parameters: Drives) -> Finding | Cause:
     words, hint = _wrong_speed(steps, scene, wanted, middle)
     off = next((step for step in steps if not low <= step.linear_m_s <= high), steps[0])
     evidence = evidence_at(recording, "first at a wrong speed", off.time_ns, plot)
-    return Cause(f"{seen}: {words}", hint, evidence)
+    return Finding(f"{seen}: {words}", hint, evidence)
 
 
 def _free(truth: Sequence[Truth], scene: Scene, parameters: Drives) -> list[Truth]:
@@ -166,7 +165,7 @@ class KeepsDriving(RobotParameters):
 
 
 @check("motion.keeps_driving", Subject.RECORDING, KeepsDriving)
-def keeps_driving(recording: Recording, parameters: KeepsDriving) -> Finding | Cause:
+def keeps_driving(recording: Recording, parameters: KeepsDriving) -> Finding:
     """The robot drives on while nothing is ahead.
 
     Judged by the forward distance along its true path, minus what it drives backwards.
@@ -179,14 +178,14 @@ def keeps_driving(recording: Recording, parameters: KeepsDriving) -> Finding | C
     return why_interrupted(recording) or _why_not_ahead(recording, gone_m)
 
 
-def _why_not_ahead(recording: Recording, gone_m: float) -> Cause:
+def _why_not_ahead(recording: Recording, gone_m: float) -> Finding:
     truth = recording.truth
     if way_m(truth) < MOVED_M:
         words = "the robot only turned on the spot"
-        return Cause(words, _FIELDS_HINT, _since_departure(recording))
+        return Finding(words, _FIELDS_HINT, _since_departure(recording))
     if gone_m < -_WAY_TOLERANCE_M:
         words = f"the robot drove {metres(-gone_m)} backwards"
-        return Cause(words, _FIELDS_HINT, _since_departure(recording))
+        return Finding(words, _FIELDS_HINT, _since_departure(recording))
     rest = final_rest(truth)
     if rest is None:
         return _too_slow(recording, gone_m)
@@ -197,15 +196,15 @@ def _why_not_ahead(recording: Recording, gone_m: float) -> Cause:
     )
     seen = f"stopped after {metres(gone_m)} in all"
     if misread is not None:
-        return Cause(f"{seen}: {misread.words}", misread.hint, evidence)
-    return Cause(
+        return Finding(f"{seen}: {misread.words}", misread.hint, evidence)
+    return Finding(
         f"{seen}, {when_s:.2f} s after launch",
         "Which message made it stop? Log what the callback compares.",
         evidence,
     )
 
 
-def _too_slow(recording: Recording, gone_m: float) -> Cause:
+def _too_slow(recording: Recording, gone_m: float) -> Finding:
     truth = recording.truth
     begin = departure(truth) or 0
     driven_s = (truth[-1].time_ns - truth[begin].time_ns) / NS
@@ -217,9 +216,9 @@ def _too_slow(recording: Recording, gone_m: float) -> Cause:
         f"{speed(average)} on average; it had set off after {format_duration(waited_s)}"
     )
     if lost_s > 0.25 * (driven_s + waited_s):
-        return Cause.held_up(words, lost_s)
+        return Finding.held_up(words, lost_s)
     evidence = Evidence(moments=(until_the_end(recording),), plots=(speed_plot(recording),))
-    return Cause(words, _FIELDS_HINT, evidence)
+    return Finding(words, _FIELDS_HINT, evidence)
 
 
 def _since_departure(recording: Recording) -> Evidence:
@@ -244,7 +243,7 @@ class Straight(RobotParameters):
 
 
 @check("motion.straight", Subject.RECORDING, Straight)
-def straight(recording: Recording, parameters: Straight) -> Finding | Cause:
+def straight(recording: Recording, parameters: Straight) -> Finding:
     """The robot drives straight ahead.
 
     Judged by the active commands and by the true heading: `angular.z` is always zero, and the
@@ -263,7 +262,7 @@ def straight(recording: Recording, parameters: Straight) -> Finding | Cause:
     if turning:
         worst = max((step.command_rad_s for step in turning), key=abs)
         when_s = recording.since_launch_s(turning[0].time_ns)
-        return Cause(
+        return Finding(
             f"angular.z = {turn(worst)} was commanded (from {when_s:.2f} s after launch, "
             f"{percent(len(turning) / len(truth))} of the time)",
             "The speed ahead is linear.x, the turn is angular.z: leave angular.z at 0.0.",
@@ -273,7 +272,7 @@ def straight(recording: Recording, parameters: Straight) -> Finding | Cause:
     off_rad = max(turned, key=abs)
     if abs(off_rad) > parameters.heading:
         first = next(i for i, angle in enumerate(turned) if abs(angle) > parameters.heading)
-        return Cause(
+        return Finding(
             f"the heading changed by {degrees(off_rad)}, through commands of less than "
             f"{turn(parameters.tolerance)} that add up",
             "Leave angular.z at exactly 0.0.",

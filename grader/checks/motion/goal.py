@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import accumulate
 from operator import sub
 
@@ -10,7 +11,6 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import GoalParameters, RobotParameters
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.missed_heading import why_not_aligned
 from grader.diagnosis.motion.no_motion import why_not_moved
@@ -66,15 +66,15 @@ def reaches(recording: Recording, parameters: Reaches) -> Finding:
     if cause is None and parameters.at_rest and not is_at_rest(last):
         cause = why_off_course(recording) or _restless(recording, last, "is at the goal, but")
     if cause is not None:
-        return cause.finding(expected)
+        return replace(cause, expected=expected)
     seen = f"{metres(run.distance_m(last))} from the goal"
     if heading is not None:
         seen += f", {degrees(abs(run.heading_error_rad(last)))} off its heading"
     return Finding.passed(expected, seen, Evidence(plots=(run.distance_plot, run.heading_plot)))
 
 
-def _restless(recording: Recording, last: Truth, place: str) -> Cause:
-    return Cause(
+def _restless(recording: Recording, last: Truth, place: str) -> Finding:
+    return Finding(
         f"{place} not at rest when the observation ends: {speed(last.linear_m_s)} and "
         f"{turn(last.angular_rad_s)}",
         "Publish a Twist of zeros where both errors are below your tolerances: the last command "
@@ -98,7 +98,7 @@ class Settles(RobotParameters):
 
 
 @check("motion.settles", Subject.RECORDING, Settles)
-def settles(recording: Recording, parameters: Settles) -> Finding | Cause:
+def settles(recording: Recording, parameters: Settles) -> Finding:
     """The robot comes to rest in time.
 
     Judged by the true motion, from the beginning of simulated time (when the node is first
@@ -117,11 +117,11 @@ def settles(recording: Recording, parameters: Settles) -> Finding | Cause:
     lost_s = stolen_s(recording, truth[0].time_ns, end.time_ns)
     if lost_s > 0.0 and took_s - lost_s <= parameters.within:
         seen = f"at rest after {format_duration(took_s)}" if rest is not None else "never at rest"
-        return Cause.held_up(seen, lost_s)
+        return Finding.held_up(seen, lost_s)
     stop_if(why_unsteered(recording))
     if rest is None:
         return _restless(recording, end, f"after {format_duration(took_s)} it is")
-    return Cause(
+    return Finding(
         f"at rest after {format_duration(took_s)}",
         "With larger gains the robot is faster. With gains that are too large it overshoots.",
         evidence_at(recording, "at rest", end.time_ns, *evidence.plots),
@@ -139,7 +139,7 @@ class PathLength(GoalParameters):
 
 
 @check("motion.path_length", Subject.RECORDING, PathLength)
-def path_length(recording: Recording, parameters: PathLength) -> Finding | Cause:
+def path_length(recording: Recording, parameters: PathLength) -> Finding:
     """The path to the goal is not much longer than the straight line.
 
     Judged by the true path of the whole run, against the straight line from its start to the
@@ -149,7 +149,7 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding | Cause
     straight_m = run.distance_m(run.truth[0])
     if straight_m <= parameters.position:
         start = f"the start is {metres(straight_m)} from the goal"
-        return Cause(f"{start}: there is no path to judge", ours=True)
+        return Finding.ours(f"{start}: there is no path to judge")
     stop_if(why_not_there(run, parameters.position))
     gone_m = way_m(run.truth)
     longer = gone_m / straight_m - 1.0
@@ -162,8 +162,8 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding | Cause
     lost_s = stolen_s(recording, run.truth[0].time_ns, run.truth[-1].time_ns)
     # What it drives on without a command, it has to come back.
     if lost_s > 0.0 and 2.0 * lost_s * max(abs(step.linear_m_s) for step in run.truth) >= more_m:
-        return Cause.held_up(seen, lost_s)
-    return Cause(
+        return Finding.held_up(seen, lost_s)
+    return Finding(
         seen,
         "Does the robot turn to the goal at once, and the short way? Wrap the error "
         "atan2(dy, dx) - yaw to [-pi, pi]. Its gain must be several times the gain of the "
@@ -198,7 +198,7 @@ class Overshoot(GoalParameters):
 
 
 @check("motion.overshoot", Subject.RECORDING, Overshoot)
-def overshoot(recording: Recording, parameters: Overshoot) -> Finding | Cause:
+def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     """The robot does not go past its goal.
 
     Judged by the true motion: how much the distance from the goal grows again after the robot has
@@ -210,7 +210,7 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding | Cause:
     seen, plot = f"{metres(past_m[far])} past the goal", _plot(run, past_m, parameters.most)
     if past_m[far] <= parameters.most:
         return Finding.passed(parameters.asked_for, seen, Evidence(plots=(plot,)))
-    return why_off_course(recording) or Cause(
+    return why_off_course(recording) or Finding(
         seen,
         "Compute linear.x as a gain times the distance: then the robot slows down before the goal. "
         "Make the gain smaller, so that linear.x is below its limit before the robot arrives.",

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Unmet, stop_if
+from grader.checks.check import Parameters, stop_if
 from grader.checks.need import Doubt, SimulatedRobot
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.no_motion import approach, why_not_moved
+from grader.findings.finding import Finding
 from grader.findings.reference import GoalPose
 from grader.measure.motion.approach import Approach
 from grader.recording.model import Recording
@@ -36,15 +36,16 @@ class GoalParameters(RobotParameters):
     def approach(self, recording: Recording) -> Approach:
         """The way to the goal; ends the check if the robot never moved."""
         run = approach(recording, self.goal)
-        if isinstance(run, Cause):
-            raise Unmet(run)
+        stop_if(run if isinstance(run, Finding) else None)
+        assert isinstance(run, Approach)
         return run
 
     def arrival(self, run: Approach) -> int:
         """Index of the first step near the goal; ends the check if there is none."""
         found = run.arrival(self.position)
         if found is None:
-            raise Unmet(why_not_there(run, self.position) or Cause("never near the goal"))
+            stop_if(why_not_there(run, self.position))
+        assert found is not None
         return found
 
 

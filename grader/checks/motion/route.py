@@ -12,7 +12,6 @@ from pydantic import AfterValidator, Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters, moved_in
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import cause_of
 from grader.diagnosis.motion.missed_place import PlaceMissed
 from grader.diagnosis.motion.no_motion import why_not_moved
@@ -108,7 +107,7 @@ def _why_missed(
     parameters: Visits,
     visited: dict[int, int],
     moments: tuple[Moment, ...],
-) -> Cause:
+) -> Finding:
     """Why the first place that is missing was not visited."""
     truth, places = recording.truth, parameters.places
     number = next(index for index in range(len(places)) if index not in visited)
@@ -191,7 +190,7 @@ class KeepsDistance(RobotParameters):
 
 
 @check("motion.keeps_distance", Subject.RECORDING, KeepsDistance)
-def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding | Cause:
+def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding:
     """The robot keeps its distance from a wall.
 
     Judged by the true distance to the nearest obstacle, from the moment at which it is right for
@@ -209,7 +208,7 @@ def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding |
     )
     begin = next((index for index, is_right in enumerate(kept) if is_right), None)
     if begin is None:
-        return why_off_course(recording) or Cause(
+        return why_off_course(recording) or Finding(
             "it never was at this distance",
             "Look at the plot of the distance: which range does the node compare?",
             evidence_at(recording, "the run began", truth[0].time_ns, plot),
@@ -224,7 +223,7 @@ def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding |
     evidence = evidence_at(recording, "first at this distance", truth[begin].time_ns, plot)
     if right_m >= parameters.way and ratio >= parameters.share:
         return Finding.passed(parameters.asked_for, seen, evidence)
-    return why_off_course(recording) or Cause(
+    return why_off_course(recording) or Finding(
         seen,
         "Turn towards the wall where it is too far, and away where it is too near: angular.z is a "
         "gain times the error, with the sign of REP-103 (positive is left).",

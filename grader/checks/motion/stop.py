@@ -11,7 +11,6 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters, moved_in
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
@@ -59,7 +58,7 @@ class Stops(RobotParameters):
 
 
 @check("motion.stops", Subject.RECORDING, Stops)
-def stops(recording: Recording, parameters: Stops) -> Finding | Cause:
+def stops(recording: Recording, parameters: Stops) -> Finding:
     """The robot stops at the right distance from the obstacle ahead.
 
     Judged by the true distance from the LiDAR, straight ahead, at the moment the robot came to rest
@@ -82,7 +81,7 @@ def stops(recording: Recording, parameters: Stops) -> Finding | Cause:
         return _late(recording, scene, rest, sight, parameters)
     misread = misreading(recording, step)
     where = f"{sight.name} still {metres(sight.distance_m)} ahead" if sight else "nothing ahead"
-    return Cause(
+    return Finding(
         f"stopped early, with {where}{f': {misread.words}' if misread else ''}",
         misread.hint
         if misread
@@ -92,7 +91,7 @@ def stops(recording: Recording, parameters: Stops) -> Finding | Cause:
     )
 
 
-def _never_stopped(recording: Recording) -> Cause:
+def _never_stopped(recording: Recording) -> Finding:
     last = recording.truth[-1]
     sight = ahead(recording.scene, last)
     where = (
@@ -100,7 +99,7 @@ def _never_stopped(recording: Recording) -> Cause:
         if sight
         else "nothing is ahead any more"
     )
-    return Cause(
+    return Finding(
         "the robot has not come to rest: it turns on the spot"
         if abs(last.linear_m_s) < REST_M_S
         else f"the robot never stopped: it still drives at {speed(last.linear_m_s)} when the "
@@ -114,7 +113,9 @@ def _never_stopped(recording: Recording) -> Cause:
     )
 
 
-def _late(recording: Recording, scene: Scene, rest: int, sight: Sight, parameters: Stops) -> Cause:
+def _late(
+    recording: Recording, scene: Scene, rest: int, sight: Sight, parameters: Stops
+) -> Finding:
     truth, wanted_m = recording.truth, parameters.distance
     seen = f"stopped late, with {sight.name} at {metres(sight.distance_m)}"
     begin = rest
@@ -127,10 +128,10 @@ def _late(recording: Recording, scene: Scene, rest: int, sight: Sight, parameter
     lost_s = stolen_s(recording, begin_ns, end_ns)
     missing_m = wanted_m - parameters.late - sight.distance_m
     if lost_s > 0.0 and lost_s * fastest >= missing_m:
-        return Cause.held_up(seen, lost_s)
+        return Finding.held_up(seen, lost_s)
     shown = [one.stamp_ns for one in scans(recording) if begin_ns <= one.stamp_ns <= end_ns]
     within = f"; {counted(len(shown), 'scan')} came meanwhile" if shown else ""
-    return Cause(
+    return Finding(
         f"{seen}: it drove on for {format_duration((end_ns - begin_ns) / NS)} below "
         f"{metres(wanted_m)}, at up to {speed(fastest)}{within}",
         "Which number does the callback compare the front range with? Ranges are in metres, and "
@@ -195,7 +196,7 @@ class StaysAtRest(RobotParameters):
 
 
 @check("motion.stays_at_rest", Subject.RECORDING, StaysAtRest)
-def stays_at_rest(recording: Recording, parameters: StaysAtRest) -> Finding | Cause:
+def stays_at_rest(recording: Recording, parameters: StaysAtRest) -> Finding:
     """The robot stays at rest.
 
     Judged by the true speed: with `after: start` in the whole run, with `after: stop` from the
@@ -230,7 +231,7 @@ def _moves(step: Truth, tolerance_m_s: float) -> bool:
 
 def _set_off(
     recording: Recording, truth: tuple[Truth, ...], step: Truth, is_blind: bool, is_start: bool
-) -> Cause:
+) -> Finding:
     """How a robot that was at rest began to move."""
     when_s = recording.since_launch_s(step.time_ns)
     sight = ahead(recording.scene, step)
@@ -243,7 +244,7 @@ def _set_off(
     words += ", before the first scan had come" if is_blind else ""
     words += f", with {sight.name} {metres(sight.distance_m)} ahead" if sight else ""
     fastest = max(abs(item.linear_m_s) for item in truth)
-    return Cause(
+    return Finding(
         f"{words}: {metres(way_m(truth))} in all, at up to {speed(fastest)}",
         "Publish no speed before the first scan: until then the node cannot know what is ahead."
         if is_blind
@@ -263,7 +264,7 @@ class NoContact(RobotParameters):
 
 
 @check("motion.no_contact", Subject.RECORDING, NoContact)
-def no_contact(recording: Recording, parameters: NoContact) -> Finding | Cause:
+def no_contact(recording: Recording, parameters: NoContact) -> Finding:
     """The robot touches nothing.
 
     Judged by the simulator. An obstacle that drives into a robot at rest does not count. A robot

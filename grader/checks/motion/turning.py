@@ -9,7 +9,6 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import GoalParameters
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.findings.finding import Evidence, Finding
@@ -41,7 +40,7 @@ class TwoPhases(GoalParameters):
 
 
 @check("motion.two_phases", Subject.RECORDING, TwoPhases, concept="angles")
-def two_phases(recording: Recording, parameters: TwoPhases) -> Finding | Cause:
+def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
     """At the goal's position the robot turns and no longer drives.
 
     Judged by the active commands and the true path. Within `position` of the goal, the robot may
@@ -60,7 +59,7 @@ def two_phases(recording: Recording, parameters: TwoPhases) -> Finding | Cause:
     first = stray[0][1]
     fastest = max((abs(after.command_m_s) for _, after in stray))
     when_s = recording.since_launch_s(first.time_ns)
-    return why_off_course(recording) or Cause(
+    return why_off_course(recording) or Finding(
         f"drove {metres(way)} while it turned at the goal, commanded with up to {speed(fastest)} "
         f"(from {when_s:.2f} s after launch)",
         "In the second phase linear.x is 0.0. Remember in a flag that the position was reached, so "
@@ -111,7 +110,7 @@ class ShortWay(GoalParameters):
 
 
 @check("motion.short_way", Subject.RECORDING, ShortWay, concept="angles")
-def short_way(recording: Recording, parameters: ShortWay) -> Finding | Cause:
+def short_way(recording: Recording, parameters: ShortWay) -> Finding:
     """The robot always turns the short way.
 
     Judged by the true heading, in the first phase against the direction of the goal, in the second
@@ -138,7 +137,7 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding | Cause:
     what, error_rad, step = detours[0]
     when_s = recording.since_launch_s(step.time_ns)
     more = f", and {counted(len(detours) - 1, 'more time')}" if len(detours) > 1 else ""
-    return why_off_course(recording) or Cause(
+    return why_off_course(recording) or Finding(
         f"turned away from {what} through half a turn: {degrees(math.tau - abs(error_rad))} "
         f"{_sense(-error_rad)} where {degrees(abs(error_rad))} {_sense(error_rad)} would do "
         f"({when_s:.2f} s after launch{more})",

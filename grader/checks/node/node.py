@@ -7,7 +7,6 @@ from functools import partial
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.blocked_executor import left_s
 from grader.diagnosis.process.process_exit import (
@@ -66,7 +65,7 @@ class NodeExists(Parameters):
 
 
 @check("node.exists", Subject.RECORDING, NodeExists, concept="names")
-def exists(recording: Recording, parameters: NodeExists) -> Finding | Cause:
+def exists(recording: Recording, parameters: NodeExists) -> Finding:
     """The node appears under its name.
 
     Judged by the ROS graph: a node of the student with this fully qualified name was seen.
@@ -75,7 +74,7 @@ def exists(recording: Recording, parameters: NodeExists) -> Finding | Cause:
     publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.publishes)
     others = sorted({item.node for item in publishers} - {parameters.name})
     if parameters.publishes is not None and others:
-        return Cause(
+        return Finding(
             f"{code(parameters.name)} is there, but {codes(others)} publishes on "
             f"{code(parameters.publishes)}",
             "Create the publisher with self.create_publisher(...) in the node that is asked for.",
@@ -136,7 +135,7 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
     return Finding.passed(parameters.asked_for, observed)
 
 
-def _why_gone(recording: Recording, name: str | None) -> Cause | None:
+def _why_gone(recording: Recording, name: str | None) -> Finding | None:
     """Why a node that the scenario is about vanished early, without a sign of life after it."""
     concerned = target_nodes(recording)
     nodes = concerned or recording.student_nodes
@@ -147,7 +146,7 @@ def _why_gone(recording: Recording, name: str | None) -> Cause | None:
     if not gone or (name is None and not concerned and len(gone) < len(nodes)):
         return None
     when_s = recording.since_launch_s(gone[0].vanished_ns or recording.stop_ns)
-    return Cause(
+    return Finding(
         f"the node {code(gone[0].name)} left the ROS graph {when_s:.2f} s after launch, although "
         "its process still ran",
         "Call destroy_node() and rclpy.shutdown() only after rclpy.spin() has returned.",
@@ -193,20 +192,20 @@ class Ends(Parameters):
 
 
 @check("node.ends", Subject.RECORDING, Ends, concept="nodes")
-def ends(recording: Recording, parameters: Ends) -> Finding | Cause:
+def ends(recording: Recording, parameters: Ends) -> Finding:
     """The process ends by itself after Ctrl-C.
 
     Judged by the process: after SIGINT it must end in time and leave no process behind. Delays by
     the machine are taken off. Its exit status and a traceback of KeyboardInterrupt do not matter.
     """
     if not recording.processes:
-        stop_if(why_no_node(recording) or Cause("nothing was launched"))
+        stop_if(why_no_node(recording) or Finding("nothing was launched"))
     stop_if(why_ended(recording, "it had already ended before SIGINT"))
     processes, took_s = recording.processes, partial(_stop_s, recording)
     stuck = [process.name for process in processes if process.exited_ns is None]
     if stuck:
         text = f"{codes(stuck)} could not be ended, not even by SIGKILL"
-        return Cause(text, ours=True)
+        return Finding.ours(text)
     asked = [process for process in processes if not _was_killed(recording, process)]
     slow = [process for process in asked if not _in_time(process, parameters)]
     if slow:
@@ -214,14 +213,14 @@ def ends(recording: Recording, parameters: Ends) -> Finding | Cause:
     for process in processes:
         if process.survivors:
             number = counted(len(process.survivors), "process", "processes")
-            return Cause(
+            return Finding(
                 f"{code(process.name)} left {number} running behind it: {codes(process.survivors)}",
                 "End child processes before main() returns: process.terminate(), then "
                 "process.wait().",
                 Evidence(moments=(_end(recording, process),)),
             )
     if not asked:
-        return Cause("a stimulus of the scenario had ended it before", ours=True)
+        return Finding.ours("a stimulus of the scenario had ended it before")
     observed = f"ended {format_duration(max(map(took_s, asked)))} after SIGINT"
     sigint = Moment("SIGINT", recording.since_launch_s(recording.stop_ns))
     return Finding.passed(parameters.asked_for, observed, Evidence(moments=(sigint,)))
@@ -250,7 +249,7 @@ def _stop_s(recording: Recording, process: Process) -> float:
     return max(((process.exited_ns or recording.end_ns) - recording.stop_ns) / NS, 0.0)
 
 
-def _why_slow(recording: Recording, process: Process) -> Cause:
+def _why_slow(recording: Recording, process: Process) -> Finding:
     took_s = _stop_s(recording, process)
     seen = f"{code(process.name)} did not end after SIGINT; {process.stopped_by} was needed"
     if process.stopped_by == "SIGINT":
@@ -259,14 +258,14 @@ def _why_slow(recording: Recording, process: Process) -> Cause:
     ended_ns = process.exited_ns or recording.end_ns
     wall_s = (ended_ns - recording.stop_ns) / NS
     if left_s(recording, recording.stop_ns, ended_ns) < wall_s / LONGEST_STRETCH:
-        return Cause.held_up(seen, recording.stolen_s(recording.stop_ns, ended_ns))
+        return Finding.held_up(seen, recording.stolen_s(recording.stop_ns, ended_ns))
     lines = [
         line.text
         for line in recording.log
         if line.process == process.name and line.time_ns >= recording.stop_ns
     ]
     sigint = Moment("SIGINT", recording.since_launch_s(recording.stop_ns))
-    return Cause(
+    return Finding(
         seen,
         "Ctrl-C raises KeyboardInterrupt: look for a bare `except:` or `except BaseException:` "
         "in a loop that swallows it, for a signal handler of your own, for a callback that "

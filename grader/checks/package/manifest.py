@@ -9,7 +9,6 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.package.package import OfPackage
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_manifest
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code
@@ -30,7 +29,7 @@ class Manifest(OfPackage):
 
 
 @check("package.manifest", Subject.SUBMISSION, Manifest, concept="packages")
-def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding | Cause:
+def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding:
     """package.xml names the description, the maintainer and the licence of the package.
 
     Placeholders that `ros2 pkg create` writes, such as `TODO: License declaration`, do not count.
@@ -41,7 +40,7 @@ def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding | Ca
     if not faults:
         seen = f"{', '.join(package.maintainers)}; {', '.join(package.licenses)}"
         return Finding.passed(parameters.asked_for, seen)
-    return Cause(
+    return Finding(
         "; ".join(faults),
         "Write in package.xml what the package does, your name and e-mail, and its licence.",
         Evidence(places=(SourceError(package.file("package.xml"), None, faults[0]),)),

@@ -12,7 +12,6 @@ from pydantic import Field
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Need, Submitted
 from grader.diagnosis.build_error import EMPTY_HINT
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_executable import why_no_executable, why_nothing_to_run
 from grader.diagnosis.not_built import (
     breach_of_rep_144,
@@ -59,7 +58,7 @@ class PackageFound(OfPackage):
 
 
 @check("package.found", Subject.SUBMISSION, PackageFound, concept="packages")
-def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding | Cause:
+def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding:
     """The package is there and has a valid package.xml.
 
     Judged by the submitted files: a valid package.xml with this name and the expected build type.
@@ -67,18 +66,17 @@ def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding | C
     """
     stop_if(why_no_manifest(submission, parameters.package))
     package = existing_package(submission, parameters.package)
-    if cause := why_misnamed(submission, parameters.package):
-        finding = cause.finding(parameters.asked_for)
+    if finding := why_misnamed(submission, parameters.package):
         seen = f"{finding.observed}; everything else was judged in this package"
         return replace(finding, observed=seen, remap=f"{package.name}:={parameters.package}")
     if breach := breach_of_rep_144(package.name):
         seen = f"found in {code(package.path)}{breach}"
-        return Cause(seen, "Give the package another name.")
+        return Finding(seen, "Give the package another name.")
     if not parameters.build_type or package.build_type in parameters.build_type:
         return Finding.passed(parameters.asked_for, f"found in {code(package.path)}")
     manifest = SourceError(package.file("package.xml"), None, f"build type {package.build_type}")
     tags = (f"<export><build_type>{one}</build_type></export>" for one in parameters.build_type)
-    return Cause(
+    return Finding(
         f"its build type is {package.build_type}",
         f"Write {' or '.join(tags)} in package.xml.",
         Evidence(places=(manifest,)),
@@ -133,7 +131,7 @@ def executable(submission: SubmissionRecord, parameters: Executable) -> Finding:
     if cause is None:
         return Finding.passed(parameters.asked_for, f"installed in lib/{parameters.package}")
     remap = _misnamed(submission, parameters) if parameters.remap else ""
-    return replace(cause.finding(parameters.asked_for), remap=remap)
+    return replace(cause, remap=remap)
 
 
 def _misnamed(submission: SubmissionRecord, parameters: Executable) -> str:
@@ -176,7 +174,7 @@ class Dependencies(OfPackage):
 
 
 @check("package.dependencies", Subject.SUBMISSION, Dependencies, concept="packages")
-def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Finding | Cause:
+def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Finding:
     """package.xml declares the ROS packages that the code uses.
 
     Every ROS package that the Python code imports, whose headers the C++ code includes or that
@@ -207,21 +205,21 @@ def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Find
         if tags
         else []
     )
-    return Cause(
+    return Finding(
         "; ".join(seen),
         " ".join([*add, *filter(None, hints)]),
         Evidence(places=places, tables=(Table("package.xml", ("what", "write"), rows),)),
     )
 
 
-def _why_unknown_imports(package: PackageRecord) -> Cause | None:
+def _why_unknown_imports(package: PackageRecord) -> Finding | None:
     """A file whose imports are unknown, since Python cannot parse it."""
     read = {item.file for item in package.imports}
     for error in package.syntax_errors:
         if error.file not in read:
             seen = f"the imports cannot be read: {error}"
             hint = EMPTY_HINT if error.message == EMPTY else "Correct the syntax error first."
-            return Cause(seen, hint, Evidence(places=(error,)))
+            return Finding(seen, hint, Evidence(places=(error,)))
     return None
 
 

@@ -8,7 +8,6 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.package.package import OfPackage
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Finding
 from grader.findings.wording import codes
@@ -28,7 +27,7 @@ class File(OfPackage):
 
 
 @check("package.file", Subject.SUBMISSION, File, concept="packages")
-def file(submission: SubmissionRecord, parameters: File) -> Finding | Cause:
+def file(submission: SubmissionRecord, parameters: File) -> Finding:
     """The package installs a file, such as a launch file or a parameter file.
 
     Judged by what the build installed in `share/<package>/`.
@@ -41,7 +40,7 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding | Cause:
         return Finding.passed(asked, f"it installs {codes(found)}")
     if not installed:
         # Each package installs its package.xml.
-        return Cause("what it installs was not recorded: grade again", ours=True)
+        return Finding.ours("what it installs was not recorded: grade again")
     folder, _, name = parameters.path.rpartition("/")
     own = [path for path in submission.files if fnmatchcase(path.rpartition("/")[2], name)]
     seen = f"{codes(own)} is handed in, but not installed; " if own else ""
@@ -51,4 +50,4 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding | Cause:
     if package.build_type == "ament_cmake":
         line = f"install(DIRECTORY {folder} DESTINATION share/${{PROJECT_NAME}})` in CMakeLists.txt"
     hint = f"{'' if own else 'Add the file. '}Write `{line}."
-    return Cause(f"{seen}it installs {codes(installed)}", hint)
+    return Finding(f"{seen}it installs {codes(installed)}", hint)

@@ -7,7 +7,6 @@ from pydantic import Field
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.need import StudentTests
 from grader.checks.package.package import OfPackage
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes, counted
@@ -28,7 +27,7 @@ class Tests(OfPackage):
 
 
 @check("package.tests", Subject.SUBMISSION, Tests)
-def tests(submission: SubmissionRecord, parameters: Tests) -> Finding | Cause:
+def tests(submission: SubmissionRecord, parameters: Tests) -> Finding:
     """The student's own tests of the package pass.
 
     They are run with pytest after the build, in the sandbox of the build. The linters that `ros2
@@ -39,16 +38,16 @@ def tests(submission: SubmissionRecord, parameters: Tests) -> Finding | Cause:
     name = existing_package(submission, parameters.package).name
     run = next((one for one in runs if one.package == name), None)
     if run is None:
-        return Cause("the tests were not run: grade again", ours=True)
+        return Finding.ours("the tests were not run: grade again")
     if run.problem is not None:
         hint = "Put tests into `test/test_*.py`, in functions with names that begin with `test_`."
-        return Cause(run.problem, f"{hint} {_HINT}")
+        return Finding(run.problem, f"{hint} {_HINT}")
     if run.failed:
         names = codes(name for name, _ in run.failed)
         seen = f"{counted(run.passed, 'test')} passed, {len(run.failed)} failed: {names}"
         log = tuple(f"{name} - {message}" for name, message in run.failed)
-        return Cause(seen, _HINT, Evidence(log=log))
+        return Finding(seen, _HINT, Evidence(log=log))
     if run.passed < parameters.at_least:
         seen = f"there {'is' if run.passed == 1 else 'are'} {counted(run.passed, 'test')}"
-        return Cause(seen, "Write more tests.")
+        return Finding(seen, "Write more tests.")
     return Finding.passed(parameters.asked_for, f"{counted(run.passed, 'test')} passed")

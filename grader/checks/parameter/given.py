@@ -46,10 +46,9 @@ def given(recording: Recording, parameters: Given) -> Finding:
     that fail in the same scenario, without partial credit, are skipped, but for those it requires.
     """
     names, asked = parameters.names or recording.given_parameters, parameters.asked_for
-    cause = why_not_taken(recording, names)
-    if cause is None:
+    finding = why_not_taken(recording, names)
+    if finding is None:
         return Finding.passed(asked, "no other parameter is given")
-    finding = cause.finding(asked)
     likely = misnamed_parameters(recording, names) if parameters.remap else {}
     if not likely:
         return finding

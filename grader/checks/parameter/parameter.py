@@ -8,7 +8,6 @@ from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Doubt, ParameterSet, Stimulated
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_parameter import (
     answered_at,
     why_not_asked,
@@ -90,7 +89,7 @@ class Declared(OfParameter):
 
 
 @check("parameter.declared", Subject.RECORDING, Declared)
-def declared(recording: Recording, parameters: Declared) -> Finding | Cause:
+def declared(recording: Recording, parameters: Declared) -> Finding:
     """The node declares the parameter.
 
     Judged by the node's own parameter services, which the probe asked (`read_parameters` or
@@ -108,7 +107,7 @@ def declared(recording: Recording, parameters: Declared) -> Finding | Cause:
         if not values:
             stop_if(why_not_asked(recording, parameters.node, "its value was not read"))
         if not same_value(parameters.default, values[0].value):
-            return Cause(
+            return Finding(
                 f"it is {value_text(values[0].value)} at first",
                 "Its default is the second argument: self.declare_parameter("
                 f"'{parameters.name}', {wanted_text(parameters.default)}).",
@@ -127,26 +126,28 @@ def _range_words(found: tuple[float, float, float]) -> str:
     return f"{low:g} to {high:g}" + (f" in steps of {step:g}" if step else "")
 
 
-def _why_other_descriptor(found: Descriptor, parameters: Declared, shown: Evidence) -> Cause | None:
+def _why_other_descriptor(
+    found: Descriptor, parameters: Declared, shown: Evidence
+) -> Finding | None:
     if parameters.type not in (None, found.type):
         hint = f"The type is that of the default in self.declare_parameter('{parameters.name}', "
         hint += "default)."
         if (parameters.type, found.type) == ("double", "integer"):
             hint += " 1 is an integer, 1.0 is a double."
-        return Cause(f"it is {_article(found.type)}", hint, shown)
+        return Finding(f"it is {_article(found.type)}", hint, shown)
     wanted = [*(parameters.range or ()), *([] if parameters.step is None else [parameters.step])]
     if wanted and not (found.range and same(wanted, found.range[: len(wanted)], _TOLERANCE)):
         kind = "IntegerRange" if found.type == "integer" else "FloatingPointRange"
-        return Cause(
+        return Finding(
             f"its range is {_range_words(found.range)}" if found.range else "it has no range",
             f"{_GIVE} with a {kind}(from_value=..., to_value=..., step=...).",
             shown,
         )
     if parameters.read_only not in (None, found.read_only):
         seen = "it is read-only" if found.read_only else "it is not read-only"
-        return Cause(seen, f"{_GIVE}(read_only={parameters.read_only}).", shown)
+        return Finding(seen, f"{_GIVE}(read_only={parameters.read_only}).", shown)
     if parameters.described and not found.description.strip():
-        return Cause("it has no description", f"{_GIVE}(description='...').", shown)
+        return Finding("it has no description", f"{_GIVE}(description='...').", shown)
     return None
 
 
@@ -225,10 +226,10 @@ def set_(recording: Recording, parameters: Set) -> Finding:
     return Finding.passed(parameters.asked_for, observed, shown)
 
 
-def _why_other_answer(recording: Recording, item: Setting, parameters: Set) -> Cause | None:
+def _why_other_answer(recording: Recording, item: Setting, parameters: Set) -> Finding | None:
     shown = _moment(recording, item, parameters)
     if item.accepted and not parameters.accepted:
-        return Cause(
+        return Finding(
             "it was accepted",
             "Register a callback with self.add_on_set_parameters_callback() that returns "
             "SetParametersResult(successful=False, reason='...') for such a value, or give the "
@@ -236,7 +237,7 @@ def _why_other_answer(recording: Recording, item: Setting, parameters: Set) -> C
             shown,
         )
     if parameters.accepted and not item.accepted:
-        return Cause(
+        return Finding(
             f"it was {refusal(item)}",
             "Look at the callback of add_on_set_parameters_callback() and at the range: both "
             "must allow it.",
@@ -244,7 +245,7 @@ def _why_other_answer(recording: Recording, item: Setting, parameters: Set) -> C
         )
     if parameters.reason.casefold() not in item.reason.casefold():
         reason = f"is “{item.reason}”" if item.reason else "is empty"
-        return Cause(
+        return Finding(
             f"it was refused, but the reason {reason}",
             "Say why in SetParametersResult(successful=False, reason='...').",
             shown,
@@ -255,7 +256,7 @@ def _why_other_answer(recording: Recording, item: Setting, parameters: Set) -> C
                 return None
             verb = "accepted" if item.accepted else "refused"
             seen = f"it was {verb}, but its value is {value_text(reading.value)} afterwards"
-            return Cause(seen, "Do not set the parameter yourself in the callback.", shown)
+            return Finding(seen, "Do not set the parameter yourself in the callback.", shown)
     return None
 
 

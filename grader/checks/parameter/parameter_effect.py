@@ -13,7 +13,6 @@ from pydantic import Field, model_validator
 from grader.checks.check import NamedFields, Subject, check, stop_if, toleranced
 from grader.checks.need import ParameterSet, Recorded
 from grader.checks.parameter.parameter import OfSetting, refusal, settings_to
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_raised, why_taken
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended
@@ -76,7 +75,7 @@ class TakesEffect(OfSetting):
 
 
 @check("parameter.takes_effect", Subject.RECORDING, TakesEffect)
-def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding | Cause:
+def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding:
     """Setting the parameter changes what the node does.
 
     Judged by the messages from `within` after the node accepted the value until the same parameter
@@ -87,7 +86,7 @@ def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding | Cau
     when = Moment(f"set to {value_text(item.value)}", recording.since_launch_s(set_ns))
     shown = Evidence(moments=(when,))
     if not item.accepted:
-        return Cause(
+        return Finding(
             f"the value was {refusal(item)}",
             "Look at the callback of add_on_set_parameters_callback() and at the range.",
             shown,
@@ -119,7 +118,7 @@ def _why_too_few(
     begin_ns: int,
     end_ns: int,
     shown: Evidence,
-) -> Cause | None:
+) -> Finding | None:
     if number >= (1 if parameters.period is None else _LEAST_PERIODS + 1):
         return None
     watched_s = max((end_ns - begin_ns) / NS, 0.0)
@@ -129,9 +128,9 @@ def _why_too_few(
         return ended
     stolen_s = recording.stolen_s(begin_ns, end_ns)
     if watched_s - stolen_s <= _LEAST_PERIODS * (parameters.period or 0.0):
-        return Cause.held_up(f"{seen}, too few to judge", stolen_s)
+        return Finding.held_up(f"{seen}, too few to judge", stolen_s)
     hint = "Publish in every call of the callback, whatever the value of the parameter is."
-    return why_raised(recording, seen, begin_ns - round(parameters.within * NS)) or Cause(
+    return why_raised(recording, seen, begin_ns - round(parameters.within * NS)) or Finding(
         seen, hint if parameters.period is None else _NEW_TIMER, shown
     )
 
@@ -143,7 +142,7 @@ def _why_other_message(
     before: Sequence[Message],
     set_ns: int,
     shown: Evidence,
-) -> Cause | None:
+) -> Finding | None:
     wrong = unlike(message.value, parameters.fields, parameters.tolerance)
     if not wrong:
         return None
@@ -158,12 +157,12 @@ def _why_other_message(
         )
     taken = why_taken(recording, seen, set_ns, message.stamp_ns, parameters.within)
     table = difference_table("That message", wrong)
-    return taken or Cause(seen, hint, replace(shown, tables=(table,)))
+    return taken or Finding(seen, hint, replace(shown, tables=(table,)))
 
 
 def _why_other_period(
     recording: Recording, parameters: TakesEffect, found: list[Message], shown: Evidence
-) -> Cause | None:
+) -> Finding | None:
     if parameters.period is None:
         return None
     times = [message.stamp_ns for message in found]
@@ -174,6 +173,6 @@ def _why_other_period(
     seen = f"after that, messages come every {format_duration(median_s)} (median)"
     stolen_s = recording.stolen_s(times[0], times[-1])
     if 0.0 < off_s * (len(times) - 1) <= stolen_s:
-        return Cause.held_up(seen, stolen_s)
+        return Finding.held_up(seen, stolen_s)
     most = percent(parameters.period_tolerance)
-    return Cause(seen, f"{_NEW_TIMER} The period may be {most} off.", shown)
+    return Finding(seen, f"{_NEW_TIMER} The period may be {most} off.", shown)

@@ -9,7 +9,6 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Stimulated
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.no_messages import why_few
 from grader.diagnosis.process.process_exit import why_ended
@@ -50,7 +49,7 @@ class LateJoiner(Parameters):
 
 
 @check("qos.late_joiner", Subject.RECORDING, LateJoiner, concept="qos")
-def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding | Cause:
+def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     """A late joiner gets the last messages, and no more.
 
     Judged by behaviour: a subscription of the probe joins in the middle of the run, and gets the
@@ -160,7 +159,7 @@ class _Case:
         table = Table(f"Messages before {name} joined", header, rows[-_SHOWN:])
         return Evidence(moments, tables=(table,))
 
-    def why_destroyed(self, seen: str) -> Cause | None:
+    def why_destroyed(self, seen: str) -> Finding | None:
         """The cause if publishers were destroyed before it joined, while another one was there."""
         ends = [item.vanished_ns or math.inf for item in self.publishers]
         gone = sum(end_ns <= self.join.joined_ns for end_ns in ends)
@@ -169,7 +168,7 @@ class _Case:
         number = counted(gone, "publisher was", "publishers were")
         lost = "what a publisher keeps is lost with it"
         observed = f"{seen}: {number} destroyed before it joined, and {lost}"
-        return Cause(observed, _ONE_PUBLISHER_HINT, self.evidence)
+        return Finding(observed, _ONE_PUBLISHER_HINT, self.evidence)
 
 
 def _published_until(messages: tuple[Message, ...], time_ns: int) -> list[Message]:
@@ -179,15 +178,15 @@ def _published_until(messages: tuple[Message, ...], time_ns: int) -> list[Messag
     )
 
 
-def _why_not_judged(recording: Recording, parameters: LateJoiner, seen: str) -> Cause:
+def _why_not_judged(recording: Recording, parameters: LateJoiner, seen: str) -> Finding:
     """Why it did not join, or too little had been published to see what is kept of it."""
     needed = parameters.last + 1
     if len(recording.on(parameters.topic)) < needed:
         return why_few(recording, parameters.topic, needed)
-    return why_ended(recording, seen) or Cause(seen, ours=True)
+    return why_ended(recording, seen) or Finding.ours(seen)
 
 
-def _why_wrong(case: _Case) -> Cause | None:
+def _why_wrong(case: _Case) -> Finding | None:
     """Why it did not get what it should, or None."""
     number, last = len(case.history), case.parameters.last
     if case.number <= last:
@@ -200,11 +199,13 @@ def _why_wrong(case: _Case) -> Cause | None:
     if number > last:
         return _why_too_many(case)
     if not case.is_newest:
-        return Cause.to_repeat(f"{case.seen}, but not the newest ones: some were lost on their way")
+        return Finding.undecided(
+            f"{case.seen}, but not the newest ones: some were lost on their way"
+        )
     return _why_too_few(case) if number < case.least else None
 
 
-def _why_unpublished_before(case: _Case) -> Cause:
+def _why_unpublished_before(case: _Case) -> Finding:
     """Why little or nothing was published before the late joiner, the only subscription."""
     recording, join = case.recording, case.join
     number = counted(case.number, "message was", "messages were")
@@ -217,8 +218,8 @@ def _why_unpublished_before(case: _Case) -> Cause:
     stolen_s = recording.stolen_s(begin_ns, join.joined_ns)
     # With the time that was taken from it, the node may have come to as many as are needed.
     if case.number * span_s > case.parameters.last * (span_s - stolen_s):
-        return Cause.held_up(seen, stolen_s)
-    return Cause(
+        return Finding.held_up(seen, stolen_s)
+    return Finding(
         f"{seen} ({format_duration(span_s)})",
         "Publish from the start, whether or not there is a subscription: leave out conditions such "
         "as get_subscription_count() > 0. What comes before the late joiner is kept for it.",
@@ -226,10 +227,10 @@ def _why_unpublished_before(case: _Case) -> Cause:
     )
 
 
-def _why_too_many(case: _Case) -> Cause:
+def _why_too_many(case: _Case) -> Finding:
     if len(case.publishers) > 1:
         each = f"of {len(case.publishers)} publishers, each of which keeps its own"
-        return Cause(f"{case.seen}, {each}", _ONE_PUBLISHER_HINT, case.evidence)
+        return Finding(f"{case.seen}, {each}", _ONE_PUBLISHER_HINT, case.evidence)
     queues = declarations.queues(case.recording, Kind.PUBLISHER, case.parameters.topic)
     if any(queue.history == "keep_all" for queue in queues):
         why = "the publisher's history is keep_all, declared by the process"
@@ -237,16 +238,16 @@ def _why_too_many(case: _Case) -> Cause:
         why = f"the publisher's depth is {case.depths[0]}, declared by the process"
     else:
         why = f"the publisher keeps {len(case.history)}"
-    return Cause(f"{case.seen}: {why}", case.hint, case.evidence)
+    return Finding(f"{case.seen}: {why}", case.hint, case.evidence)
 
 
-def _why_too_few(case: _Case) -> Cause:
+def _why_too_few(case: _Case) -> Finding:
     recording, join, last = case.recording, case.join, case.parameters.last
     for publisher in case.publishers:
         refused = refusals(publisher.qos, join.qos)
         if refused:
             table = compatibility_table(publisher.qos, join.qos)
-            return Cause(
+            return Finding(
                 f"it got nothing at all: {', '.join(refused)}",
                 f"{case.hint} A subscription receives nothing from a publisher that offers less "
                 "than it requests.",
@@ -256,7 +257,7 @@ def _why_too_few(case: _Case) -> Cause:
     known = len(case.before) >= last
     oldest_ns = case.before[-last].stamp_ns if known else recording.launched_ns
     if lifespans and min(lifespans) < (join.joined_ns - oldest_ns) / NS:
-        return Cause(
+        return Finding(
             f"{case.seen}: the publisher's lifespan is {format_duration(min(lifespans))}, and what "
             "is older is thrown away",
             "Leave `lifespan` out of the QoSProfile: then a message stays until newer ones take "
@@ -265,7 +266,7 @@ def _why_too_few(case: _Case) -> Cause:
         )
     if join.matched_ns is None and case.publishers:
         waited_s = format_duration((recording.stop_ns - join.joined_ns) / NS)
-        return why_unpublished(recording, case.parameters.topic, case.seen) or Cause.to_repeat(
+        return why_unpublished(recording, case.parameters.topic, case.seen) or Finding.undecided(
             f"the late joiner was not matched within {waited_s}"
         )
     destroyed = case.why_destroyed(case.seen)
@@ -273,10 +274,10 @@ def _why_too_few(case: _Case) -> Cause:
         return destroyed
     depth = case.depths[0] if case.depths else None
     if depth is None:
-        return Cause(case.seen, case.hint, case.evidence)
+        return Finding(case.seen, case.hint, case.evidence)
     if depth >= last:
-        return Cause.to_repeat(
+        return Finding.undecided(
             f"{case.seen}, although the publisher's depth is {depth}: the rest was lost on its way"
         )
     why = f"the publisher's depth is {depth}, declared by the process"
-    return Cause(f"{case.seen}: {why}", case.hint, case.evidence)
+    return Finding(f"{case.seen}: {why}", case.hint, case.evidence)

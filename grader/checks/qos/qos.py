@@ -9,7 +9,6 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.undeclared import why_undeclared
 from grader.findings.finding import Evidence, Finding
@@ -96,7 +95,7 @@ class Offered(Profile):
 
 
 @check("qos.offered", Subject.RECORDING, Offered, concept="qos")
-def offered(recording: Recording, parameters: Offered) -> Finding | Cause:
+def offered(recording: Recording, parameters: Offered) -> Finding:
     """Publishers on the topic offer the expected QoS.
 
     Judged by what DDS discovered of every publisher of the student's on the topic; only the
@@ -112,7 +111,7 @@ class Requested(Profile):
 
 
 @check("qos.requested", Subject.RECORDING, Requested, concept="qos")
-def requested(recording: Recording, parameters: Requested) -> Finding | Cause:
+def requested(recording: Recording, parameters: Requested) -> Finding:
     """Subscriptions to the topic request the expected QoS.
 
     Judged by what DDS discovered of every subscription of the student's to the topic; only the
@@ -121,7 +120,7 @@ def requested(recording: Recording, parameters: Requested) -> Finding | Cause:
     return _judge(recording, parameters)
 
 
-def _judge(recording: Recording, parameters: Profile) -> Finding | Cause:
+def _judge(recording: Recording, parameters: Profile) -> Finding:
     kind = parameters.kind
     has, did, other_end = _WORDS[kind]
     stop_if(why_no_endpoint(recording, kind, parameters.topic))
@@ -146,7 +145,7 @@ def _judge(recording: Recording, parameters: Profile) -> Finding | Cause:
         seen = endpoints_seen(recording, own) or first_seen(
             recording, recording.on(parameters.topic)
         )
-        return Cause(
+        return Finding(
             f"the {kind.value} of {code(node)} {has} {differences}{source}"
             + still.format(f"{other_end} the expected profile"),
             _hint(parameters, wrong),
@@ -159,7 +158,7 @@ def _judge(recording: Recording, parameters: Profile) -> Finding | Cause:
     ]
     if hidden or not profiles:
         names = ", ".join(hidden) or "QoS"
-        return Cause(f"{names} of the {kind.value} was not discovered", ours=True)
+        return Finding.ours(f"{names} of the {kind.value} was not discovered")
     observed = f"{did} by {counted(len(profiles), kind.value)}{source}"
     return Finding.passed(parameters.asked_for, observed)
 
@@ -216,7 +215,7 @@ class Depth(Parameters):
 
 
 @check("qos.depth", Subject.RECORDING, Depth, concept="qos")
-def depth(recording: Recording, parameters: Depth) -> Finding | Cause:
+def depth(recording: Recording, parameters: Depth) -> Finding:
     """The queue has the expected depth.
 
     Discovery does not include history and depth. So this is judged by what the process declared
@@ -233,14 +232,14 @@ def depth(recording: Recording, parameters: Depth) -> Finding | Cause:
         messages = recording.on(parameters.topic)
         seen = endpoints_seen(recording, own) or first_seen(recording, messages)
         third = "third" if kind is Kind.PUBLISHER else "fourth"
-        return Cause(
+        return Finding(
             observed,
             f"The {third} argument of create_{kind.value} is the depth, or a QoSProfile that has "
             f"it beside the other policies: QoSProfile(depth={parameters.depth}, ...).",
             Evidence(moments=seen),
         )
     if any(queue.depth is None for queue in declared):
-        return Cause("the depth cannot be seen: the process declared no number", ours=True)
+        return Finding.ours("the depth cannot be seen: the process declared no number")
     if not declared and shown is None:
         what = f"the {kind.value} on {code(parameters.topic)}"
         return why_undeclared(recording, what)
@@ -326,7 +325,7 @@ class Compatible(Parameters):
 
 
 @check("qos.compatible", Subject.RECORDING, Compatible, concept="qos")
-def compatible(recording: Recording, parameters: Compatible) -> Finding | Cause:
+def compatible(recording: Recording, parameters: Compatible) -> Finding:
     """A given peer matches or does not match, by the rules of DDS.
 
     Judged by what DDS discovered of every endpoint of the student's on the topic, by the rule
@@ -339,7 +338,7 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding | Cause:
     stop_if(why_no_endpoint(recording, kind, parameters.topic))
     endpoints = recording.student_endpoints(kind, parameters.topic)
     if not endpoints:
-        return Cause(f"the {kind.value} was not discovered", ours=True)
+        return Finding.ours(f"the {kind.value} was not discovered")
     for endpoint in endpoints:
         pair = sides(kind, endpoint.qos, parameters.peer)
         refused = refusals(*pair)
@@ -366,7 +365,7 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding | Cause:
         evidence = Evidence(
             moments=endpoints_seen(recording, (endpoint,)), tables=(compatibility_table(*pair),)
         )
-        return Cause(observed, hint, evidence)
+        return Finding(observed, hint, evidence)
     pair = sides(kind, endpoints[0].qos, parameters.peer)
     return Finding.passed(
         parameters.asked_for,

@@ -20,7 +20,6 @@ from grader.checks.check import (
 )
 from grader.checks.need import Called, Doubt
 from grader.checks.requests import judged_requests, why_other_fields
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_late
 from grader.diagnosis.no_endpoint import SERVICE, is_offered
 from grader.findings.fields import FieldTolerance, brief, words
@@ -120,7 +119,7 @@ def judged_calls(
     return judged_requests(recording, SERVICE, service, recording.calls, request or {})
 
 
-def why_slow(recording: Recording, calls: tuple[Call, ...], within_s: float) -> Cause | None:
+def why_slow(recording: Recording, calls: tuple[Call, ...], within_s: float) -> Finding | None:
     """Why one of some calls was not answered in time, or None if all were."""
     worst = max(calls, key=_took_s)
     sent_ns, end_ns, server = worst.requested_ns, worst.answered_ns, worst.service
@@ -144,7 +143,7 @@ def _took_s(call: Call) -> float:
 
 def _why_other_response(
     recording: Recording, calls: tuple[Call, ...], call: Call, parameters: Responds
-) -> Cause | None:
+) -> Finding | None:
     seen = f"{_which(calls, call)} was answered with"
     called = Moment(f"called with {brief(call.request or {})}", _since_s(recording, call))
     shown, response = Evidence(moments=(called,)), call.response or {}
@@ -159,7 +158,7 @@ def _why_other_response(
     if wrong or not lacking:
         return wrong
     hint = "Look where the callback sets this text of the response that it returns."
-    return Cause(f"{seen} {' and '.join(lacking)}", hint, shown)
+    return Finding(f"{seen} {' and '.join(lacking)}", hint, shown)
 
 
 def _evidence(recording: Recording, calls: Sequence[Call]) -> Evidence:
@@ -203,7 +202,7 @@ class Concurrent(Parameters):
 
 
 @check("service.concurrent", Subject.RECORDING, Concurrent, concept="executors")
-def concurrent(recording: Recording, parameters: Concurrent) -> Finding | Cause:
+def concurrent(recording: Recording, parameters: Concurrent) -> Finding:
     """A second call during a slow call is processed as expected.
 
     Judged by the answers to calls that the probe sent at once. Parallel calls are answered
@@ -217,7 +216,7 @@ def concurrent(recording: Recording, parameters: Concurrent) -> Finding | Cause:
     ]
     if not pairs:
         text = "the scenario never calls the service twice at once"
-        return Cause(text, ours=True)
+        return Finding.ours(text)
     # Time enough for the slower of both, one after the other.
     stop_if(why_slow(recording, calls, 2.0 * len(calls) * parameters.takes))
     stop_if_any(_why_other_order(recording, parameters, pair) for pair in pairs)
@@ -231,7 +230,7 @@ def _gap_s(pair: tuple[Call, Call]) -> float:
 
 def _why_other_order(
     recording: Recording, parameters: Concurrent, pair: tuple[Call, Call]
-) -> Cause | None:
+) -> Finding | None:
     gap_s, takes_s = _gap_s(pair), parameters.takes
     side_by_side = parameters.calls == "side_by_side"
     together, far_apart = gap_s <= _TOGETHER * takes_s, gap_s >= _APART * takes_s
@@ -246,9 +245,9 @@ def _why_other_order(
     else:
         in_doubt = gap_s + stolen_s >= _APART * takes_s
     if in_doubt:
-        return Cause.held_up(seen, stolen_s)
+        return Finding.held_up(seen, stolen_s)
     if not (together or far_apart):
-        return Cause(
+        return Finding(
             f"{seen}: neither together nor one processing time apart",
             f"Each call should take {format_duration(takes_s)}.",
             _evidence(recording, pair),
@@ -256,12 +255,12 @@ def _why_other_order(
     executors = sorted({str(item.data.get("executor")) for item in recording.declared("spin")})
     declared = f"; the process declared a {codes(executors)}" if executors else ""
     if not side_by_side:
-        return Cause(
+        return Finding(
             f"{seen}, so both were processed at the same time{declared}",
             "Give the service a MutuallyExclusiveCallbackGroup, or use rclpy.spin(node).",
             _evidence(recording, pair),
         )
-    return Cause(
+    return Finding(
         f"{seen}, so the second call waited until the first was answered{declared}",
         "Spin with a MultiThreadedExecutor, and give the service a ReentrantCallbackGroup: "
         "self.create_service(..., callback_group=ReentrantCallbackGroup()).",

@@ -15,7 +15,6 @@ from pydantic import AfterValidator, Field, field_validator
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.need import RuffRules, Submitted
 from grader.checks.package.package import OfPackage
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_package, why_too_new
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes, counted, listing, percent
@@ -52,10 +51,10 @@ def _judged_package(submission: SubmissionRecord, name: str) -> PackageRecord:
         seen = f"Python cannot read {package.syntax_errors[0]}"
         places = package.syntax_errors[:_MOST_PLACES]
         hint = "Correct this line or the one before it."
-        stop_if(Cause(seen, hint, Evidence(places=places)))
+        stop_if(Finding(seen, hint, Evidence(places=places)))
     if not package.sources:
         hint = f"The code belongs in the folder {code(f'{name}/{name}')}, beside __init__.py."
-        stop_if(Cause(f"the package {code(name)} has no Python code", hint))
+        stop_if(Finding(f"the package {code(name)} has no Python code", hint))
     return package
 
 
@@ -100,27 +99,27 @@ def class_(submission: SubmissionRecord, parameters: Class) -> Finding:
 
 def _why_no_class(
     family: Family, classes: Sequence[FoundClass], named: Sequence[FoundClass], parameters: Class
-) -> Cause:
+) -> Finding:
     module, _, base = parameters.inherits.rpartition(".")
     name = parameters.name or "MyClass"
     hint = f"Write `from {module} import {base}` and `class {name}({base}):`."
     if not classes:
-        return Cause("no class is defined in the package", hint)
+        return Finding("no class is defined in the package", hint)
     evidence = Evidence(places=tuple(_place(item, _inherits(item)) for item in classes[:10]))
     if not named:
         there = sorted({_short(item) for item in classes})
         match = nearest(name, there)
         found = f"found the class {code(match)}" if match else f"found {codes(there)} only"
-        return Cause(found, f"Call the class {code(name)}.", evidence)
+        return Finding(found, f"Call the class {code(name)}.", evidence)
     for item in named:
         foreign = family.foreign(item)
         if foreign:
             seen = f"{code(item.found.name)} inherits {codes(foreign)}, which was not handed in"
             hint = "A person has to look at the class: the source of its base class is needed."
-            return Cause(seen, hint, ours=True)
+            return Finding.ours(seen, hint)
     place = _place(named[0], "")
     seen = "; ".join(_inherits(item) for item in named[:4])
-    return Cause(f"{seen} ({place.file}:{place.line})", hint, evidence)
+    return Finding(f"{seen} ({place.file}:{place.line})", hint, evidence)
 
 
 def _inherits(item: FoundClass) -> str:
@@ -170,7 +169,7 @@ class Docstrings(_Share):
 
 
 @check("source.docstrings", Subject.SUBMISSION, Docstrings)
-def docstrings(submission: SubmissionRecord, parameters: Docstrings) -> Finding | Cause:
+def docstrings(submission: SubmissionRecord, parameters: Docstrings) -> Finding:
     """Classes and functions have docstrings.
 
     Judged by the syntax of the package's Python files. Names that begin with an underscore need
@@ -220,7 +219,7 @@ class TypeHints(_Share):
 
 
 @check("source.type_hints", Subject.SUBMISSION, TypeHints)
-def type_hints(submission: SubmissionRecord, parameters: TypeHints) -> Finding | Cause:
+def type_hints(submission: SubmissionRecord, parameters: TypeHints) -> Finding:
     """Functions have type hints.
 
     Judged by the syntax of the package's Python files: every parameter and every return value.
@@ -247,7 +246,7 @@ def _lacking(one: SourceFunction, returns: bool) -> str:
 
 def _shared(
     parameters: _Share, judged: Sequence[tuple[bool, SourceError]], what: str, hint: str
-) -> Finding | Cause:
+) -> Finding:
     """The finding by the share of items that have what they need."""
     lacking = [place for good, place in judged if not good]
     having = len(judged) - len(lacking)
@@ -257,7 +256,7 @@ def _shared(
         return Finding.passed(parameters.asked_for, observed)
     first = f"the first without is {lacking[0]}" if lacking else "there is nothing to judge"
     shown = Evidence(places=tuple(lacking[:_MOST_PLACES]))
-    return Cause(f"{observed}; {first}", hint, shown)
+    return Finding(f"{observed}; {first}", hint, shown)
 
 
 class NoPrint(OfPython):
@@ -267,7 +266,7 @@ class NoPrint(OfPython):
 
 
 @check("source.no_print", Subject.SUBMISSION, NoPrint)
-def no_print(submission: SubmissionRecord, parameters: NoPrint) -> Finding | Cause:
+def no_print(submission: SubmissionRecord, parameters: NoPrint) -> Finding:
     """The code does not call print(): the node logs.
 
     Judged by the syntax of the package's Python files: `print` is neither called nor passed as a
@@ -280,7 +279,7 @@ def no_print(submission: SubmissionRecord, parameters: NoPrint) -> Finding | Cau
     if not places:
         return Finding.passed(parameters.asked_for, "no print()")
     number = counted(len(places), "place")
-    return Cause(
+    return Finding(
         f"{number} with print(), the first at {places[0].file}:{places[0].line}",
         "Write self.get_logger().info('...'): it has a level and the node's name, and goes to "
         "/rosout as well.",
@@ -326,7 +325,7 @@ class Ruff(OfPython):
 
 
 @check("source.ruff", Subject.SUBMISSION, Ruff)
-def ruff(submission: SubmissionRecord, parameters: Ruff) -> Finding | Cause:
+def ruff(submission: SubmissionRecord, parameters: Ruff) -> Finding:
     """The code follows the given rules of ruff.
 
     Judged by `ruff check` on the package's Python files, with lines of up to 99 characters as in
@@ -336,13 +335,13 @@ def ruff(submission: SubmissionRecord, parameters: Ruff) -> Finding | Cause:
     lint = _judged_package(submission, parameters.package).lint
     if lint is None or lint.problem is not None:
         why = "ruff was not asked" if lint is None else lint.problem
-        return Cause(f"the style was not looked at: {why}", ours=True)
+        return Finding.ours(f"the style was not looked at: {why}")
     found = [item for item in lint.findings if parameters.is_broken_by(item.code)]
     if len(found) <= parameters.at_most:
         observed = counted(len(found), "place") if found else "none"
         return Finding.passed(parameters.asked_for, observed)
     places = [SourceError(item.file, item.line, f"{item.code} {item.message}") for item in found]
-    return Cause(
+    return Finding(
         f"{counted(len(places), 'place')}, the first at {places[0]}",
         f"`ruff check --select {','.join(parameters.rules)}` shows them all, "
         f"`ruff rule {found[0].code}` explains this one.",

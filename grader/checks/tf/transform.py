@@ -16,7 +16,6 @@ from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.messages import following, messages
 from grader.checks.need import Need, OwnTransform, Recorded, SimulatedRobot
 from grader.checks.timing import timing
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import cause_of, explain
 from grader.diagnosis.wrong_transform import (
     BadTransform,
@@ -133,7 +132,7 @@ class Broadcast(EdgeParameters):
 
 
 @check("tf.broadcast", Subject.RECORDING, Broadcast, concept="stamps")
-def broadcast(recording: Recording, parameters: Broadcast) -> Finding | Cause:
+def broadcast(recording: Recording, parameters: Broadcast) -> Finding:
     """A transform is broadcast at the right rate, with stamps of the node's clock.
 
     A stamp must be within 1 s of the moment of publishing. Or it is the stamp of a message from
@@ -147,7 +146,7 @@ def broadcast(recording: Recording, parameters: Broadcast) -> Finding | Cause:
     if found.credit and parameters.moving and all(one.value == first.value for one in others):
         seen = f"{found.observed}, but the transform is always the same"
         hint = "Compute translation and rotation again in each call of the callback."
-        return Cause(seen, hint, found.evidence)
+        return Finding(seen, hint, found.evidence)
     return replace(found, expected=parameters.asked_for)
 
 
@@ -222,7 +221,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     return replace(found, expected=parameters.asked_for, hint=hint)
 
 
-def _why_other_stamp(recording: Recording, parameters: Follows) -> Cause | None:
+def _why_other_stamp(recording: Recording, parameters: Follows) -> Finding | None:
     """Why the stamps are not those of the source; None if they are."""
     symptom = NoTransform(recording, parameters.topic, parameters.parent, parameters.child)
     sources = recording.on(parameters.source or "")
@@ -244,7 +243,7 @@ def _why_other_stamp(recording: Recording, parameters: Follows) -> Cause | None:
         if message.stamp_ns <= one.message.stamp_ns:
             source = message
     off_s = (one.stamp_ns - (stamp_of(source.value) or 0)) / NS
-    return Cause(
+    return Finding(
         f"{len(wrong)} of {counted(len(judged), 'transform')} have another stamp than the message "
         f"on {code(source.topic)}; the first one is {format_duration(abs(off_s))} "
         f"{'later' if off_s > 0.0 else 'earlier'}",

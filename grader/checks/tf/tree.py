@@ -8,7 +8,6 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Recorded
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_crashed
 from grader.diagnosis.wrong_transform import edge, moment
@@ -49,7 +48,7 @@ def tree(recording: Recording, parameters: Tree) -> Finding:
     if not there:
         stop_if(why_silent(recording, parameters.topic))
     for seen, hint, one in _faults(parameters, there):
-        stop_if(why_crashed(recording) or Cause(seen, hint, moment(recording, one, "sent")))
+        stop_if(why_crashed(recording) or Finding(seen, hint, moment(recording, one, "sent")))
     frames = {name for one in there for name in (one.parent, one.child)}
     seen = f"{counted(len(frames), 'frame')} below {codes(roots(there))}"
     return Finding.passed(parameters.asked_for, seen, moment(recording, there[0], "sent"))

@@ -11,7 +11,6 @@ from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import PUBLISHED, Recorded
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_messages import why_not_sent, why_silent
 from grader.diagnosis.process.blocked_executor import left_s
@@ -87,7 +86,7 @@ class Latency(Parameters):
 
 
 @check("timing.latency", Subject.RECORDING, Latency)
-def latency(recording: Recording, parameters: Latency) -> Finding | Cause:
+def latency(recording: Recording, parameters: Latency) -> Finding:
     """The node answers soon.
 
     The latency is the time from the probe's publishing of a message to the source timestamp of the
@@ -122,19 +121,19 @@ def latency(recording: Recording, parameters: Latency) -> Finding | Cause:
     unexcused = len(set(missing) - excused)
     if unexcused <= parameters.unanswered and not parameters.is_too_slow(own_s):
         stolen_s = recording.stolen_s(sent[0].stamp_ns, recording.stop_ns)
-        return Cause.held_up(figures, stolen_s)
+        return Finding.held_up(figures, stolen_s)
     if not is_missing:
         hint = (
             "Publish the answer in the subscription's callback itself, not from a timer. Let the "
             "callback return soon: no time.sleep(), no wait, no loop over what is there already."
         )
-        return Cause(figures, hint, evidence)
+        return Finding(figures, hint, evidence)
     hint = (
         "Publish one answer in every call of the subscription's callback, with no condition that "
         "leaves one out."
     )
     observed += f"; of the others {figures}" if times else ""
-    return Cause(observed, hint, evidence)
+    return Finding(observed, hint, evidence)
 
 
 def _excused(

@@ -13,7 +13,6 @@ from pydantic import Field, model_validator
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Recorded
 from grader.checks.tolerance import TimeTolerance, Tolerance
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import cause_of
 from grader.diagnosis.no_messages import ENDED_HINT, why_few
 from grader.diagnosis.process.blocked_executor import left_s
@@ -97,7 +96,7 @@ class Period(Parameters):
 
 
 @check("timing.period", Subject.RECORDING, Period, concept="timers")
-def period(recording: Recording, parameters: Period) -> Finding | Cause:
+def period(recording: Recording, parameters: Period) -> Finding:
     """Messages come at the expected period.
 
     Judged by source timestamps, which the publisher's process sets in `publish()`, so a slow grader
@@ -115,7 +114,7 @@ def period(recording: Recording, parameters: Period) -> Finding | Cause:
     stop_if(_why_not_believed(recording, messages))
     measured = intervals(messages)
     if len(measured) < min(parameters.at_least, len(messages) - 1):
-        return Cause.to_repeat(
+        return Finding.undecided(
             f"of {counted(len(messages), 'message')} so many neighbours were lost on their way to "
             f"the probe that only {counted(len(measured), 'interval')} can be judged"
         )
@@ -130,7 +129,7 @@ def period(recording: Recording, parameters: Period) -> Finding | Cause:
         calm = undisturbed(recording, measured)
         if len(calm) < max(parameters.at_least, len(measured) / 2) or not judge(calm, limits).good:
             stolen_s = recording.stolen_s(measured[0].begin_ns, measured[-1].end_ns)
-            return Cause.held_up(observed, stolen_s)
+            return Finding.held_up(observed, stolen_s)
         observed += f"; the machine took time in {len(measured) - len(calm)}, which do not count"
     if verdict.good or is_excused:
         last_ns = messages[-1].stamp_ns
@@ -153,7 +152,7 @@ def period(recording: Recording, parameters: Period) -> Finding | Cause:
         )
     cause = cause_of(WrongRhythm(recording, parameters.topic, measured, verdict, limits))
     observed += f": {cause.observed}" if cause.observed else ""
-    return Cause(observed, cause.hint, replace(evidence, places=cause.evidence.places))
+    return Finding(observed, cause.hint, replace(evidence, places=cause.evidence.places))
 
 
 def _is_declared(recording: Recording, verdict: PeriodVerdict, limits: PeriodLimits) -> bool:
@@ -244,7 +243,7 @@ class Rate(Parameters):
 
 
 @check("timing.rate", Subject.RECORDING, Rate, concept="timers")
-def rate(recording: Recording, parameters: Rate) -> Finding | Cause:
+def rate(recording: Recording, parameters: Rate) -> Finding:
     """Messages come at a rate within bounds.
 
     The rate is the number of messages after the first, divided by the time from the first to the
@@ -267,9 +266,9 @@ def rate(recording: Recording, parameters: Rate) -> Finding | Cause:
     if is_slow and number >= (parameters.at_least or 0.0) * left_s(
         recording, first.stamp_ns, last.stamp_ns
     ):
-        return Cause.to_repeat(f"{observed}, but the machine took time from the process")
+        return Finding.undecided(f"{observed}, but the machine took time from the process")
     if is_slow or (parameters.at_most is not None and found_hz > parameters.at_most):
-        return Cause(
+        return Finding(
             observed,
             "Publish once in every call of the callback: look for a condition that leaves calls "
             "out, for a time.sleep(), and for a second timer or publish(). create_timer takes its "
@@ -282,7 +281,7 @@ def rate(recording: Recording, parameters: Rate) -> Finding | Cause:
 
 def _why_paused(
     recording: Recording, parameters: Rate, messages: tuple[Message, ...]
-) -> Cause | None:
+) -> Finding | None:
     """Why the longest time without a message is too long, or None."""
     if parameters.pause is None:
         return None
@@ -305,15 +304,15 @@ def _why_paused(
     )
 
 
-def _why_not_believed(recording: Recording, messages: Sequence[Message]) -> Cause | None:
+def _why_not_believed(recording: Recording, messages: Sequence[Message]) -> Finding | None:
     """Why the source timestamps, which the writer gives, do not tell when it published."""
     given = any(message.stamp_ns for message in messages)
     if not given and recording.environment.get("rmw") != _STAMPING:
-        return Cause("the middleware gave no source timestamps", ours=True)
+        return Finding.ours("the middleware gave no source timestamps")
     for message in messages:
         begin_ns = recording.launched_ns - _CLOCK_SLACK_NS
         if not begin_ns <= message.stamp_ns <= message.received_ns + _CLOCK_SLACK_NS:
-            return Cause(
+            return Finding(
                 "the source timestamps are not the times of publishing: one lies "
                 + ("before the launch" if message.stamp_ns < begin_ns else "after its arrival"),
                 _CLOCK_HINT,
@@ -325,7 +324,7 @@ def _why_not_believed(recording: Recording, messages: Sequence[Message]) -> Caus
     return _why_arrivals_differ(recording, live) if len(live) > _FEWEST else None
 
 
-def _why_arrivals_differ(recording: Recording, live: Sequence[Message]) -> Cause | None:
+def _why_arrivals_differ(recording: Recording, live: Sequence[Message]) -> Finding | None:
     usual_s = median(map(_way_s, live))
     # The first message of a publisher waits for its match. What holds up the middleware need not
     # show at the same moment in what the machine took.
@@ -339,7 +338,7 @@ def _why_arrivals_differ(recording: Recording, live: Sequence[Message]) -> Cause
     ]
     if len(late) > max(_MOST_LATE, _LATE_SHARE * len(live)):
         way_s = max(map(_way_s, late)) - min(map(_way_s, live))
-        return Cause(
+        return Finding(
             f"{counted(len(late), 'message')} of {len(live)} came up to {format_duration(way_s)} "
             "earlier or later than their source timestamps say, and the machine took no such "
             "time: the timestamps are not the times of publishing",
@@ -352,7 +351,7 @@ def _why_arrivals_differ(recording: Recording, live: Sequence[Message]) -> Cause
     arrival_s = median((b - a) / NS for a, b in pairwise(arrivals_ns))
     if abs(arrival_s - source_s) <= max(_RELATIVE * source_s, _ABSOLUTE_S):
         return None
-    return Cause.to_repeat(
+    return Finding.undecided(
         f"messages arrive every {format_duration(arrival_s)}, but their source timestamps are "
         f"{format_duration(source_s)} apart, while the machine was busy"
     )

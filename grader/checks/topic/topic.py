@@ -9,7 +9,6 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Recorded
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_dropped
 from grader.diagnosis.no_endpoint import misnamed, why_no_endpoint
 from grader.diagnosis.no_node import why_no_node
@@ -74,7 +73,7 @@ def _presence(recording: Recording, kind: Kind, parameters: Topic) -> Finding:
     if dropped is not None:
         # What it published can be judged.
         heard = kind is Kind.PUBLISHER and bool(recording.on(parameters.topic))
-        return replace(dropped.finding(parameters.asked_for), stands_alone=heard)
+        return replace(dropped, stands_alone=heard)
     endpoints = recording.student_endpoints(kind, parameters.topic)
     if not endpoints:
         seen = "messages came from one, but too briefly for the ROS graph"
@@ -91,9 +90,8 @@ def _presence(recording: Recording, kind: Kind, parameters: Topic) -> Finding:
 def _absence(recording: Recording, kind: Kind, parameters: Topic) -> Finding | None:
     """The finding of an endpoint that is not there, or only under another name."""
     topic = parameters.topic
-    cause = why_no_endpoint(recording, kind, topic)
-    if cause is not None:
-        finding = cause.finding(parameters.asked_for)
+    finding = why_no_endpoint(recording, kind, topic)
+    if finding is not None:
         remap = misnamed(recording, kind, topic) if parameters.remap else ""
         return replace(finding, remap=remap) if finding.status is Status.FAILED else finding
     for remap in recording.remaps if parameters.remap else ():
@@ -124,7 +122,7 @@ class Type(Topic):
 
 
 @check("topic.type", Subject.RECORDING, Type, concept="interfaces")
-def type_(recording: Recording, parameters: Type) -> Finding | Cause:
+def type_(recording: Recording, parameters: Type) -> Finding:
     """The topic has the expected message type.
 
     Judged by the ROS graph, for every endpoint of the student's nodes on the topic.
@@ -140,7 +138,7 @@ def type_(recording: Recording, parameters: Type) -> Finding | Cause:
         return Finding.passed(parameters.asked_for, f"the type is {codes(types)}")
     which = f"another {kind.value} on the topic" if wanted in types else f"the {kind.value}"
     package, _, short = wanted.split("/")
-    return Cause(
+    return Finding(
         f"{which} has the type {code(wrong[0])}",
         "A publisher and a subscription meet only if their types are the same: "
         f"`from {package}.msg import {short}`.",
@@ -161,7 +159,7 @@ class Untouched(Parameters):
 
 
 @check("topic.untouched", Subject.RECORDING, Untouched, concept="names")
-def untouched(recording: Recording, parameters: Untouched) -> Finding | Cause:
+def untouched(recording: Recording, parameters: Untouched) -> Finding:
     """Only the robot publishes its sensors.
 
     Judged by the ROS graph: no node of the student has a publisher on a topic of the robot, or the
@@ -171,7 +169,7 @@ def untouched(recording: Recording, parameters: Untouched) -> Finding | Cause:
     stop_if(why_no_node(recording))
     for endpoint in recording.student_endpoints(Kind.PUBLISHER):
         if endpoint.topic in parameters.topics:
-            return Cause(
+            return Finding(
                 f"the node {code(endpoint.node)} publishes on {code(endpoint.topic)}, which "
                 "belongs to the robot",
                 "To read the sensor use create_subscription; what you compute goes to a topic of "
@@ -180,7 +178,7 @@ def untouched(recording: Recording, parameters: Untouched) -> Finding | Cause:
             )
     for node in recording.student_nodes:
         if node.name.rpartition("/")[2] == PROBE:
-            return Cause(
+            return Finding(
                 f"a node of the submission is called {code(node.name)}, which is the name of the "
                 "node that watches the run",
                 "Give your node the name that the assignment asks for.",

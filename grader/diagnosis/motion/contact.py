@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.process.standing import stuck
-from grader.findings.finding import Evidence
+from grader.findings.finding import Evidence, Finding
 from grader.measure.motion.command import VelocityCommand, commands
 from grader.measure.motion.quantities import speed, turn
 from grader.measure.motion.scan import newest
@@ -26,7 +25,7 @@ _RESTED_NS = NS // 5
 
 
 @dataclass(frozen=True)
-class Contact(Symptom[Cause]):
+class Contact(Symptom[Finding]):
     """The robot drove into something.
 
     What a cause observes is a clause that follows the contact in the text.
@@ -42,7 +41,7 @@ class Contact(Symptom[Cause]):
         return [item for item in commands(self.recording) if item.time_ns <= self.step.time_ns]
 
 
-def why_touched(recording: Recording) -> Cause | None:
+def why_touched(recording: Recording) -> Finding | None:
     """What the robot drove into, when, how fast and why; None if it did not."""
     index = _touch(recording)
     if index is None:
@@ -61,7 +60,7 @@ def why_touched(recording: Recording) -> Cause | None:
         command = "although the last command was to stop: it came too late"
     reason = cause_of(Contact(recording, step, before))
     evidence = evidence_at(recording, f"contact with {name}", step.time_ns, speed_plot(recording))
-    return Cause(
+    return Finding(
         f"drove into {name} {motion}, {when_s:.2f} s after launch, {command}{reason.observed}",
         reason.hint,
         replace(evidence, places=reason.evidence.places),
@@ -69,13 +68,13 @@ def why_touched(recording: Recording) -> Cause | None:
 
 
 @explanation(Contact)
-def no_scan_for_long(symptom: Contact) -> Cause | None:
+def no_scan_for_long(symptom: Contact) -> Finding | None:
     """No scan came for a long time."""
     scan = newest(symptom.recording, symptom.step.time_ns)
     since_ns = symptom.step.time_ns - scan.stamp_ns if scan is not None else 0
     if since_ns <= _BLIND_NS:
         return None
-    return Cause(
+    return Finding(
         f"; the last scan had come {since_ns / NS:.2f} s before",
         "Without new scans the robot drives blindly. Store the time of the last scan, and let a "
         "timer stop the robot when that is more than 1 s ago.",
@@ -83,12 +82,12 @@ def no_scan_for_long(symptom: Contact) -> Cause | None:
 
 
 @explanation(Contact)
-def old_command(symptom: Contact) -> Cause | None:
+def old_command(symptom: Contact) -> Finding | None:
     """The last command was to drive, and the robot keeps it."""
     since_ns = symptom.step.time_ns - symptom.sent[-1].time_ns if symptom.sent else 0
     if since_ns <= _HELD_NS or not symptom.before.command_m_s:
         return None
-    return Cause(
+    return Finding(
         f", sent {since_ns / NS:.2f} s before",
         "The robot keeps the last command. Publish a command for every scan, or from a timer of "
         "10 Hz or more. To stop, publish linear.x = 0.0. A time.sleep() or a loop in a callback "
@@ -97,18 +96,18 @@ def old_command(symptom: Contact) -> Cause | None:
 
 
 @explanation(Contact)
-def callback_in_a_loop(symptom: Contact) -> Cause | None:
+def callback_in_a_loop(symptom: Contact) -> Finding | None:
     """A callback looped or slept and never saw a newer scan."""
     stand = stuck(symptom.recording)
     if stand is None:
         return None
-    return Cause(f"; {stand.words}", stand.hint, Evidence(places=(stand.place,)))
+    return Finding(f"; {stand.words}", stand.hint, Evidence(places=(stand.place,)))
 
 
 @explanation(Contact, general=True)
-def decided_to_drive(symptom: Contact) -> Cause:
+def decided_to_drive(symptom: Contact) -> Finding:
     """The node continued to drive, or stopped too late."""
-    return Cause(
+    return Finding(
         "",
         "Log the range that you compare. Is it the beam straight ahead (angle 0) of the newest "
         "scan? Is your limit in metres? When the range is below the limit, publish linear.x = 0.0. "

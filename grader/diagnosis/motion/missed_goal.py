@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.diagnosis.process.blocked_executor import at_its_place
 from grader.diagnosis.process.standing import stuck
+from grader.findings.finding import Finding
 from grader.measure.motion.approach import WRAP_HINT, Approach, long_turns
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.quantities import metres, point, speed, turn
@@ -24,7 +24,7 @@ _SIGN_HINT = "Look at the signs: dx = goal's x - x, dy = goal's y - y."
 
 
 @dataclass(frozen=True)
-class GoalMissed(Symptom[Cause]):
+class GoalMissed(Symptom[Finding]):
     """The robot is not at the goal at the end."""
 
     run: Approach
@@ -61,39 +61,39 @@ class GoalMissed(Symptom[Cause]):
             f"{speed(self.last.linear_m_s)} and {turn(self.last.angular_rad_s)}"
         )
 
-    def cause(self, words: str, hint: str) -> Cause:
+    def cause(self, words: str, hint: str) -> Finding:
         """The symptom in words, followed by more, with the distance over time."""
         evidence = evidence_at(
             self.run.recording, "nearest to the goal", self.nearest.time_ns, self.run.distance_plot
         )
-        return Cause(f"{self.seen}{words}", hint, evidence)
+        return Finding(f"{self.seen}{words}", hint, evidence)
 
 
-def why_not_there(run: Approach, position_m: float) -> Cause | None:
+def why_not_there(run: Approach, position_m: float) -> Finding | None:
     """Why the robot is not at the goal's position in the end; None if it is."""
     symptom = GoalMissed(run, position_m)
     return None if run.distance_m(symptom.last) <= position_m else cause_of(symptom)
 
 
 @explanation(GoalMissed)
-def no_cpu_time(symptom: GoalMissed) -> Cause | None:
+def no_cpu_time(symptom: GoalMissed) -> Finding | None:
     """The machine gave the run too little CPU time; this is an error and costs no points."""
     recording, truth = symptom.run.recording, symptom.run.truth
     lost_s = stolen_s(recording, truth[0].time_ns, truth[-1].time_ns)
     is_starved = lost_s > 0.25 * symptom.watched_s and recording.ending is Ending.TIMEOUT
     if symptom.is_at_rest or not is_starved:
         return None
-    return Cause.held_up(symptom.seen, lost_s)
+    return Finding.held_up(symptom.seen, lost_s)
 
 
 @explanation(GoalMissed)
-def off_course(symptom: GoalMissed) -> Cause | None:
+def off_course(symptom: GoalMissed) -> Finding | None:
     """The process ended, the robot touched something, or no command came for a long time."""
     return why_off_course(symptom.run.recording)
 
 
 @explanation(GoalMissed)
-def wrong_place(symptom: GoalMissed) -> Cause | None:
+def wrong_place(symptom: GoalMissed) -> Finding | None:
     """It drove to another place: x and y swapped, a wrong sign, or counted from its start."""
     goal, last, first = symptom.run.goal, symptom.last, symptom.run.truth[0]
     places = (
@@ -121,21 +121,21 @@ def wrong_place(symptom: GoalMissed) -> Cause | None:
 
 
 @explanation(GoalMissed, concept="executors")
-def loop_in_a_callback(symptom: GoalMissed) -> Cause | None:
+def loop_in_a_callback(symptom: GoalMissed) -> Finding | None:
     """A callback does not return: its loop never sees newer odometry."""
     stand = None if symptom.is_at_rest else stuck(symptom.run.recording)
     return None if stand is None else at_its_place(symptom.cause("", ""), symptom.seen, stand)
 
 
 @explanation(GoalMissed, concept="angles")
-def yaw_misread(symptom: GoalMissed) -> Cause | None:
+def yaw_misread(symptom: GoalMissed) -> Finding | None:
     """The yaw is computed wrongly from the quaternion."""
     misread = None if symptom.is_at_rest else misread_yaw(symptom.run, symptom.position_m)
     return symptom.cause(f": {misread}", misread.hint) if misread else None
 
 
 @explanation(GoalMissed, concept="angles")
-def angle_not_wrapped(symptom: GoalMissed) -> Cause | None:
+def angle_not_wrapped(symptom: GoalMissed) -> Finding | None:
     """It turns the long way: the angle error is not wrapped to -pi .. pi."""
     run = symptom.run
     far = [step for step in run.truth if run.distance_m(step) > symptom.position_m]
@@ -157,7 +157,7 @@ def angle_not_wrapped(symptom: GoalMissed) -> Cause | None:
 
 
 @explanation(GoalMissed)
-def drove_on(symptom: GoalMissed) -> Cause | None:
+def drove_on(symptom: GoalMissed) -> Finding | None:
     """It was at the goal and drove on."""
     nearest_m = symptom.run.distance_m(symptom.nearest)
     if nearest_m > symptom.position_m:
@@ -170,7 +170,7 @@ def drove_on(symptom: GoalMissed) -> Cause | None:
 
 
 @explanation(GoalMissed)
-def stopped_elsewhere(symptom: GoalMissed) -> Cause | None:
+def stopped_elsewhere(symptom: GoalMissed) -> Finding | None:
     """It stopped before the goal, or somewhere else."""
     if not symptom.is_at_rest:
         return None
@@ -182,7 +182,7 @@ def stopped_elsewhere(symptom: GoalMissed) -> Cause | None:
 
 
 @explanation(GoalMissed)
-def drives_away(symptom: GoalMissed) -> Cause | None:
+def drives_away(symptom: GoalMissed) -> Finding | None:
     """It drives away from the goal: atan(dy / dx), or x and y exchanged in atan2()."""
     began_m = symptom.run.distance_m(symptom.run.truth[0])
     if symptom.run.distance_m(symptom.last) <= began_m:
@@ -197,7 +197,7 @@ def drives_away(symptom: GoalMissed) -> Cause | None:
 
 
 @explanation(GoalMissed, general=True)
-def too_slow(symptom: GoalMissed) -> Cause:
+def too_slow(symptom: GoalMissed) -> Finding:
     """It is on its way, but too slow, or it weaves from side to side."""
     return symptom.cause(
         f", after {format_duration(symptom.watched_s)}",

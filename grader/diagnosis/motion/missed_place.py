@@ -6,10 +6,9 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, explanation
 from grader.diagnosis.motion.off_course import why_off_course
-from grader.findings.finding import Evidence, Moment
+from grader.findings.finding import Evidence, Finding, Moment
 from grader.measure.motion.quantities import degrees, metres
 from grader.measure.motion.track import final_rest, speed_plot
 from grader.recording.model import Recording
@@ -24,7 +23,7 @@ _END_HINT = "End the turn by the yaw of odometry, not by the time, and stop befo
 
 
 @dataclass(frozen=True)
-class PlaceMissed(Symptom[Cause]):
+class PlaceMissed(Symptom[Finding]):
     """The robot did not come to a place on its route.
 
     Attributes:
@@ -61,11 +60,11 @@ class PlaceMissed(Symptom[Cause]):
         first = self.way[0]
         return wrap_angle(math.atan2(y_m - first.y_m, x_m - first.x_m) - first.yaw_rad)
 
-    def cause(self, words: str, hint: str, label: str, step: Truth) -> Cause:
+    def cause(self, words: str, hint: str, label: str, step: Truth) -> Finding:
         """What it did instead, and when."""
         moment = Moment(label, self.recording.since_launch_s(step.time_ns))
         evidence = Evidence((*self.visited, moment), plots=(speed_plot(self.recording),))
-        return Cause(f"{self.seen}; {words}", hint, evidence)
+        return Finding(f"{self.seen}; {words}", hint, evidence)
 
 
 def _to(angle_rad: float) -> str:
@@ -73,13 +72,13 @@ def _to(angle_rad: float) -> str:
 
 
 @explanation(PlaceMissed)
-def off_course(symptom: PlaceMissed) -> Cause | None:
+def off_course(symptom: PlaceMissed) -> Finding | None:
     """The process ended, the robot touched something, or no command came for a long time."""
     return why_off_course(symptom.recording)
 
 
 @explanation(PlaceMissed)
-def skipped(symptom: PlaceMissed) -> Cause | None:
+def skipped(symptom: PlaceMissed) -> Finding | None:
     """It went to a later place without this one."""
     if not symptom.skipped_to:
         return None
@@ -93,7 +92,7 @@ def skipped(symptom: PlaceMissed) -> Cause | None:
 
 
 @explanation(PlaceMissed, concept="angles")
-def turned_wrongly(symptom: PlaceMissed) -> Cause | None:
+def turned_wrongly(symptom: PlaceMissed) -> Finding | None:
     """It turned to the wrong side, too far or too little, and drove off."""
     distance_m = symptom.distance_m(symptom.way[0])
     far_m = min(max(symptom.gone_m), distance_m)
@@ -116,7 +115,7 @@ def turned_wrongly(symptom: PlaceMissed) -> Cause | None:
 
 
 @explanation(PlaceMissed)
-def stopped_short(symptom: PlaceMissed) -> Cause | None:
+def stopped_short(symptom: PlaceMissed) -> Finding | None:
     """It came to rest on its way to the place."""
     rest = final_rest(symptom.way)
     left_m = symptom.distance_m(symptom.way[-1])
@@ -132,7 +131,7 @@ def stopped_short(symptom: PlaceMissed) -> Cause | None:
 
 
 @explanation(PlaceMissed, general=True)
-def not_near(symptom: PlaceMissed) -> Cause:
+def not_near(symptom: PlaceMissed) -> Finding:
     """It came near the place, but not near enough."""
     step = min(symptom.way, key=symptom.distance_m)
     return symptom.cause(

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_messages import NoMessages, why_refused, why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
 from grader.diagnosis.wrong_value import FLOAT_HINT, MISREAD, was_integer
-from grader.findings.finding import Evidence
+from grader.findings.finding import Evidence, Finding
 from grader.findings.reference import Goal, UnknownValue
 from grader.findings.value import leaves
 from grader.findings.wording import code, codes, counted
@@ -34,7 +33,7 @@ _SHORT_S = 0.2
 """In so little time a robot does not get far enough to be seen."""
 
 
-def why_not_judged(recording: Recording) -> Cause | None:
+def why_not_judged(recording: Recording) -> Finding | None:
     """Why there is no motion to judge at all, moving or not; None if there is."""
     if recording.truth and recording.scene is not None:
         return None
@@ -43,11 +42,11 @@ def why_not_judged(recording: Recording) -> Cause | None:
         return missing
     if recording.matched_ns is None:
         return why_silent(recording, command_topic(recording))
-    return Cause("there is no simulated robot in this scenario: it needs a `world`", ours=True)
+    return Finding.ours("there is no simulated robot in this scenario: it needs a `world`")
 
 
 @dataclass(frozen=True)
-class NotMoved(Symptom[Cause]):
+class NotMoved(Symptom[Finding]):
     """The robot never moved."""
 
     recording: Recording
@@ -70,7 +69,7 @@ class NotMoved(Symptom[Cause]):
         return evidence_at(self.recording, label, self.first.time_ns)
 
 
-def why_not_moved(recording: Recording) -> Cause | None:
+def why_not_moved(recording: Recording) -> Finding | None:
     """Why the robot never moved; None if it did."""
     cause = why_not_judged(recording)
     if cause is not None or has_moved(recording.truth):
@@ -78,7 +77,7 @@ def why_not_moved(recording: Recording) -> Cause | None:
     return cause_of(NotMoved(recording))
 
 
-def approach(recording: Recording, goal: Goal) -> Approach | Cause:
+def approach(recording: Recording, goal: Goal) -> Approach | Finding:
     """What there is to judge, or why there is nothing."""
     cause = why_not_moved(recording)
     if cause is not None and not recording.truth:
@@ -86,11 +85,11 @@ def approach(recording: Recording, goal: Goal) -> Approach | Cause:
     try:
         pose = goal.pose(recording.values)
     except UnknownValue as error:
-        return Cause(str(error), ours=True)
+        return Finding.ours(str(error))
     return cause or Approach(recording, pose)
 
 
-def why_cut_short(recording: Recording) -> Cause | None:
+def why_cut_short(recording: Recording) -> Finding | None:
     """A process that ended while the robot was on its way, or commands that are not numbers."""
     ended = exited(recording)
     if ended:
@@ -102,14 +101,14 @@ def why_cut_short(recording: Recording) -> Cause | None:
     return why_rejected(recording)
 
 
-def why_rejected(recording: Recording) -> Cause | None:
+def why_rejected(recording: Recording) -> Finding | None:
     """Commands that the robot refused, for they were NaN or infinite; None without any."""
     refused = [item for item in recording.incidents if item.kind == "command_rejected"]
     if not refused:
         return None
     first = refused[0]
     were = "was" if len(refused) == 1 else "were"
-    return Cause(
+    return Finding(
         f"{counted(len(refused), 'command')} on {code(command_topic(recording))} {were} not finite "
         f"(first: {first.text}); the robot stops instead",
         "A command must be finite: look for a division by zero, for a range of inf (nothing is "
@@ -119,26 +118,26 @@ def why_rejected(recording: Recording) -> Cause | None:
 
 
 @explanation(NotMoved)
-def ended_before_it_moved(symptom: NotMoved) -> Cause | None:
+def ended_before_it_moved(symptom: NotMoved) -> Finding | None:
     """The process ended."""
     return why_ended(symptom.recording, _STILL)
 
 
 @explanation(NotMoved)
-def nothing_published(symptom: NotMoved) -> Cause | None:
+def nothing_published(symptom: NotMoved) -> Finding | None:
     """Nothing was published on the topic of velocity commands."""
     recording, topic = symptom.recording, command_topic(symptom.recording)
     return None if symptom.sent else why_silent(recording, topic).after(_STILL)
 
 
 @explanation(NotMoved)
-def not_finite(symptom: NotMoved) -> Cause | None:
+def not_finite(symptom: NotMoved) -> Finding | None:
     """The commands are inf or NaN."""
     return why_rejected(symptom.recording)
 
 
 @explanation(NotMoved, concept="qos")
-def robot_not_matched(symptom: NotMoved) -> Cause | None:
+def robot_not_matched(symptom: NotMoved) -> Finding | None:
     """The QoS of the publisher does not match that of the robot's subscription."""
     recording = symptom.recording
     if any(step.command_m_s or step.command_rad_s for step in recording.truth):
@@ -149,7 +148,7 @@ def robot_not_matched(symptom: NotMoved) -> Cause | None:
 
 
 @explanation(NotMoved)
-def only_zeros(symptom: NotMoved) -> Cause | None:
+def only_zeros(symptom: NotMoved) -> Finding | None:
     """linear.x and angular.z of all commands are 0, perhaps because a scan was misread."""
     recording, sent = symptom.recording, symptom.sent
     if not all(is_zero(item.twist) for item in sent):
@@ -164,8 +163,8 @@ def only_zeros(symptom: NotMoved) -> Cause | None:
     if others:
         seen += f", but {codes(others)} {'is' if len(others) == 1 else 'are'} not"
     elif misread is not None:
-        return Cause(f"{seen}; {misread.words}", misread.hint, symptom.evidence)
-    return Cause(
+        return Finding(f"{seen}; {misread.words}", misread.hint, symptom.evidence)
+    return Finding(
         seen,
         "Which branch of the callback publishes? Log what it compares. The speed ahead is "
         "linear.x, the turn is angular.z.",
@@ -174,12 +173,12 @@ def only_zeros(symptom: NotMoved) -> Cause | None:
 
 
 @explanation(NotMoved)
-def integer_in_command(symptom: NotMoved) -> Cause | None:
+def integer_in_command(symptom: NotMoved) -> Finding | None:
     """A float field holds an integer, which ROS misreads."""
     twist = symptom.first.twist
     for field, number in (("linear.x", twist.linear_m_s), ("angular.z", twist.angular_rad_s)):
         if was_integer(number):
-            return Cause(
+            return Finding(
                 f"{_STILL}: {MISREAD} was put into {code(field)}, a float field, "
                 "which ROS misreads",
                 FLOAT_HINT,
@@ -189,15 +188,15 @@ def integer_in_command(symptom: NotMoved) -> Cause | None:
 
 
 @explanation(NotMoved, general=True)
-def moves_too_late(symptom: NotMoved) -> Cause:
+def moves_too_late(symptom: NotMoved) -> Finding:
     """The first command to move came too late or was too slow."""
     recording, first = symptom.recording, symptom.first
     left_s = (recording.truth[-1].time_ns - first.time_ns) / NS
     begin_ns = recording.truth[0].time_ns
     lost_s = stolen_s(recording, begin_ns, recording.truth[-1].time_ns)
     if left_s < _SHORT_S <= left_s + lost_s:
-        return Cause.held_up(f"{_STILL} until the end", lost_s)
-    return Cause(
+        return Finding.held_up(f"{_STILL} until the end", lost_s)
+    return Finding(
         f"{_STILL}: the first command to move, {speed(first.twist.linear_m_s)} ahead, came "
         f"{format_duration(max(left_s, 0.0))} before the end",
         "A speed below 1 mm/s, or a command that lasts only a moment, does not move the robot.",

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short
+from grader.findings.finding import Finding
 from grader.measure.motion.command import commands, is_zero
 from grader.measure.motion.track import evidence_at, speed_plot
 from grader.recording.model import NS, Recording
@@ -14,17 +14,17 @@ from grader.spec.unit import format_duration
 _UNSTEERED_S = 2.0
 
 
-def why_interrupted(recording: Recording) -> Cause | None:
+def why_interrupted(recording: Recording) -> Finding | None:
     """Why the way ended early: a process ended, commands not finite, or a contact; or None."""
     return why_cut_short(recording) or why_touched(recording)
 
 
-def why_off_course(recording: Recording) -> Cause | None:
+def why_off_course(recording: Recording) -> Finding | None:
     """A cause that lies deeper than the way in which the robot is steered, or None."""
     return why_interrupted(recording) or why_unsteered(recording)
 
 
-def why_unsteered(recording: Recording) -> Cause | None:
+def why_unsteered(recording: Recording) -> Finding | None:
     """The longest time without a command in which the robot moved on; None if it is short."""
     end_ns = recording.truth[-1].time_ns
     sent = commands(recording)
@@ -40,7 +40,7 @@ def why_unsteered(recording: Recording) -> Cause | None:
         return None
     when_s = recording.since_launch_s(begin_ns)
     until = " until the observation ended" if next_ns == end_ns else ""
-    return Cause(
+    return Finding(
         f"no command came for {format_duration(long_s)}{until}, from {when_s:.2f} s after launch "
         "on, and the robot kept moving by its last command",
         "Publish a command for each message of odometry. Look for time.sleep() or a loop in a "

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import replace
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.process.standing import Stand, slow_callback, where_it_stands
-from grader.findings.finding import Evidence, Moment
+from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import until_the_end
 from grader.findings.wording import codes
 from grader.measure import declarations
@@ -30,7 +29,7 @@ def left_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
     return (end_ns - begin_ns) / NS - recording.stolen_s(begin_ns, end_ns)
 
 
-def why_not_called(recording: Recording, seen: str, nodes: Collection[str]) -> Cause | None:
+def why_not_called(recording: Recording, seen: str, nodes: Collection[str]) -> Finding | None:
     """The cause if callbacks are not called, or late; None where nothing tells of it."""
     return (
         why_never_spun(recording, seen, nodes)
@@ -41,7 +40,7 @@ def why_not_called(recording: Recording, seen: str, nodes: Collection[str]) -> C
 
 def why_blocked(
     recording: Recording, seen: str, nodes: Collection[str], since_ns: int
-) -> Cause | None:
+) -> Finding | None:
     """The cause if an executor is blocked, as calls to its node tell that had time for an answer.
 
     A node's parameter services answer only while its executor spins. What the machine took from
@@ -58,7 +57,7 @@ def why_blocked(
     process = declarations.process_of(recording, min(nodes))
     stand = where_it_stands(recording, process.name) if process is not None else None
     since_s = recording.since_launch_s(call.requested_ns)
-    cause = Cause(
+    cause = Finding(
         f"{seen}: something blocks the executor; from {since_s:.2f} s after launch on the node's "
         "parameter service does not answer either",
         HINT,
@@ -68,13 +67,13 @@ def why_blocked(
     return cause if stand is None else at_its_place(cause, seen, stand)
 
 
-def at_its_place(cause: Cause, seen: str, stand: Stand) -> Cause:
+def at_its_place(cause: Finding, seen: str, stand: Stand) -> Finding:
     """A cause that names the line which keeps the program."""
     evidence = replace(cause.evidence, places=(stand.place,))
     return replace(cause, observed=f"{seen}: {stand.words}", hint=stand.hint, evidence=evidence)
 
 
-def why_slow(recording: Recording, seen: str, nodes: Collection[str]) -> Cause | None:
+def why_slow(recording: Recording, seen: str, nodes: Collection[str]) -> Finding | None:
     """The cause if callbacks keep each other waiting for long, as late answers to calls tell."""
     waits = [
         (call, left_s(recording, call.requested_ns, call.answered_ns or recording.stop_ns))
@@ -86,7 +85,7 @@ def why_slow(recording: Recording, seen: str, nodes: Collection[str]) -> Cause |
         return None
     moment = Moment("call that waited", recording.since_launch_s(call.requested_ns))
     stand = slow_callback(recording)
-    cause = Cause(
+    cause = Finding(
         f"{seen}: the callbacks keep each other waiting, and calls to the node's parameter "
         f"service waited {format_duration(wait_s)} or more",
         HINT,
@@ -101,7 +100,7 @@ def why_never_spun(
     seen: str,
     nodes: Iterable[str] = (),
     processes: Iterable[Process] | None = None,
-) -> Cause | None:
+) -> Finding | None:
     """The cause if nothing spins a node, as its process declares.
 
     Args:
@@ -115,7 +114,7 @@ def why_never_spun(
     if process is None:
         if not names or not all(declarations.in_no_executor(recording, name) for name in names):
             return None
-        return Cause(
+        return Finding(
             f"{seen}: an executor spins, but {codes(names)} was not added to it, so none of its "
             "callbacks runs",
             "Add the node to the executor that spins, executor.add_node(node), or call "
@@ -124,7 +123,7 @@ def why_never_spun(
             concept="executors",
         )
     stand = where_it_stands(recording, process.name)
-    cause = Cause(
+    cause = Finding(
         f"{seen}: rclpy.spin() was never called, so no callback runs",
         "Call rclpy.spin(node) in main(). Nothing before it may wait or loop for ever.",
         Evidence(moments=(until_the_end(recording, "rclpy.spin() was still not called"),)),

@@ -7,14 +7,13 @@ import signal
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
-from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.process.exceptions import Raised
 from grader.diagnosis.process.failure import Failure
 from grader.diagnosis.process.missing_library import lacking_here
 from grader.diagnosis.process.newer_names import newer_name
 from grader.diagnosis.process.raised import fatal_failure, in_brackets, own_frames, raised_at
-from grader.findings.finding import Evidence, Moment
+from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
@@ -100,21 +99,21 @@ def signal_of(exit_code: int) -> signal.Signals | None:
     return found if exit_code < 0 or found.name in TABLE.signals else None
 
 
-def why_ended(recording: Recording, seen: str = "") -> Cause | None:
+def why_ended(recording: Recording, seen: str = "") -> Finding | None:
     """The cause if a process ended early, after what was seen of it; None if none did."""
     ended = exited(recording)
     cause = why_it_exited(recording, ended[0]) if ended else None
     return cause.after(seen) if cause is not None and seen else cause
 
 
-def why_crashed(recording: Recording) -> Cause | None:
+def why_crashed(recording: Recording) -> Finding | None:
     """The cause if a process ended early with a failure; None if none did."""
     ended = crashed(recording)
     return why_it_exited(recording, ended[0]) if ended else None
 
 
 @dataclass(frozen=True)
-class ProcessExit(Symptom[Cause], concept="nodes"):
+class ProcessExit(Symptom[Finding], concept="nodes"):
     """A process ended too early."""
 
     recording: Recording
@@ -173,13 +172,13 @@ class ProcessExit(Symptom[Cause], concept="nodes"):
         return self.process.exit_code == 0 or (self._is_leaving and failed is None)
 
 
-def why_it_exited(recording: Recording, process: Process) -> Cause:
+def why_it_exited(recording: Recording, process: Process) -> Finding:
     """Why a process ended early, with its exception and the student's line if there is one."""
     return cause_of(ProcessExit(recording, process))
 
 
 @explanation(ProcessExit)
-def main_returned(symptom: ProcessExit) -> Cause | None:
+def main_returned(symptom: ProcessExit) -> Finding | None:
     """main() returns: there is no node or no rclpy.spin(), or spin_once() or sys.exit() ends it."""
     recording, name = symptom.recording, symptom.process.name
     if not symptom.returned:
@@ -189,7 +188,7 @@ def main_returned(symptom: ProcessExit) -> Cause | None:
         how = " before a node was created"
     elif declarations.never_spun(recording, name):
         how = " without rclpy.spin()"
-    return Cause(
+    return Finding(
         f"{symptom.seen} with exit code 0: main() returned{how}",
         "main() must call rclpy.init() and create the node. rclpy.spin(node) keeps a node alive "
         "until Ctrl-C. Look for what ends it: spin_once() handles one round only; a daemon thread "
@@ -199,23 +198,23 @@ def main_returned(symptom: ProcessExit) -> Cause | None:
 
 
 @explanation(ProcessExit)
-def limit_exceeded(symptom: ProcessExit) -> Cause | None:
+def limit_exceeded(symptom: ProcessExit) -> Finding | None:
     """It used too much memory, CPU time or output, or did something forbidden."""
     breach = next((item for item in symptom.recording.breaches if item.ended), None)
     if symptom.killed is not signal.SIGKILL or breach is None:
         return None
-    return Cause(f"{symptom.seen}: {breach}", TABLE.hints[breach.what], symptom.evidence)
+    return Finding(f"{symptom.seen}: {breach}", TABLE.hints[breach.what], symptom.evidence)
 
 
 @explanation(ProcessExit)
-def launch_file_not_installed(symptom: ProcessExit) -> Cause | None:
+def launch_file_not_installed(symptom: ProcessExit) -> Finding | None:
     """The launch file is not installed: data_files in setup.py or install() in CMake lacks it."""
     lines = (_NO_LAUNCH_FILE.search(line) for line in symptom.evidence.log)
     found = next(filter(None, lines), None)
     if found is None or symptom.failure is not None:
         return None
     name, package = found["file"], found["package"]
-    return Cause(
+    return Finding(
         f"{symptom.seen}: the package {code(package)} installed no {code(name)}",
         f"Name the launch file {code(name)}, and install it: "
         f"('share/{package}/launch', glob('launch/*')) in data_files of setup.py, or "
@@ -225,7 +224,7 @@ def launch_file_not_installed(symptom: ProcessExit) -> Cause | None:
 
 
 @explanation(ProcessExit)
-def parameter_file_unreadable(symptom: ProcessExit) -> Cause | None:
+def parameter_file_unreadable(symptom: ProcessExit) -> Finding | None:
     """ROS cannot read a parameter file, such as one with `ros_parameters` for `ros__parameters`."""
     lines = (_PARAMETER_FILE.search(line) for line in symptom.evidence.log)
     found = next(filter(None, lines), None)
@@ -241,7 +240,7 @@ def parameter_file_unreadable(symptom: ProcessExit) -> Cause | None:
             "Write `ros__parameters:`, with two underscores, below the node's name, and indent the "
             "parameters below it."
         )
-    return Cause(
+    return Finding(
         f"{symptom.seen}: ROS cannot read the parameter file {code(file)}: {found['why']}",
         hint,
         replace(symptom.evidence, places=(SourceError(file, line, found["why"]),)),
@@ -249,7 +248,7 @@ def parameter_file_unreadable(symptom: ProcessExit) -> Cause | None:
 
 
 @explanation(ProcessExit)
-def ended_by_signal(symptom: ProcessExit) -> Cause | None:
+def ended_by_signal(symptom: ProcessExit) -> Finding | None:
     """A signal ended it, such as SIGSEGV, or it ended with an exit code and no traceback."""
     if symptom.failure is not None:
         return None
@@ -258,17 +257,17 @@ def ended_by_signal(symptom: ProcessExit) -> Cause | None:
         killed.name if killed else "",
         "Run it by hand with `ros2 run` and look at its last lines of output.",
     )
-    return Cause(f"{symptom.seen} with {exit_words(symptom.process.exit_code)}", hint, evidence)
+    return Finding(f"{symptom.seen} with {exit_words(symptom.process.exit_code)}", hint, evidence)
 
 
 @explanation(ProcessExit)
-def service_without_response(symptom: ProcessExit) -> Cause | None:
+def service_without_response(symptom: ProcessExit) -> Finding | None:
     """The callback of a service does not return its response."""
     failure = symptom.failure
     if not failure or failure.type != "TypeError" or failure.frames[-1].where != "send_response":
         return None
     # The deepest line of the student's is that of spin(), which is right.
-    return Cause(
+    return Finding(
         f"{symptom.seen} with {failure}: a service's callback did not return a response",
         "End the service's callback with `return response`: return the object that it was given.",
         symptom.evidence,
@@ -276,7 +275,7 @@ def service_without_response(symptom: ProcessExit) -> Cause | None:
 
 
 @explanation(ProcessExit, only=PYTHON)
-def hides_what_node_has(symptom: ProcessExit) -> Cause | None:
+def hides_what_node_has(symptom: ProcessExit) -> Finding | None:
     """A method or an attribute has a name that Node uses itself, such as handle or executor."""
     failure = symptom.failure
     if not failure or not failure.frames or "/rclpy/" not in failure.frames[-1].file:
@@ -296,7 +295,7 @@ def hides_what_node_has(symptom: ProcessExit) -> Cause | None:
     name, place = next((pair for pair in places if _OF_NODE.fullmatch(pair[0])), ("", None))
     if place is None:
         return None
-    return Cause(
+    return Finding(
         f"{symptom.seen} with {failure}: your class replaces {code(name)} of Node"
         f"{in_brackets(place)}",
         f"Node needs its own {code(name)}. Choose another name for yours.",
@@ -305,24 +304,22 @@ def hides_what_node_has(symptom: ProcessExit) -> Cause | None:
 
 
 @explanation(ProcessExit)
-def machine_lacks_it(symptom: ProcessExit) -> Cause | None:
+def machine_lacks_it(symptom: ProcessExit) -> Finding | None:
     """It needs something of ROS 2 or of its Python that the machine lacks; this costs no points."""
     failure, recording = symptom.failure, symptom.recording
     lacking = failure and (newer_name(failure, recording) or lacking_here(failure, recording))
     if not lacking:
         return None
     name, needs = lacking
-    return Cause(
+    return Finding.ours(
         f"{symptom.seen}: it uses {code(name)}{in_brackets(symptom.place)}: ROS 2 Jazzy has "
         "it, but it is not installed on the machine that grades",
         f"You lose no points for it. Tell your instructor that it needs {needs}.",
-        symptom.evidence,
-        ours=True,
     )
 
 
 @explanation(ProcessExit, general=True)
-def raised(symptom: ProcessExit) -> Cause | None:
+def raised(symptom: ProcessExit) -> Finding | None:
     """An exception ended it: see the list of exceptions below."""
     failure = symptom.failure
     if failure is None:
@@ -330,19 +327,19 @@ def raised(symptom: ProcessExit) -> Cause | None:
     where = in_brackets(symptom.place)
     if failure.compiled and failure.frames and not where:
         where = f" in {code(failure.frames[-1].where)}"
-    return Cause(
+    return Finding(
         f"{symptom.seen} with {failure}{where}",
         cause_of(Raised(failure, symptom.recording)),
         replace(symptom.evidence, places=(symptom.place,) if symptom.place else ()),
     )
 
 
-def offence(recording: Recording) -> Cause | None:
+def offence(recording: Recording) -> Finding | None:
     """A forbidden action of the processes, also where they ended before it was seen."""
     for breach in recording.breaches:
         if not breach.allowed:
             moment = Moment(breach.what, recording.since_launch_s(breach.time_ns))
-            return Cause(str(breach), TABLE.hints[breach.what], Evidence(moments=(moment,)))
+            return Finding(str(breach), TABLE.hints[breach.what], Evidence(moments=(moment,)))
     return None
 
 
