@@ -1,8 +1,8 @@
 """The documentation that is made from the code: ``python -m grader.docs [--check]``.
 
 ``docs/assignment-yaml.md`` comes from the models of the YAML, ``docs/checks.md`` and a page for
-each family from the catalogue of checks, ``docs/recording.md`` from the model of a recording.
-Nothing in them is typed twice; with ``--check`` a stale file is an error.
+each family from the catalogue of checks, ``docs/recording.md`` and ``docs/finding.md`` from what a
+check gets and returns. Nothing in them is typed twice; with ``--check`` a stale file is an error.
 """
 
 from __future__ import annotations
@@ -111,11 +111,17 @@ _EXAMPLES = {
     Dimension.RATIO: "5 %",
     Dimension.SIZE: "64 MiB",
 }
-_RECORDED = (
-    *(recording.Recording, recording.Message, *dict.fromkeys(FACTS.values())),
-    *(recording.Qos, interaction.Feedback, simulated.Scene),
-)
-_FOUND = (finding.Finding, finding.Evidence, finding.Moment, finding.Plot, finding.Table)
+# Page -> the classes that an own check works with, in the order of reading.
+_CLASSES = {
+    "recording.md": (
+        *(recording.Recording, recording.Message, *dict.fromkeys(FACTS.values())),
+        *(recording.Qos, interaction.Feedback, simulated.Scene),
+    ),
+    "finding.md": (
+        finding.Finding,
+        *(finding.Evidence, finding.Moment, finding.Plot, finding.Table),
+    ),
+}
 _READABLE = (FunctionType, property, cached_property)
 _TYPES = {
     "string": "text",
@@ -181,9 +187,12 @@ def explanations_markdown() -> str:
     return _rendered("explanations.md", symptoms=sorted(symptoms, key=lambda item: item[0]))
 
 
-def recording_markdown() -> str:
-    """What an own check can look at, and what it returns."""
-    return _rendered("recording.md", recorded=_RECORDED, found=_FOUND, class_section=_class_section)
+def classes_markdown() -> dict[str, str]:
+    """What an own check can look at, and what it returns, by page."""
+    return {
+        page: _rendered(page, classes=classes, class_section=_class_section)
+        for page, classes in _CLASSES.items()
+    }
 
 
 def _rendered(name: str, **values: Any) -> str:
@@ -317,7 +326,7 @@ def documents() -> dict[str, str]:
         **assignment_markdown(),
         **checks_markdown(),
         "explanations.md": explanations_markdown(),
-        "recording.md": recording_markdown(),
+        **classes_markdown(),
     }
 
 

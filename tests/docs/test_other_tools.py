@@ -1,4 +1,4 @@
-"""What docs/recording.md shows of other tools is run as it stands there."""
+"""What docs/other-tools.md shows of other tools is run as it stands there."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from grader import resources
 from tests.recording.written import write_robot_run
 
-PAGE = resources.PACKAGE.parent / "docs" / "recording.md"
+PAGE = resources.PACKAGE.parent / "docs" / "other-tools.md"
 SHOWN = dict(
     re.findall(r'```python title="with (\w+)"\n(.*?)```', PAGE.read_text("utf-8"), re.DOTALL)
 )
