@@ -7,7 +7,7 @@ import pytest
 from grader.findings.finding import Status
 from grader.recording.event import Breach, Intervention, Wait
 from grader.recording.model import Ending, Kind, Owner
-from grader.submission.record import BuildRecord, SourceError
+from grader.submission.record import BuildRecord, SourceError, SourceFile, SourceFunction
 from tests.checks.builder import (
     BOT,
     INSTALLED,
@@ -26,6 +26,7 @@ from tests.checks.builder import (
     node,
     nodeless,
     output,
+    package,
     process,
     reader,
     recording,
@@ -34,6 +35,7 @@ from tests.checks.builder import (
     text,
     traceback,
 )
+from tests.checks.requests import service
 
 
 def crashed(printed="", exit_code=1, **changes):
@@ -147,6 +149,17 @@ class TestExists:
         assert "with TypeError: a service's callback did not return a response" in finding.observed
         assert "`return response`" in finding.hint
         assert finding.evidence.places == ()
+        told = (declared("ran", 1.0, callback="Bot.enable", serves="/enable"),)
+        enable = SourceFile(SOURCE, "node", functions=(SourceFunction("Bot.enable", 31),))
+        named = replace(
+            run,
+            services=(service(),),
+            declarations=told,
+            submission=submission(package(sources=(enable,))),
+        )
+        finding = judge("node.exists", named, name=NODE)
+        assert finding.observed.endswith(f"did not return a response ({SOURCE}:31)")
+        assert [place.line for place in finding.evidence.places] == [31]
 
     @pytest.mark.parametrize(
         ("exit_code", "words"),

@@ -12,8 +12,19 @@ from grader.diagnosis.explanation import Explanation, cause_of, explanations, in
 from grader.diagnosis.no_messages import FewMessages, NoMessages
 from grader.diagnosis.process.exceptions import CPP_ROWS, TABLE, Raised, Row
 from grader.diagnosis.process.failure import Failure, Frame
+from grader.diagnosis.process.process_exit import why_it_exited
 from grader.docs import explanations_markdown
-from tests.checks.builder import declared, package, recording, submission
+from grader.submission.record import SourceFile
+from tests.checks.builder import (
+    INSTALLED,
+    SOURCE,
+    declared,
+    died,
+    output,
+    package,
+    recording,
+    submission,
+)
 
 ALL = [(symptom, entry) for symptom, entries in explanations().items() for entry in entries]
 
@@ -152,6 +163,33 @@ def test_the_fields_that_a_message_has_are_listed() -> None:
     run = recording(declarations=(declared("exiting", 2.0, fields="x y z"),))
     raised = Raised(Failure("AttributeError", "'Vector3' object has no attribute 'w'", ()), run)
     assert cause_of(raised) == "`Vector3` has the fields `x`, `y` and `z`."
+
+
+def test_a_stamp_without_to_msg_is_told_at_the_line_that_sets_it() -> None:
+    sources = SourceFile(
+        SOURCE,
+        "bot_publisher.node",
+        sets=(("msg.header.stamp", 8), ("self.time", 9), ("self.out.header.stamp", 12)),
+    )
+    lines = (
+        *("Traceback (most recent call last):", f'  File "{INSTALLED}", line 14, in tick'),
+        *(
+            "    self.publisher.publish(self.out)",
+            '  File "/opt/rclpy/publisher.py", line 70, in p',
+        ),
+        *("    publish(msg)", "AttributeError: 'Time' object has no attribute 'sec'"),
+    )
+    told = declared("exiting", 2.0, fields="sec nanosec", field="header.stamp")
+    run = recording(
+        submission=submission(package(sources=(sources,))),
+        declarations=(told,),
+        processes=(died(1),),
+        log=output("\n".join(lines)),
+    )
+    cause = why_it_exited(run, run.processes[0])
+    assert f"({SOURCE}:12)" in cause.observed
+    assert [place.line for place in cause.evidence.places] == [12]
+    assert "now().to_msg()" in cause.hint
 
 
 def test_a_module_of_nobody_is_not_looked_for_in_a_package_at_the_top() -> None:

@@ -62,6 +62,38 @@ def test_a_program_that_ends_by_a_missing_field_tells_those_that_are_there() -> 
     assert json.loads(told[-1])["fields"] == "x y z"
 
 
+_SENDS = """
+import rclpy
+from geometry_msgs.msg import PoseStamped, Twist
+from nav_msgs.msg import Path
+from rclpy.clock import Clock
+from std_msgs.msg import Int32
+
+rclpy.init()
+node = rclpy.create_node("bot")
+message = {wrong}
+node.create_publisher(type(message), "topic", 10).publish(message)
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ("wrong", "field"),
+    [
+        ("PoseStamped(); message.header.stamp = Clock().now()", "header.stamp"),
+        (
+            "Path(poses=[PoseStamped()]); message.poses[0].header.stamp = Clock().now()",
+            "poses.header.stamp",
+        ),
+        ("Twist(); message.linear = 1.0", "linear"),
+        ("Int32(); message.data = 1.5", "data"),
+    ],
+)
+def test_a_program_that_cannot_send_a_message_tells_the_field(wrong: str, field: str) -> None:
+    told = map(json.loads, run_traced(_SENDS.replace("{wrong}", wrong), status=1).splitlines())
+    assert [one["field"] for one in told if one["kind"] == "exiting"] == [field]
+
+
 _IMPORTS = """
 import importlib
 import other

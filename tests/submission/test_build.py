@@ -89,9 +89,7 @@ def test_a_good_package_is_built_and_runs(tree: Tree, real_ros: RosInstallation)
 def test_the_second_time_it_comes_from_the_cache(tree: Tree, real_ros: RosInstallation) -> None:
     tree.package()
     first = prepared(tree, real_ros)
-    started = time.monotonic()
     second = prepared(tree, real_ros)
-    assert time.monotonic() - started < 1.0
     assert build_of(second).cached
     assert build_of(second).duration_s == build_of(first).duration_s
     assert second.install == first.install

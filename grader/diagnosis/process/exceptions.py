@@ -18,7 +18,7 @@ from grader.spec.source import Model, read_source
 from grader.submission.record import CPP, PYTHON, PackageRecord, SubmissionRecord
 
 _UNDEFINED = re.compile(r"name '(\w+)' is not defined")
-_NO_ATTRIBUTE = re.compile(r"'(\w+)' object has no attribute '\w+'")
+_NO_ATTRIBUTE = re.compile(r"'(\w+)' object has no attribute '(\w+)'")
 _NO_MODULE = re.compile(r"No module named '(\w+)'$")
 _NO_NAME = re.compile(r"cannot import name '(\w+)' from '([\w.]+)'")
 _MOST_FIELDS = 20
@@ -126,7 +126,8 @@ def no_such_field(symptom: Raised) -> str | None:
     ends = symptom.recording.declared("exiting")
     fields = next((str(one.data["fields"]) for one in ends if "fields" in one.data), "")
     named = [code(one) for one in fields.split() if one.isidentifier()]
-    if found is None or not named:
+    # If it does have the field, this is another class of the same name.
+    if found is None or not named or code(found[2]) in named:
         return None
     return f"{code(found[1])} has the fields {listing(named[:_MOST_FIELDS])}."
 

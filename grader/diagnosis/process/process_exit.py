@@ -12,7 +12,13 @@ from grader.diagnosis.process.exceptions import Raised
 from grader.diagnosis.process.failure import Failure
 from grader.diagnosis.process.missing_library import lacking_here
 from grader.diagnosis.process.newer_names import newer_name
-from grader.diagnosis.process.raised import fatal_failure, in_brackets, own_frames, raised_at
+from grader.diagnosis.process.raised import (
+    defined_at,
+    fatal_failure,
+    in_brackets,
+    own_frames,
+    raised_at,
+)
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code
 from grader.measure import declarations
@@ -267,10 +273,19 @@ def service_without_response(symptom: ProcessExit) -> Finding | None:
     if not failure or failure.type != "TypeError" or failure.frames[-1].where != "send_response":
         return None
     # The deepest line of the student's is that of spin(), which is right.
+    recording, name = symptom.recording, symptom.process.name
+    services = {one.name for one in recording.services}
+    calls = [
+        str(one.data.get("callback"))
+        for one in recording.declared("ran")
+        if one.process == name and one.data.get("serves") in services
+    ]
+    place = defined_at(calls[-1], str(failure), recording.submission) if calls else None
     return Finding(
-        f"{symptom.seen} with {failure}: a service's callback did not return a response",
+        f"{symptom.seen} with {failure}: a service's callback did not return a response"
+        f"{in_brackets(place)}",
         "End the service's callback with `return response`: return the object that it was given.",
-        symptom.evidence,
+        replace(symptom.evidence, places=(place,) if place else ()),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 from grader.diagnosis.process.crash import parse_crashes
 from grader.diagnosis.process.failure import Failure, Frame
@@ -132,11 +133,16 @@ def student_place(failure: Failure, submission: SubmissionRecord) -> SourceError
 
 
 def raised_at(failure: Failure, recording: Recording) -> SourceError | None:
-    """The student's line to correct: of what rclpy raised in spin(), that of the callback."""
+    """The student's line to correct, where rclpy raised it.
+
+    In spin() it is that of the callback, in publish() that which set the field.
+    """
     submission, place = recording.submission, student_place(failure, recording.submission)
     frame = _student_frame(failure, submission)
-    if frame is None or "spin" not in frame.source or frame is failure.frames[-1]:
+    if frame is None or place is None or frame is failure.frames[-1]:
         return place
+    if "spin" not in frame.source:
+        return _set_at(place, recording) or place
     called = (
         defined_at(name, str(failure), submission) for name in _CALLED.findall(failure.message)
     )
@@ -150,6 +156,24 @@ def raised_at(failure: Failure, recording: Recording) -> SourceError | None:
         if given and timer.data.get("callback") == given[1] and path and isinstance(line, int):
             return SourceError(path, line, str(failure))
     return place
+
+
+def _set_at(published: SourceError, recording: Recording) -> SourceError | None:
+    """The line that gave a field a value of another type, as the process declares the field."""
+    told = (one.data.get("field") for one in recording.declared("exiting"))
+    field = str(next(filter(None, told), "")).split(".")[::-1]
+    best: tuple[tuple[int, bool, bool, int], SourceError] | None = None
+    for package in recording.submission.packages:
+        for file in package.sources:
+            for target, line in file.sets:
+                parts = zip(target.split(".")[:0:-1], field, strict=False)
+                alike = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], parts))
+                # Of two in the same file the one before the message is published.
+                own = file.path == published.file
+                rank = (alike, own, own and line <= (published.line or 0), line)
+                if alike and (best is None or rank > best[0]):
+                    best = rank, SourceError(file.path, line, published.message)
+    return best and best[1]
 
 
 def defined_at(name: str, message: str, submission: SubmissionRecord) -> SourceError | None:

@@ -45,10 +45,11 @@ _IMPORTED = 100_000
 def _exit() -> None:
     """Report that Python ends in its usual way: by the program's end or an exception, no signal.
 
-    Where it ends by a field that a message does not have, the fields that it has.
+    Where it ends by a field that a message does not have, the fields that it has; where by one that
+    holds a value of another type, this one.
     """
-    fields = quietly(_fields)
-    report("exiting", **({"fields": fields} if fields else {}))
+    told = {"fields": quietly(_fields), "field": quietly(_unsent)}
+    report("exiting", **{name: text for name, text in told.items() if text})
     if "rosgrade_rclpy" in sys.modules:
         quietly(sys.modules["rosgrade_rclpy"].flush)
 
@@ -63,6 +64,33 @@ def _fields() -> str | None:
     modules = [module for path, module in sys.modules.items() if path.endswith(".msg")]
     kind = next(getattr(module, name) for module in modules if hasattr(module, name))
     return " ".join(kind.get_fields_and_field_types())
+
+
+def _unsent() -> str | None:
+    """The field, such as ``header.stamp``, for which a message could not be sent, or None."""
+    trace: Any = sys.last_traceback
+    while trace.tb_next is not None:
+        trace = trace.tb_next
+    for value in trace.tb_frame.f_locals.values():
+        if not isinstance(value, type) and hasattr(value, "get_fields_and_field_types"):
+            return _of_other_type(value)
+    return None
+
+
+def _of_other_type(message: Any) -> str | None:
+    """The first field of a message that holds no message, or no integer, where it must."""
+    for name, kind in message.get_fields_and_field_types().items():
+        value = getattr(message, name)
+        if kind.lstrip("u").startswith("int") and kind[-1].isdigit():
+            if not hasattr(value, "__index__"):
+                return str(name)
+        elif "/" in kind:
+            for one in value if kind[-1] in ">]" else [value]:
+                if not hasattr(one, "get_fields_and_field_types"):
+                    return str(name)
+                if inner := _of_other_type(one):
+                    return f"{name}.{inner}"
+    return None
 
 
 def _count_more_cpus() -> None:
