@@ -7,7 +7,7 @@ would end as an error, or as a failure, for every student.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import singledispatch
 from graphlib import CycleError, TopologicalSorter
@@ -16,11 +16,7 @@ from typing import Any
 from grader.assignment.binding import BoundCheck
 from grader.assignment.model import SHOWN_FROM, Assignment, CheckSpec, Launch, Package, Scenario
 from grader.assignment.repeat import runs_of
-from grader.assignment.stimuli.kinds.request import (
-    CallService,
-    SendGoal,
-    SetParameters,
-)
+from grader.assignment.stimuli.stimulus_model import StimulusModel
 from grader.checks import need as needs
 from grader.checks.check import Subject
 from grader.errors import GraderFault, Problem
@@ -236,7 +232,7 @@ def _(need: needs.Recorded, user: _User) -> Iterator[_Lack]:
     for scenario in user.scenarios:
         recorded = scenario.recorded_types
         if need.or_sent:
-            sent = (one.exchanged for one in scenario.stimuli if one.key == "publish")
+            sent = (one.exchanged for one in _doing(needs.Act.PUBLISH, scenario))
             recorded.update(filter(None, sent))
         if topic not in recorded:
             text = f"the scenario {scenario.id!r} does not record {topic!r}."
@@ -250,7 +246,7 @@ def _(need: needs.Recorded, user: _User) -> Iterator[_Lack]:
 def _(need: needs.SentOrOwn, user: _User) -> Iterator[_Lack]:
     topic, own = user.value(need.topic), user.value(need.own)
     for scenario in user.scenarios:
-        given = {one.subject for one in scenario.stimuli if one.key == "publish"}
+        given = {one.subject for one in _doing(needs.Act.PUBLISH, scenario)}
         if scenario.world is not None:
             robot = scenario.model_copy(update={"record": ()})
             given |= {*robot.recorded_types} - {scenario.topics.command.topic}
@@ -280,58 +276,30 @@ def _(need: needs.OwnTransform, user: _User) -> Iterator[_Lack]:
 
 @_lacks.register
 def _(need: needs.Stimulated, user: _User) -> Iterator[_Lack]:
-    for scenario in user.scenarios:
-        names = _subjects(scenario, *need.keys)
-        yield from _unnamed(user, need.parameter, scenario, names, need.does)
-
-
-@_lacks.register
-def _(need: needs.Called, user: _User) -> Iterator[_Lack]:
-    if user.value(need.service) is None:
+    if user.value(need.parameter) is None:
         return
-    service, key = user.value(need.service) + need.suffix, ("with", need.service)
+    wanted, key = user.value(need.parameter) + need.suffix, ("with", need.parameter)
+    having, fields = str(need.having).partition(":")[0], user.value(need.fields) or {}
     for scenario in user.scenarios:
-        calls = [one for one in scenario.stimuli if isinstance(one, CallService)]
-        mine = [one for one in calls if one.call == service]
-        names = [one.call for one in calls]
-        yield from _unnamed(user, need.service, scenario, names, "asks", service)
-        if mine and all(one.at_once < need.at_once for one in mine):
-            text = f"the scenario {scenario.id!r} never calls it twice at once: add 'at_once: 2'"
-            yield key, text
-        fields = user.value(need.request) or {}
-        waits_s = [one.within for one in mine if _has_fields(fields, one.sequence)]
-        yield from _impatient(user, scenario, need.within, waits_s)
-
-
-@_lacks.register
-def _(need: needs.GoalSent, user: _User) -> Iterator[_Lack]:
-    action = user.value(need.action)
-    for scenario in user.scenarios:
-        goals = [one for one in scenario.stimuli if isinstance(one, SendGoal)]
-        mine = [one for one in goals if one.send_goal == action]
-        names = [one.send_goal for one in goals]
-        yield from _unnamed(user, need.action, scenario, names, "asks")
-        if need.having is not None and mine and not any(getattr(g, need.having) for g in mine):
-            text = f"no goal of the scenario {scenario.id!r} has {need.having!r}"
-            yield ("with", need.action), text
-        fields = user.value(need.goal)
-        waits_s = [one.within for one in mine if _has_fields(fields, [one.goal])]
-        yield from _impatient(user, scenario, need.within, waits_s)
+        able = _doing(need.act, scenario)
+        mine = [one for one in able if one.subject == wanted]
+        does = f"no stimulus of the scenario {scenario.id!r} {need.act.value} {wanted!r}"
+        if not mine:
+            yield key, f"{does}." + nearest_or_all(wanted, [one.subject for one in able])
+        elif need.having and not any(one.differs_in(having) for one in mine):
+            yield key, f"{does} with {having!r}: add '{need.having}'"
+        yield from _impatient(user, scenario, need.within, [one for one in mine if one.has(fields)])
 
 
 @_lacks.register
 def _(need: needs.ParameterSet, user: _User) -> Iterator[_Lack]:
+    yield from _lacks(needs.Stimulated(needs.Act.SET_PARAMETERS, need.node), user)
     node, name, wanted = map(user.value, (need.node, need.name, need.value))
     for scenario in user.scenarios:
-        nodes = _subjects(scenario, "set_parameters")
-        yield from _unnamed(user, need.node, scenario, nodes, "asks")
-        tried = [
-            one.set_parameters[name]
-            for one in scenario.stimuli
-            if isinstance(one, SetParameters) and one.node == node and name in one.set_parameters
-        ]
+        mine = [one for one in _doing(needs.Act.SET_PARAMETERS, scenario) if one.subject == node]
+        tried = [given[name] for one in mine for given in one.given if name in given]
         drawn = any(isinstance(value, str) for value in tried)
-        if node in nodes and not drawn and not any(same_value(wanted, value) for value in tried):
+        if mine and not drawn and not any(same_value(wanted, value) for value in tried):
             listed = ", ".join(map(repr, tried)) or "nothing"
             text = f"the scenario {scenario.id!r} sets {name!r} to {listed}, never to {wanted!r}"
             yield ("with", need.value), text
@@ -349,8 +317,8 @@ def _(need: needs.ParametersGiven, user: _User) -> Iterator[_Lack]:
                 yield ("with", need.names, index), text + nearest_or_all(name, sorted(given))
 
 
-def _subjects(scenario: Scenario, *keys: str) -> list[str]:
-    return [one.subject for one in scenario.stimuli if one.key in keys]
+def _doing(act: needs.Act, scenario: Scenario) -> list[StimulusModel]:
+    return [one for one in scenario.stimuli if act in one.provides]
 
 
 @_lacks.register
@@ -376,34 +344,14 @@ def _(need: needs.RuffRules, user: _User) -> Iterator[_Lack]:
             yield ("with", need.rules, index), text
 
 
-def _unnamed(
-    user: _User,
-    key: str,
-    scenario: Scenario,
-    names: Sequence[str],
-    does: str,
-    wanted: str | None = None,
-) -> Iterator[_Lack]:
-    """The problem that no stimulus uses the name in a parameter."""
-    wanted = wanted or user.value(key)
-    if wanted is not None and wanted not in names:
-        text = f"no stimulus of the scenario {scenario.id!r} {does} {wanted!r}."
-        yield ("with", key), text + nearest_or_all(wanted, names)
-
-
-def _has_fields(wanted: Mapping[str, Any], given: Sequence[Mapping[str, Any]]) -> bool:
-    """Whether one of some requests has the fields that a check asks for, as both are written."""
-    return any(all(fields.get(key) == item for key, item in wanted.items()) for fields in given)
-
-
 def _impatient(
-    user: _User, scenario: Scenario, key: str | None, waits_s: Iterable[float]
+    user: _User, scenario: Scenario, key: str | None, asking: Iterable[StimulusModel]
 ) -> Iterator[_Lack]:
     """The problem of a stimulus that waits for less time than the check allows."""
     if key is None:
         return
     within_s = user.value(key)
-    short_s = min(waits_s, default=within_s)
+    short_s = min((one.patience_s for one in asking), default=within_s)
     if short_s < within_s:
         short, needed = format_duration(short_s), format_duration(within_s)
         text = f"a stimulus of the scenario {scenario.id!r} waits only {short} for an answer"

@@ -12,6 +12,18 @@ from enum import Enum
 from typing import ClassVar
 
 
+class Act(str, Enum):
+    """What a stimulus does to something that it names; the value is said before the name."""
+
+    PUBLISH = "publishes on"
+    CALL = "calls"
+    SEND_GOAL = "sends a goal to"
+    READ_PARAMETERS = "reads or sets the parameters of"
+    SET_PARAMETERS = "sets parameters of"
+    SERVE = "serves"
+    JOIN = "is a join with the name"
+
+
 @dataclass(frozen=True)
 class Need:
     """Something that must be there for a check to judge anything.
@@ -74,48 +86,23 @@ class OwnTransform(Need):
 
 @dataclass(frozen=True)
 class Stimulated(Need):
-    """A stimulus that is about what a parameter names."""
+    """A stimulus that does something to what a parameter names."""
 
-    words = "a stimulus that {does} `{parameter}`"
+    words = "a stimulus that {act.value} `{parameter}`"
+    act: Act
     parameter: str
-    does: str
-    """What such a stimulus does, before the name."""
-    keys: tuple[str, ...]
-    """Of the stimuli that do."""
-
-
-PUBLISHED = Stimulated("stimulus", "publishes on", ("publish",))
-"""A topic that a stimulus publishes on."""
-
-
-@dataclass(frozen=True)
-class Called(Need):
-    """A service that a stimulus calls."""
-
-    words = "a stimulus that calls `{service}`"
-    service: str = "service"
     suffix: str = ""
-    """Added to the parameter to get the name of the service."""
-    request: str | None = None
-    """Parameter with fields of the requests that are judged."""
+    """Added to the parameter to get the name."""
+    fields: str | None = None
+    """Parameter with fields of the requests or goals that are judged."""
     within: str | None = None
     """Parameter with how long an answer may take: the stimulus must wait as long."""
-    at_once: int = 1
-    """How many calls must be sent at once."""
-
-
-@dataclass(frozen=True)
-class GoalSent(Need):
-    """An action that a stimulus sends a goal to."""
-
-    words = "a stimulus that sends a goal to `{action}`"
-    action: str = "action"
-    goal: str = "goal"
-    """Parameter with fields of the goals that are judged."""
-    within: str | None = None
-    """Parameter with how long the result may take: the stimulus must wait as long."""
     having: str | None = None
-    """Key that one of the goals must have."""
+    """Key that one of these stimuli must have, with a value as an example."""
+
+
+PUBLISHED = Stimulated(Act.PUBLISH, "stimulus")
+"""A topic that a stimulus publishes on."""
 
 
 @dataclass(frozen=True)

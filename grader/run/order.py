@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 from grader.run.process.process_sandbox import ProcessSandbox
+
+if TYPE_CHECKING:
+    from grader.assignment.stimuli.stimulus_model import StimulusModel
 
 ORDER_FILE = "order.pickle"
 RECORDING_FILE = "recording.mcap"
@@ -88,6 +91,7 @@ class CellOrder:
 
     Attributes:
         scratch: Folder of the student: working directory, home and temporary files.
+        stimuli: With their values.
         submission: The submission's facts, as JSON, to go into the recording unread.
         simulator: The simulated robot, or None.
         compiled_tracer: The library that compiled programs are started with, or None.
@@ -101,7 +105,7 @@ class CellOrder:
     environment: dict[str, str]
     prefixes: tuple[str, ...]
     topics: tuple[Topic, ...]
-    stimuli: tuple[dict[str, Any], ...]
+    stimuli: tuple[StimulusModel, ...]
     until: Until
     limits: RunLimits
     scratch: str

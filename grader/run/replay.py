@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +24,7 @@ from grader.submission.record import SubmissionRecord
 
 if TYPE_CHECKING:
     from grader.assignment.model import Assignment, Scenario
+    from grader.assignment.stimuli.kinds.publish import Publish
 
 _DEFAULT = Qos("reliable", "volatile")
 _DEPTH = 1000
@@ -35,39 +35,24 @@ _AFTERMATH_S = 0.5
 _ENDING_LIMIT_S = 20.0
 
 
-@dataclass(frozen=True)
-class Input:
-    """The messages of one topic, in the place of a stimulus that publishes them."""
+def published(messages: Sequence[RawMessage], qos: Qos, recording: Recording) -> Publish:
+    """The messages of one topic as a stimulus; what a late joiner gets comes before the launch."""
+    from grader.assignment.stimuli.kinds.publish import Publish
 
-    messages: Sequence[RawMessage]
-    qos: Qos
-    recording: Recording
-    key = "publish"
-
-    @property
-    def exchanged(self) -> tuple[str, str]:
-        """The topic and its type."""
-        return self.messages[0].topic, self.messages[0].type
-
-    def order(self, _making: Any) -> dict[str, Any]:
-        """The messages with their times; what a late joiner gets goes out before the launch."""
-        recording = self.recording
-        latched = self.qos.durability == "transient_local"
-        early = [one for one in self.messages if latched and one.stamp_ns < recording.launched_ns]
-        later = self.messages[len(early) :]
-        after_s = (later[0].stamp_ns - began_ns(recording)) / NS if later else 0.0
-        return {
-            "kind": "PublishOrder",
-            "topic": self.exchanged[0],
-            "type": self.exchanged[1],
-            "reliability": self.qos.reliability,
-            "durability": self.qos.durability,
-            "depth": _DEPTH,
-            "messages": [one.cdr for one in self.messages],
-            "times_s": [one.stamp_ns / NS for one in self.messages],
-            "before_launch": len(early),
-            "after_s": max(0.0, after_s),
-        }
+    latched = qos.durability == "transient_local"
+    early = [one for one in messages if latched and one.stamp_ns < recording.launched_ns]
+    later = messages[len(early) :]
+    after_s = (later[0].stamp_ns - began_ns(recording)) / NS if later else 0.0
+    offered: Any = {"reliability": qos.reliability, "durability": qos.durability}
+    stimulus = Publish.model_construct(
+        publish=messages[0].topic,
+        type=messages[0].type,
+        depth=_DEPTH,
+        before_launch=len(early),
+        after=max(0.0, after_s),
+        **offered,
+    )
+    return stimulus.sending((one.cdr, one.stamp_ns / NS) for one in messages)
 
 
 def began_ns(recording: Recording) -> int:
@@ -97,19 +82,19 @@ def replay_scenario(file: Path, recording: Recording, assignment: Assignment) ->
         for endpoint in recording.endpoints
         if endpoint.owner is Owner.PROBE and endpoint.kind is Kind.PUBLISHER
     }
-    published = {one.topic: one.type for one in recording.student_endpoints(Kind.PUBLISHER)}
+    types = {one.topic: one.type for one in recording.student_endpoints(Kind.PUBLISHER)}
     # Every publisher meets the weakest request.
     elapsed_s = (recording.stop_ns - began_ns(recording)) / NS + _AFTERMATH_S
     return scenario.model_copy(
         update={
             "world": None,
             "stimuli": tuple(
-                Input(messages[topic], offered.get(topic, _DEFAULT), recording)
+                published(messages[topic], offered.get(topic, _DEFAULT), recording)
                 for topic in sorted(messages)
             ),
             "record": tuple(
                 RecordedTopic(topic=topic, type=type, reliability="best_effort", depth=_DEPTH)
-                for topic, type in published.items()
+                for topic, type in types.items()
             ),
             "until": Until.model_construct(elapsed=elapsed_s, stimuli="done"),
             "timeout": elapsed_s + _ENDING_LIMIT_S,

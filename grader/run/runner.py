@@ -34,6 +34,7 @@ from grader.submission.record import SubmissionRecord
 if TYPE_CHECKING:
     from grader.assignment.model import Assignment, Launch, Scenario
     from grader.assignment.model import Until as UntilModel
+    from grader.assignment.stimuli.stimulus_model import StimulusModel
     from grader.sandbox.sandbox import Sandbox
 
 _STARTED_EVENTS = ("matched", "stopping", "recorded")
@@ -203,23 +204,24 @@ def _stimuli(
     prefixes: Sequence[str],
     seed: int,
     drawn: Mapping[str, float],
-) -> tuple[dict[str, Any], ...]:
+) -> tuple[StimulusModel, ...]:
+    from grader.assignment.stimuli.kinds.request import AskDeclared
     from grader.assignment.stimuli.message import StimulusError
     from grader.assignment.stimuli.stimulus_model import Making
 
     find = definition_finder(Path(prefix) for prefix in prefixes)
     making = Making(folder, find, seed, drawn, [command.name for command in commands])
-    found = []
+    found: list[StimulusModel] = []
     for item in scenario.stimuli:
         what = f"the stimulus {item.key!r}" + (f" on {item.exchanged[0]}" if item.exchanged else "")
         try:
-            found.append(item.order(making))
+            found.append(item.prepared(making))
         except StimulusError as error:
             raise GraderFault(f"{what}: {error}") from error
         except KeyError as error:
             raise GraderFault(f"{what}: no definition of {error.args[0]} was found") from error
     if given := given_parameters(scenario):
-        found.append({"kind": "DeclaredOrder", "names": given})
+        found.append(AskDeclared(names=tuple(given)))
     return tuple(found)
 
 

@@ -71,10 +71,14 @@ def test_what_fits_is_accepted(found: Found, uses: str, parameters: str) -> None
 @pytest.mark.parametrize(
     ("uses", "parameters", "expected"),
     [
-        ("service.responds", "service: /enabel", r"asks '/enabel'\. Did you mean '/enable'\?"),
-        ("service.concurrent", "service: /enable, takes: 1 s", "never calls it twice at once"),
+        ("service.responds", "service: /enabel", r"calls '/enabel'\. Did you mean '/enable'\?"),
+        (
+            "service.concurrent",
+            "service: /enable, takes: 1 s",
+            "with 'at_once': add 'at_once: 2'",
+        ),
         ("action.result", "action: /fib, within: 11 s", "waits only 10 s for an answer"),
-        ("lifecycle.state", "node: other, states: [active]", "asks '/other/get_state'"),
+        ("lifecycle.state", "node: other, states: [active]", "calls '/other/get_state'"),
         ("parameter.declared", "node: bto, name: x", r"Did you mean '/bot'\?"),
         ("parameter.set", "node: bot, name: speed, value: 0.6", "to 0.5, never to 0.6"),
         (
@@ -82,7 +86,7 @@ def test_what_fits_is_accepted(found: Found, uses: str, parameters: str) -> None
             "topic: /speed, source: /sped, fields: {data: data}, tolerance: 0.1",
             r"does not record '/sped'\. Did you mean '/speed'\?",
         ),
-        ("action.cancels", "action: /fib", "no goal of the scenario 'run' has 'cancel_after'"),
+        ("action.cancels", "action: /fib", "to '/fib' with 'cancel_after': add '"),
         ("source.ruff", "package: bot, rules: [F, F999999]", "ruff has no rule 'F999999'"),
     ],
 )

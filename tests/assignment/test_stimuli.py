@@ -171,7 +171,8 @@ def read(folder: Path, **keys: object) -> list[tuple[dict[str, object], float]]:
     model = Publish.model_validate(
         {"publish": "/goal", "type": "geometry_msgs/msg/Vector3", **keys}
     )
-    return list(model.due(Making(folder, DEFINITIONS.__getitem__, 7, {"goal": 1.5}, [])))
+    making = Making(folder, DEFINITIONS.__getitem__, 7, {"goal": 1.5}, [])
+    return list(model.prepared(making).due)
 
 
 def test_a_csv_file_has_a_message_in_each_row(folder: Path) -> None:
@@ -344,14 +345,14 @@ def test_requests_have_values_in_si_units_and_drawn_ones() -> None:
             "count": 2,
         }
     )
-    first, second = call.order(MAKING)["requests"]
+    first, second = call.prepared(MAKING).requests
     assert first == second == {"to": {"x": 1.5, "y": pytest.approx(3.14159265)}}
 
 
 def test_the_type_of_a_parameter_is_that_of_the_yaml() -> None:
     given = {"a": 1, "b": 1.0, "c": "2 m", "d": True, "e": "text", "f": [1, 2.5], "g": "$speed"}
     item = SetParameters.model_validate({"set_parameters": given, "node": "bot"})
-    found = item.order(MAKING)["values"]
+    found = item.prepared(MAKING).set_parameters
     assert found == {"a": 1, "b": 1.0, "c": 2.0, "d": True, "e": "text", "f": [1, 2.5], "g": 1.5}
     assert [type(found[name]) for name in "abcd"] == [int, float, float, bool]
 
@@ -397,5 +398,5 @@ def test_a_server_that_does_not_fit_is_named(found: Found, stimulus: str, expect
 def test_a_goal_takes_as_long_as_its_feedback() -> None:
     values = {"serve": "/go", "type": "x/action/Drive"}
     answers = ({"feedback": [{}, {}], "every": "250 ms"}, {"takes": "forever"})
-    order = ServeAction.model_validate({**values, "answers": answers}).order(MAKING)
-    assert [one["takes"] for one in order["answers"]] == [0.5, math.inf]
+    played = ServeAction.model_validate({**values, "answers": answers}).prepared(MAKING)
+    assert [one.takes_s for one in played.answers] == [0.5, math.inf]

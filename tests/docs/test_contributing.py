@@ -108,5 +108,5 @@ def test_a_new_stimulus_is_valid_described_and_played(copy: Path) -> None:
         "from grader.docs import assignment_markdown\n"
         "from grader.run.stimuli.player import PLAYS\n"
         "assert '## wait' in assignment_markdown()['stimuli.md']\n"
-        "assert 'WaitOrder' in [order.__name__ for order in PLAYS]\n",
+        "assert 'Wait' in [model.__name__ for model in PLAYS]\n",
     )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, TypeVar
 
 from grader.assignment.stimuli.message import Find, StimulusError
+from grader.checks.need import Act
 from grader.spec.document import Place
 from grader.spec.nearest_name import nearest_or_all
 from grader.spec.source import Model
@@ -33,7 +35,7 @@ class ScenarioOfStimuli(Protocol):
 
 @dataclass(frozen=True)
 class Making:
-    """The data of an assignment from which the orders of a scenario are made.
+    """The data of an assignment from which the stimuli of a scenario are prepared.
 
     Attributes:
         folder: Of the assignment.
@@ -72,6 +74,8 @@ class StimulusModel(Model):
     """Its heading in the documentation; by default the key."""
     inner: ClassVar[Models] = {}
     """What stands below one of its keys."""
+    provides: ClassVar[tuple[Act, ...]] = ()
+    """What it does to its subject, for the checks that need it."""
 
     @classmethod
     def accepts(cls, value: Mapping[str, Any]) -> bool:
@@ -94,19 +98,37 @@ class StimulusModel(Model):
         interface = getattr(self, "type", None)
         return None if interface is None else (getattr(self, self.key), interface)
 
-    def order(self, making: Making) -> dict[str, Any]:
-        """The order for the cell as plain JSON; ``kind`` names the ``order_type`` that plays it.
+    @property
+    def given(self) -> Sequence[Mapping[str, Any]]:
+        """Fields of the requests or goals that it sends, or the parameters that it sets."""
+        return ()
+
+    @property
+    def patience_s(self) -> float:
+        """How long it waits for an answer."""
+        return float(getattr(self, "within", math.inf))
+
+    def has(self, fields: Mapping[str, Any]) -> bool:
+        """Whether something that it sends has these fields, as both are written."""
+        return any(all(one.get(key) == it for key, it in fields.items()) for one in self.given)
+
+    def differs_in(self, key: str) -> bool:
+        """Whether it has a key with another value than the default."""
+        return bool(getattr(self, key) != type(self).model_fields[key].default)
+
+    def prepared(self, making: Making) -> StimulusModel:
+        """What a cell plays: this stimulus with its values read, drawn and found.
 
         Raises:
             StimulusError: A value does not fit.
             KeyError: The definition of a message is missing.
         """
-        raise NotImplementedError
+        return self
 
     def mistakes(self, making: Making, scenario: ScenarioOfStimuli) -> Iterator[tuple[Place, str]]:
-        """Mistakes that show without a run; by default, that the order cannot be made."""
+        """Mistakes that show without a run; by default, that it cannot be prepared."""
         try:
-            self.order(making)
+            self.prepared(making)
         except StimulusError as error:
             yield error.place, str(error)
         except KeyError:

@@ -16,7 +16,7 @@ from grader.checks.check import (
     stop_if_any,
     toleranced,
 )
-from grader.checks.need import Doubt, GoalSent
+from grader.checks.need import Act, Doubt, Stimulated
 from grader.checks.requests import judged_requests, timeline, why_other_fields
 from grader.diagnosis.no_answer import why_late, why_raised, why_unanswered
 from grader.diagnosis.no_endpoint import ACTION, is_offered
@@ -57,7 +57,7 @@ def exists(recording: Recording, parameters: ActionExists) -> Finding:
 class OfGoals(Parameters):
     """Part of the parameters of every check of goals."""
 
-    needs = (GoalSent(),)
+    needs = (Stimulated(Act.SEND_GOAL, "action"),)
     doubt = Doubt.ANSWER_MISSED
 
     action: TopicName = Field(description="Action that a `send_goal` of the scenario sends to.")
@@ -260,7 +260,7 @@ def _why_other_feedback(recording: Recording, goal: Goal, parameters: FeedbackOf
 class Result(OfGoals):
     """Parameters of action.result."""
 
-    needs = (GoalSent(within="within"),)
+    needs = (Stimulated(Act.SEND_GOAL, "action", fields="goal", within="within"),)
 
     result: dict[str, Any] = Field(
         default_factory=dict,

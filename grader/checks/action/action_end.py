@@ -6,7 +6,7 @@ from pydantic import Field
 
 from grader.checks.action.action import OfGoals, answered_goals, evidence, why_rejected
 from grader.checks.check import Subject, check, stop_if, stop_if_any
-from grader.checks.need import GoalSent
+from grader.checks.need import Act, Stimulated
 from grader.diagnosis.no_answer import why_late
 from grader.diagnosis.no_endpoint import ACTION
 from grader.diagnosis.process.process_exit import why_ended
@@ -22,7 +22,7 @@ from grader.spec.unit import format_duration
 class Cancels(OfGoals):
     """Parameters of action.cancels."""
 
-    needs = (GoalSent(having="cancel_after"),)
+    needs = (Stimulated(Act.SEND_GOAL, "action", having="cancel_after: 1 s"),)
 
     within: Duration = Field(
         1.0, description="Longest time from the cancel request to the end of the goal."
@@ -66,7 +66,7 @@ def _why_not_asked(recording: Recording, goal: Goal) -> Finding | None:
 class Preempts(OfGoals):
     """Parameters of action.preempts."""
 
-    needs = (GoalSent(having="preempt"),)
+    needs = (Stimulated(Act.SEND_GOAL, "action", having="preempt: true"),)
 
     within: Duration = Field(
         1.0, description="Longest time from the new goal to the end of the old one."

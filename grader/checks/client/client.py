@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import Field
 
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
-from grader.checks.need import Doubt, Stimulated
+from grader.checks.need import Act, Doubt, Stimulated
 from grader.checks.requests import why_other_fields
 from grader.diagnosis.no_answer import why_taken
 from grader.diagnosis.not_asked import evidence, why_not_asked
@@ -27,7 +27,7 @@ from grader.spec.unit import format_duration
 class Asks(Parameters):
     """Parameters of client.asks."""
 
-    needs = (Stimulated("server", "serves", ("serve",)),)
+    needs = (Stimulated(Act.SERVE, "server"),)
     doubt = Doubt.ANSWER_MISSED
 
     server: TopicName = Field(description="Service or action of a `serve` of the scenario.")

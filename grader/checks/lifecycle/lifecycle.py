@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.need import Called, Doubt
+from grader.checks.need import Act, Doubt, Stimulated
 from grader.checks.requests import timeline
 from grader.checks.service.service import judged_calls, why_slow
 from grader.diagnosis.no_endpoint import SERVICE, offered
@@ -28,7 +28,7 @@ _TRANSITIONS = ("create", "configure", "cleanup", "activate", "deactivate", *("s
 class State(Parameters):
     """Parameters of lifecycle.state."""
 
-    needs = (Called("node", suffix="/get_state"),)
+    needs = (Stimulated(Act.CALL, "node", suffix="/get_state"),)
     doubt = Doubt.ANSWER_MISSED
 
     node: QualifiedNodeName = Field(

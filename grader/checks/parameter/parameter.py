@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.need import Doubt, ParameterSet, Stimulated
+from grader.checks.need import Act, Doubt, ParameterSet, Stimulated
 from grader.diagnosis.no_parameter import (
     answered_at,
     why_not_asked,
@@ -49,11 +49,7 @@ class OfParameter(Parameters):
 class Declared(OfParameter):
     """Parameters of parameter.declared."""
 
-    needs = (
-        Stimulated(
-            "node", "reads or sets the parameters of", ("read_parameters", "set_parameters")
-        ),
-    )
+    needs = (Stimulated(Act.READ_PARAMETERS, "node"),)
 
     type: Type | None = Field(None, description="Its type; by default any.")
     default: Any = Field(

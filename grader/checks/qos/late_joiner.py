@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.need import Stimulated
+from grader.checks.need import Act, Stimulated
 from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.no_messages import why_few
 from grader.diagnosis.process.process_exit import why_ended
@@ -30,7 +30,7 @@ _ONE_PUBLISHER_HINT = (
 class LateJoiner(Parameters):
     """Parameters of qos.late_joiner."""
 
-    needs = (Stimulated("joiner", "is a join with the name", ("join",)),)
+    needs = (Stimulated(Act.JOIN, "joiner"),)
 
     topic: TopicName = Field(
         description="Fully qualified topic name. If the scenario does not record it, the late "

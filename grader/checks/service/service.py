@@ -18,7 +18,7 @@ from grader.checks.check import (
     stop_if_any,
     toleranced,
 )
-from grader.checks.need import Called, Doubt
+from grader.checks.need import Act, Doubt, Stimulated
 from grader.checks.requests import judged_requests, why_other_fields
 from grader.diagnosis.no_answer import why_late
 from grader.diagnosis.no_endpoint import SERVICE, is_offered
@@ -59,7 +59,7 @@ def exists(recording: Recording, parameters: ServiceExists) -> Finding:
 class Responds(Parameters):
     """Parameters of service.responds."""
 
-    needs = (Called(request="request", within="within"),)
+    needs = (Stimulated(Act.CALL, "service", fields="request", within="within"),)
     doubt = Doubt.ANSWER_MISSED
 
     service: TopicName = Field(description="Service that a `call` of the scenario calls.")
@@ -183,7 +183,7 @@ def _since_s(recording: Recording, call: Call) -> float:
 class Concurrent(Parameters):
     """Parameters of service.concurrent."""
 
-    needs = (Called(at_once=2),)
+    needs = (Stimulated(Act.CALL, "service", having="at_once: 2"),)
     doubt = Doubt.ANSWER_MISSED
 
     service: TopicName = Field(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from typing import Any
 
+from grader.assignment.stimuli.kinds.request import CallService
 from grader.recording.interaction import NO_SERVER
 from grader.recording.model import NS
 from grader.run.host.disturbance import Stopwatch
@@ -22,19 +22,6 @@ _UNCALLABLE_S = 1.0
 """A node that could not be called for so long has no service that shows whether it spins."""
 MARGIN_S = 0.25
 """Every wait lasts a little longer, so that its time has passed on every clock."""
-
-
-@dataclass(frozen=True)
-class CallOrder:
-    """Call a service; ``every_s`` None: the next request after the answer to the one before."""
-
-    service: str
-    type: str
-    requests: tuple[dict[str, Any], ...]
-    at_once: int = 1
-    after_s: float = 0.0
-    every_s: float | None = None
-    within_s: float = 2.0
 
 
 class Readiness:
@@ -116,16 +103,16 @@ class Requesting(Playing):
     @property
     def due_s(self) -> float | None:
         """When to look next."""
-        return None if self.is_done else max(self._order.after_s, self._now_s + _POLL_S)
+        return None if self.is_done else max(self._order.after, self._now_s + _POLL_S)
 
     def holds_up(self, other: Requesting) -> bool:
         """Whether another stimulus has to wait for this one, which is due or written earlier."""
         if self.is_through or self._place == other._place:
             return False
-        if self._order.after_s == other._order.after_s:
+        if self._order.after == other._order.after:
             return self._place < other._place and not self._ready.is_missing
         # On a busy machine a service may be found later than another one that is due later.
-        return bool(self._order.after_s < other._order.after_s)
+        return bool(self._order.after < other._order.after)
 
     @property
     def _is_turn(self) -> bool:
@@ -137,7 +124,7 @@ class Requesting(Playing):
     @property
     def _waits(self) -> bool:
         since = self._since_sent
-        return since is not None and since.elapsed_s < self._order.within_s + MARGIN_S
+        return since is not None and since.elapsed_s < self._order.within + MARGIN_S
 
     def play(self, elapsed_s: float) -> None:
         """Note the time; where an answer is waited for, see whether the node spins meanwhile."""
@@ -147,12 +134,12 @@ class Requesting(Playing):
             self._ready.look()
 
 
-@plays(CallOrder)
+@plays(CallService)
 class Calling(Requesting):
     """Requests to one service, one after another or several at once."""
 
-    def __init__(self, order: CallOrder, context: StimulusContext) -> None:
-        super().__init__(order, f"a service {order.service}", order.service, context)
+    def __init__(self, order: CallService, context: StimulusContext) -> None:
+        super().__init__(order, f"a service {order.call}", order.call, context)
         self._started = False
         self._sent = 0
         self._sent_s = 0.0
@@ -162,20 +149,20 @@ class Calling(Requesting):
     @property
     def is_through(self) -> bool:
         """Whether later requests need not wait; a sequence with its own pace holds up none."""
-        return self.is_done or (self._order.every_s is not None and self._sent > 0)
+        return self.is_done or (self._order.every is not None and self._sent > 0)
 
     @property
     def is_done(self) -> bool:
         """Whether everything was sent, and answered or waited for; or there is no server."""
         if self._failed is not None or self._ready.given_up:
             return True
-        return self._sent >= len(self._order.requests) and self._is_over
+        return self._sent >= len(self._order.given) and self._is_over
 
     @property
     def due_s(self) -> float | None:
         """When to look next."""
-        every_s = self._order.every_s
-        if every_s is not None and 0 < self._sent < len(self._order.requests):
+        every_s = self._order.every
+        if every_s is not None and 0 < self._sent < len(self._order.given):
             return float(self._sent_s + every_s)
         return super().due_s
 
@@ -187,17 +174,17 @@ class Calling(Requesting):
         super().play(elapsed_s)
         if not self._started:
             try:
-                there = calls.is_ready(order.service, order.type)
+                there = calls.is_ready(order.call, order.type)
             except ImportError as error:
                 self._failed = f"the interface {order.type} is not installed ({error})"
                 return
             self._started = self._ready.met(there) and self._is_turn
-        if not self._started or self._sent >= len(order.requests):
+        if not self._started or self._sent >= len(order.given):
             return
         if self._sent and not self._is_next_due:
             return
-        request = order.requests[self._sent]
-        self._round = [calls.send(order.service, order.type, request) for _ in range(order.at_once)]
+        request = order.given[self._sent]
+        self._round = [calls.send(order.call, order.type, request) for _ in range(order.at_once)]
         self._sent += 1
         self._sent_s = elapsed_s
         self._wait_for_answer()
@@ -207,14 +194,14 @@ class Calling(Requesting):
         order, note = self._order, self._context.calls.note_unsent
         if self._failed is not None or self._ready.is_in_vain:
             error = self._failed or NO_SERVER
-            note(order.service, order.type, order.requests[self._sent], error)
+            note(order.call, order.type, order.given[self._sent], error)
         elif self._ready.never_answered and not self._started:
-            note(order.service, order.type, order.requests[0], "", self._ready.there_ns)
+            note(order.call, order.type, order.given[0], "", self._ready.there_ns)
 
     @property
     def _is_next_due(self) -> bool:
-        if self._order.every_s is not None:
-            return bool(self._now_s - self._sent_s >= self._order.every_s)
+        if self._order.every is not None:
+            return bool(self._now_s - self._sent_s >= self._order.every)
         return self._is_over
 
     @property

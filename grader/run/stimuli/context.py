@@ -19,6 +19,7 @@ from grader.run.process.student import StudentProcesses
 from grader.run.stimuli.service_calls import ServiceCalls
 
 if TYPE_CHECKING:
+    from grader.assignment.stimuli.stimulus_model import StimulusModel
     from grader.run.cell.simulator import SimulatedRobot
 
 # A node that has added nothing to the graph for so long has left its constructor, or hangs in it.
@@ -140,7 +141,7 @@ class Playing:
     """One stimulus being played; its clock starts with the first match.
 
     A subclass in a module of this package says with :func:`plays` what it plays. It is created
-    with its order and with the context of the run.
+    with its order, which is the stimulus with its values, and with the context of the run.
     """
 
     answer: str | None = None
@@ -164,7 +165,7 @@ class Playing:
 
     def tick(self, elapsed_s: float | None) -> None:
         """Do what is due; called with the seconds since the first match, or None before it."""
-        if elapsed_s is not None and elapsed_s >= self._order.after_s:
+        if elapsed_s is not None and elapsed_s >= getattr(self._order, "after", 0.0):
             self.play(elapsed_s)
 
     def play(self, elapsed_s: float) -> None:
@@ -189,15 +190,15 @@ class Playing:
         return False
 
 
-PLAYS: dict[type[Any], type[Playing]] = {}
-"""Class of an order -> class of the stimulus that plays it."""
+PLAYS: dict[type[StimulusModel], type[Playing]] = {}
+"""Model of a stimulus -> class that plays it."""
 
 
-def plays(order_type: type[Any]) -> Callable[[type[P]], type[P]]:
-    """Decorator: register a class as the one that plays the orders of a type."""
+def plays(*models: type[StimulusModel]) -> Callable[[type[P]], type[P]]:
+    """Decorator: register a class as the one that plays these stimuli."""
 
     def register(playing: type[P]) -> type[P]:
-        PLAYS[order_type] = playing
+        PLAYS.update(dict.fromkeys(models, playing))
         return playing
 
     return register

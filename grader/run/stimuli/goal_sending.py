@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
+from grader.assignment.stimuli.kinds.request import SendGoal
 from grader.recording.interaction import NO_SERVER, Feedback, Goal
 from grader.run.cell.probe import import_interface
 from grader.run.stimuli.calling import Requesting
@@ -26,32 +27,19 @@ _STATUSES = {
 }
 
 
-@dataclass(frozen=True)
-class GoalOrder:
-    """Send a goal to an action; cancel it ``cancel_after_s`` after it was accepted, or None."""
-
-    action: str
-    type: str
-    goal: dict[str, Any]
-    after_s: float = 0.0
-    cancel_after_s: float | None = None
-    preempt: bool = False
-    within_s: float = 10.0
-
-
-@plays(GoalOrder)
+@plays(SendGoal)
 class SendingGoal(Requesting):
     """One goal, from its sending to its result."""
 
-    def __init__(self, order: GoalOrder, context: StimulusContext) -> None:
+    def __init__(self, order: SendGoal, context: StimulusContext) -> None:
         # Those of the orders before it are there already, and are waited for.
         self._before = [
             item
             for item in context.requests
-            if isinstance(item, SendingGoal) and item._order.action == order.action
+            if isinstance(item, SendingGoal) and item._order.send_goal == order.send_goal
         ]
-        send_goal = f"{order.action}/_action/send_goal"
-        super().__init__(order, f"an action {order.action}", send_goal, context)
+        send_goal = f"{order.send_goal}/_action/send_goal"
+        super().__init__(order, f"an action {order.send_goal}", send_goal, context)
         self._client: Any = None
         self._handle: Any = None
         self._number: int | None = None
@@ -83,8 +71,8 @@ class SendingGoal(Requesting):
 
     def holds_up(self, other: Requesting) -> bool:
         """A goal may wait for the end of another one: it holds up only what is due at once."""
-        same_action = isinstance(other, SendingGoal) and other._order.action == self._order.action
-        is_at_once = self._order.after_s == other._order.after_s
+        same_action = isinstance(other, SendingGoal) and other._order.subject == self._order.subject
+        is_at_once = self._order.after == other._order.after
         return is_at_once and not same_action and super().holds_up(other)
 
     def play(self, elapsed_s: float) -> None:
@@ -109,11 +97,11 @@ class SendingGoal(Requesting):
         self._number = len(self._context.goals)
         self._context.goals.append(
             Goal(
-                order.action,
+                order.send_goal,
                 order.type,
                 goal,
                 sent_ns,
-                cancel_after_s=order.cancel_after_s,
+                cancel_after_s=order.cancel_after,
                 preempts=order.preempt,
                 error=error,
             )
@@ -135,7 +123,7 @@ class SendingGoal(Requesting):
                 self._failed = f"the interface {self._order.type} is not installed ({error})"
                 return False
             node = self._context.probe.node
-            self._client = ActionClient(node, interface, self._order.action)
+            self._client = ActionClient(node, interface, self._order.send_goal)
         return self._ready.met(bool(self._client.server_is_ready()))
 
     @property
@@ -182,7 +170,7 @@ class SendingGoal(Requesting):
         status = _STATUSES.get(self._handle.status)
         if status and (not sent.statuses or sent.statuses[-1][1] != status):
             self._update(statuses=(*sent.statuses, (now_ns, status)))
-        cancel_s = self._order.cancel_after_s
+        cancel_s = self._order.cancel_after
         if cancel_s is None or sent.canceled_ns is not None or self._is_over:
             return
         if now_ns - (sent.answered_ns or now_ns) >= cancel_s * 1e9:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
+from grader.assignment.stimuli.kinds.join import Join as JoinLate
 from grader.recording.model import Join, Qos
 from grader.run.cell.probe import qos_profile
 from grader.run.stimuli.context import Playing, StimulusContext, plays
@@ -15,24 +16,11 @@ _HISTORY_S = 0.5
 _POLL_S = 0.02
 
 
-@dataclass(frozen=True)
-class JoinOrder:
-    """Subscribe late."""
-
-    name: str
-    topic: str
-    type: str
-    reliability: str
-    durability: str
-    depth: int
-    after_s: float
-
-
-@plays(JoinOrder)
+@plays(JoinLate)
 class Joining(Playing):
     """A late joiner."""
 
-    def __init__(self, order: JoinOrder, context: StimulusContext) -> None:
+    def __init__(self, order: JoinLate, context: StimulusContext) -> None:
         super().__init__(order, context)
         self._subscription: Any = None
         self._joined_s = 0.0
@@ -43,7 +31,7 @@ class Joining(Playing):
     def due_s(self) -> float | None:
         """Its time to join; then until it is matched, in short steps."""
         if self._subscription is None:
-            return float(self._order.after_s)
+            return float(self._order.after)
         return None if self.is_done else self._now_s + _POLL_S
 
     @property
@@ -62,10 +50,10 @@ class Joining(Playing):
         if self._subscription is None:
             self._joined_s = elapsed_s
             qos = Qos(order.reliability, order.durability, "keep_last", order.depth)
-            joins[order.name] = Join(order.name, order.topic, order.type, qos, time.time_ns())
+            joins[order.name] = Join(order.name, order.join, order.type, qos, time.time_ns())
             profile = qos_profile(order.reliability, order.durability, order.depth)
             join = self._context.probe.join
-            self._subscription = join(order.name, order.topic, order.type, profile)
+            self._subscription = join(order.name, order.join, order.type, profile)
         elif self._matched_s is None and self._subscription.get_publisher_count():
             self._matched_s = elapsed_s
             joins[order.name] = replace(joins[order.name], matched_ns=time.time_ns())

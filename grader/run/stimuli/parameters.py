@@ -5,11 +5,16 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from rclpy.exceptions import InvalidServiceNameException
 
+from grader.assignment.stimuli.kinds.request import (
+    AskDeclared,
+    ListParameters,
+    ReadParameters,
+    SetParameters,
+)
 from grader.recording.interaction import NO_SERVER
 from grader.run.stimuli.calling import Requesting
 from grader.run.stimuli.context import Playing, StimulusContext, plays
@@ -24,21 +29,11 @@ _TYPES = {
 }
 
 
-@dataclass(frozen=True)
-class ParametersOrder:
-    """Read the parameters of a node, and set some of them, or none."""
-
-    node: str
-    values: dict[str, Any]
-    after_s: float = 0.0
-    within_s: float = 2.0
-
-
-@plays(ParametersOrder)
+@plays(ReadParameters, SetParameters)
 class SettingParameters(Requesting):
     """One round of calls to the parameter services of a node; each waits for the one before."""
 
-    def __init__(self, order: ParametersOrder, context: StimulusContext) -> None:
+    def __init__(self, order: ReadParameters | SetParameters, context: StimulusContext) -> None:
         what = f"parameter services of {order.node}"
         super().__init__(order, what, f"{order.node}/list_parameters", context)
         self._steps: Iterator[int] | None = None
@@ -88,7 +83,7 @@ class SettingParameters(Requesting):
         if names:
             yield self._send("describe_parameters", {"names": names})
             yield self._send("get_parameters", {"names": names})
-        values = self._order.values
+        values: Mapping[str, Any] = next(iter(self._order.given), {})
         if not values:
             return
         wanted = [{"name": name, "value": parameter_value(one)} for name, one in values.items()]
@@ -122,18 +117,11 @@ def parameter_value(value: Any) -> dict[str, Any]:
     return {"type": number + 5, f"{word}_array_value": value}
 
 
-@dataclass(frozen=True)
-class DeclaredOrder:
-    """Ask every node of the student which parameters it declares."""
-
-    names: tuple[str, ...]
-
-
-@plays(DeclaredOrder)
+@plays(AskDeclared)
 class AskingForDeclared(Playing):
     """One call to each node; again while some of the names are not among its answers."""
 
-    def __init__(self, order: DeclaredOrder, context: StimulusContext) -> None:
+    def __init__(self, order: AskDeclared, context: StimulusContext) -> None:
         super().__init__(order, context)
         self._next = 0.0
         self._last: dict[str, int] = {}
@@ -157,13 +145,6 @@ class AskingForDeclared(Playing):
                     self._last[node] = calls.send(service, type_, _EVERY)
 
 
-@dataclass(frozen=True)
-class ListParametersOrder:
-    """Call the parameter services of all nodes of the student."""
-
-    every_s: float
-
-
 def next_call_s(due_s: float, every_s: float, now_s: float) -> float:
     """When to call again: at the next whole period after the time at which this call was due.
 
@@ -173,11 +154,11 @@ def next_call_s(due_s: float, every_s: float, now_s: float) -> float:
     return due_s + every_s * (1 + (now_s - due_s) // every_s)
 
 
-@plays(ListParametersOrder)
+@plays(ListParameters)
 class ListingParameters(Playing):
     """Calls ``list_parameters`` of every node, or what stands in for it; it has no end."""
 
-    def __init__(self, order: ListParametersOrder, context: StimulusContext) -> None:
+    def __init__(self, order: ListParameters, context: StimulusContext) -> None:
         super().__init__(order, context)
         self._next = 0.0
         self._due_s: float | None = None
@@ -189,7 +170,7 @@ class ListingParameters(Playing):
 
     def tick(self, elapsed_s: float | None) -> None:
         """Call when it is due; also before the first match, since a node may be blocked."""
-        now, every_s = time.monotonic(), self._order.every_s
+        now, every_s = time.monotonic(), self._order.every
         if now >= self._next and self._context.is_set_up:
             self._next = next_call_s(self._next or now, every_s, now)
             for name in self._context.student_nodes:

@@ -3,38 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import Any
 
+from grader.assignment.stimuli.stimulus_model import StimulusModel
 from grader.run import stimuli
-from grader.run.stimuli.context import PLAYS, Playing, StimulusContext
+from grader.run.stimuli.context import PLAYS, StimulusContext
 
 for _module in iter_modules(stimuli.__path__):
     if _module.name != "player":
         import_module(f"{stimuli.__name__}.{_module.name}")
-_ORDERS = {order_type.__name__: order_type for order_type in PLAYS}
-
-
-def _played(order: Mapping[str, Any], context: StimulusContext) -> Playing:
-    """The stimulus of an order, of whose tuples JSON made lists."""
-    values = {
-        key: tuple(value) if isinstance(value, list) else value
-        for key, value in order.items()
-        if key != "kind"
-    }
-    order_type = _ORDERS[order["kind"]]
-    kind: Any = PLAYS[order_type]
-    playing: Playing = kind(order_type(**values), context)
-    return playing
 
 
 class Player:
     """Plays every stimulus of a run at its time."""
 
-    def __init__(self, orders: Sequence[Mapping[str, Any]], context: StimulusContext) -> None:
-        self._playing = [_played(order, context) for order in orders]
+    def __init__(self, orders: Sequence[StimulusModel], context: StimulusContext) -> None:
+        self._playing = [PLAYS[type(order)](order, context) for order in orders]
         self._began_s: float | None = None
 
     @property

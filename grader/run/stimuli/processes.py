@@ -4,28 +4,11 @@ from __future__ import annotations
 
 import signal
 import time
-from dataclasses import dataclass
 
+from grader.assignment.stimuli.kinds.process import Kill, Restart
 from grader.recording.event import Intervention
 from grader.run.host.disturbance import Stopwatch
 from grader.run.stimuli.context import Playing, StimulusContext, plays
-
-
-@dataclass(frozen=True)
-class RestartOrder:
-    """End a process (``package/executable``) if it still runs, and start it again."""
-
-    process: str
-    after_s: float
-
-
-@dataclass(frozen=True)
-class KillOrder:
-    """Send a signal to a process (``package/executable``)."""
-
-    process: str
-    signal: str
-    after_s: float
 
 
 class _OfProcess(Playing):
@@ -36,7 +19,7 @@ class _OfProcess(Playing):
     @property
     def due_s(self) -> float | None:
         """Its time; then whenever the cell looks."""
-        return None if self._done else float(self._order.after_s)
+        return None if self._done else float(self._order.after)
 
     @property
     def is_done(self) -> bool:
@@ -45,33 +28,33 @@ class _OfProcess(Playing):
 
     def _note(self, action: str, signal_name: str = "") -> None:
         self._context.interventions.append(
-            Intervention(time.time_ns(), self._order.process, action, signal_name)
+            Intervention(time.time_ns(), self._order.subject, action, signal_name)
         )
 
 
-@plays(KillOrder)
+@plays(Kill)
 class Killing(_OfProcess):
     """Sends a signal to a process."""
 
     @property
     def keeps_run(self) -> bool:
         """Whether it ended the process, which is then meant to be gone."""
-        return self._context.students.was_killed(self._order.process)
+        return self._context.students.was_killed(self._order.subject)
 
     def play(self, elapsed_s: float) -> None:
         """Send the signal once."""
         if not self._done:
             self._done = True
             order = self._order
-            if self._context.students.kill(order.process, signal.Signals[order.signal]):
+            if self._context.students.kill(order.subject, signal.Signals[order.signal]):
                 self._note("kill", order.signal)
 
 
-@plays(RestartOrder)
+@plays(Restart)
 class Restarting(_OfProcess):
     """Ends a process if it still runs, in steps, and starts it again."""
 
-    def __init__(self, order: RestartOrder, context: StimulusContext) -> None:
+    def __init__(self, order: Restart, context: StimulusContext) -> None:
         super().__init__(order, context)
         self._steps = [signal.SIGINT, signal.SIGTERM, signal.SIGKILL]
         self._since: Stopwatch | None = None
@@ -90,7 +73,7 @@ class Restarting(_OfProcess):
         """End it and start it again."""
         if self._done:
             return
-        context, process = self._context, self._order.process
+        context, process = self._context, self._order.subject
         limits = context.limits
         if not context.students.is_running(process):
             self._done = True

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from typing import Any
 
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.serialization import serialize_message
 
+from grader.assignment.stimuli.kinds.publish import Publish
 from grader.measure.compatibility import refusals
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import Kind, Qos
@@ -23,43 +23,20 @@ _POLL_S = 0.02
 _GRACE_S = 0.1
 
 
-@dataclass(frozen=True)
-class PublishOrder:
-    """Publish messages.
-
-    Attributes:
-        repeat_s: Repeat the last one with this period until the end, or None.
-        answer: Wait for a message on this topic before the next, or None.
-    """
-
-    topic: str
-    type: str
-    reliability: str
-    durability: str
-    depth: int
-    messages: tuple[dict[str, Any] | bytes, ...]
-    times_s: tuple[float, ...]
-    before_launch: int = 0
-    after_s: float = 0.0
-    repeat_s: float | None = None
-    answer: str | None = None
-    within_s: float = 1.0
-
-
-@plays(PublishOrder)
+@plays(Publish)
 class Publishing(Playing):
     """A publisher of the probe with its messages."""
 
-    def __init__(self, order: PublishOrder, context: StimulusContext) -> None:
+    def __init__(self, order: Publish, context: StimulusContext) -> None:
         super().__init__(order, context)
-        self._order: PublishOrder = order
-        self.topic = order.topic
+        self._order: Publish = order
+        self.topic = order.publish
         self.answer = order.answer
         self._class = import_interface(order.type)
         self._qos = Qos(reliability=order.reliability, durability=order.durability)
         self._publisher: Any = context.probe.node.create_publisher(
             self._class,
-            order.topic,
+            order.publish,
             qos_profile(order.reliability, order.durability, order.depth),
             # A subscription may be destroyed again before the graph is looked at the next time.
             event_callbacks=PublisherEventCallbacks(
@@ -67,23 +44,23 @@ class Publishing(Playing):
             ),
         )
         self._sent = 0
-        self._patience = Patience(f"a subscription on {order.topic}", context)
+        self._patience = Patience(f"a subscription on {order.publish}", context)
         self._ready_s: float | None = None
         self._next_s: float | None = None
-        self._answers = Answers(order.within_s)
+        self._answers = Answers(order.within)
         self._since_sent = Stopwatch(context.meter)
         self._read = 0
         self._now_s = 0.0
-        for _ in range(min(order.before_launch, len(order.messages))):
+        for _ in range(min(order.before_launch, len(order.due))):
             self._publish()
 
     @property
     def is_done(self) -> bool:
         """Whether everything was published, with its answer; or nothing ever subscribed."""
         order = self._order
-        if order.repeat_s is not None or self._patience.given_up:
+        if not order.has_end or self._patience.given_up:
             return True
-        if self._sent < len(order.messages):
+        if self._sent < len(order.due):
             return False
         self._listen()
         return self._answers.is_over(self._since_sent.elapsed_s)
@@ -92,7 +69,7 @@ class Publishing(Playing):
     def due_s(self) -> float | None:
         """When the next message is due; until something subscribes, in short steps."""
         if self._next_s is None:
-            return max(self._order.after_s, self._now_s + _POLL_S)
+            return max(self._order.after, self._now_s + _POLL_S)
         if self._order.answer and self._sent > self._order.before_launch:
             return max(self._next_s, self._now_s + _POLL_S) if not self.is_done else None
         return self._next_s if self._is_more else None
@@ -115,13 +92,13 @@ class Publishing(Playing):
 
     @property
     def _is_more(self) -> bool:
-        return self._sent < len(self._order.messages) or self._order.repeat_s is not None
+        return self._sent < len(self._order.due) or not self._order.has_end
 
     def _gap_s(self) -> float:
-        times, number = self._order.times_s, self._sent
-        if 0 < number < len(times):
-            return times[number] - times[number - 1]
-        return self._order.repeat_s or 0.0
+        due, number = self._order.due, self._sent
+        if 0 < number < len(due):
+            return due[number][1] - due[number - 1][1]
+        return 0.0 if self._order.has_end else float(self._order.every or 0.0)
 
     def _await_listener(self, elapsed_s: float) -> None:
         if not self._patience.look(self._is_listened_to()):
@@ -136,7 +113,7 @@ class Publishing(Playing):
         """Whether every subscription of the student's that can match has, and there is one."""
         able = [
             item
-            for item in self._context.endpoints(Kind.SUBSCRIPTION, self._order.topic)
+            for item in self._context.endpoints(Kind.SUBSCRIPTION, self._order.publish)
             if item.type == self._order.type and not refusals(self._qos, item.qos)
         ]
         matched = self._publisher.get_subscription_count()
@@ -153,7 +130,7 @@ class Publishing(Playing):
 
     def _publish(self) -> None:
         order = self._order
-        value = order.messages[min(self._sent, len(order.messages) - 1)]
+        value, _ = order.due[min(self._sent, len(order.due) - 1)]
         if isinstance(value, bytes):
             cdr = value
         else:
@@ -161,8 +138,8 @@ class Publishing(Playing):
         stamp_ns = time.time_ns()
         self._publisher.publish(cdr)
         self._sent += 1
-        if order.repeat_s is None:
+        if order.has_end:
             self.last_ns = stamp_ns
         self._context.probe.messages.append(
-            RawMessage(order.topic, order.type, cdr, stamp_ns, stamp_ns, self._sent, is_sent=True)
+            RawMessage(order.publish, order.type, cdr, stamp_ns, stamp_ns, self._sent, is_sent=True)
         )

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
 
+from grader.assignment.stimuli.kinds.serve import ServeService
 from grader.findings.fields import unlike
 from grader.recording.interaction import Asked
 from grader.recording.model import NS
@@ -29,16 +30,6 @@ _FOREVER_S = 1e6
 _LOOK_NS = NS // 2
 
 
-@dataclass(frozen=True)
-class ServeServiceOrder:
-    """Offer a service; each answer has the keys of the YAML, times in s, perhaps infinite."""
-
-    name: str
-    type: str
-    answers: tuple[dict[str, Any], ...]
-    after_s: float = 0.0
-
-
 class Serving(Playing):
     """A server with a node and threads of its own, so that its callbacks may wait."""
 
@@ -48,14 +39,14 @@ class Serving(Playing):
 
     def __init__(self, order: Any, context: StimulusContext) -> None:
         super().__init__(order, context)
-        self.server = order.name + self.takes
+        self.server = order.serve + self.takes
         self._interface: Any = import_interface(order.type)
         self._given: set[int] = set()
         self._open = 0
         self._leaves_waiting = False
         self._lock = threading.Lock()
         self._is_there = False
-        if order.after_s == 0.0:
+        if order.after == 0.0:
             self.play(0.0)
 
     def create(self, node: Any, group: ReentrantCallbackGroup) -> None:
@@ -68,7 +59,7 @@ class Serving(Playing):
             return
         self._is_there = True
         context = self._context.probe.node.context
-        node = make_node(f"rosgrade{self._order.name.replace('/', '_')}", context)
+        node = make_node(f"rosgrade{self._order.serve.replace('/', '_')}", context)
         self.create(node, ReentrantCallbackGroup())
         executor = MultiThreadedExecutor(_MOST_AT_ONCE, context=context)
         executor.add_node(node)
@@ -86,7 +77,7 @@ class Serving(Playing):
     @property
     def due_s(self) -> float | None:
         """When it appears."""
-        return None if self._is_there else float(self._order.after_s)
+        return None if self._is_there else float(self._order.after)
 
     @property
     def is_done(self) -> bool:
@@ -103,12 +94,12 @@ class Serving(Playing):
                 return callback(*arguments)
             except Exception as error:
                 if self._context.probe.recording:
-                    self._context.faults.append(f"the server {self._order.name} failed: {error!r}")
+                    self._context.faults.append(f"the server {self._order.serve} failed: {error!r}")
                 raise
 
         return called
 
-    def ask(self, message: Any) -> tuple[int, Mapping[str, Any] | None]:
+    def ask(self, message: Any) -> tuple[int, Any]:
         """Note a request or a goal; its number, and the answer to it after its delay.
 
         It is the next answer that fits, the last one again and again; None if none fits.
@@ -117,20 +108,20 @@ class Serving(Playing):
         fitting = [
             number
             for number, answer in enumerate(order.answers)
-            if not unlike(fields, answer["when"], _SAME)
+            if not unlike(fields, answer.when, _SAME)
         ]
         asked = self._context.asked
         with self._lock:
             fresh = [number for number in fitting if number not in self._given] or fitting[-1:]
             self._given.update(fresh[:1])
             answer = order.answers[fresh[0]] if fresh else None
-            delay_s = answer["delay"] if answer is not None else 0.0
+            delay_s = answer.delay_s if answer is not None else 0.0
             self._leaves_waiting = math.isinf(delay_s)
             self._open += not self._leaves_waiting
             status = "unanswered" if self._leaves_waiting else ""
             number = len(asked)
             if self._context.probe.recording and number < self._context.limits.messages:
-                asked.append(Asked(order.name, order.type, fields, now_ns, status))
+                asked.append(Asked(order.serve, order.type, fields, now_ns, status))
         time.sleep(min(delay_s, _FOREVER_S))
         return number, answer
 
@@ -147,18 +138,18 @@ class Serving(Playing):
                 self.last_ns = now_ns
 
 
-@plays(ServeServiceOrder)
+@plays(ServeService)
 class ServingService(Serving):
     """A service of the probe."""
 
     def create(self, node: Any, group: ReentrantCallbackGroup) -> None:
         """Create the service."""
-        name = self._order.name
+        name = self._order.serve
         answer = self.noting_faults(self._answer)
         node.create_service(self._interface, name, answer, callback_group=group)
 
     def _answer(self, message: Any, response: Any) -> Any:
         number, answer = self.ask(message)
-        filled(response, answer["response"] if answer is not None else {}, time.time_ns())
+        filled(response, answer.response if answer is not None else {}, time.time_ns())
         self.note(number, ends=True, status="answered", answer=plain(response))
         return response

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from pydantic import Field
 
@@ -13,6 +12,7 @@ from grader.assignment.stimuli.stimulus_model import (
     StimulusModel,
     kind,
 )
+from grader.checks.need import Act
 from grader.spec.document import Place
 from grader.spec.name import Durability, Id, InterfaceName, Reliability, TopicName
 from grader.spec.quantity import DurationOrZero
@@ -27,6 +27,7 @@ class Join(StimulusModel):
     """
 
     key = "join"
+    provides = (Act.JOIN,)
 
     join: TopicName = Field(description="Topic to subscribe to.")
     type: InterfaceName = Field(description="Interface, such as std_msgs/msg/Int64.")
@@ -41,16 +42,12 @@ class Join(StimulusModel):
         """Its own name: several may be on one topic."""
         return self.name
 
-    def order(self, making: Making) -> dict[str, Any]:
-        """The subscription."""
-        same = self.model_dump(include={"name", "type", "reliability", "durability", "depth"})
-        return {"kind": "JoinOrder", "topic": self.join, "after_s": self.after, **same}
-
     def mistakes(self, making: Making, scenario: ScenarioOfStimuli) -> Iterator[tuple[Place, str]]:
         """Its name is used already, or the probe itself publishes on its topic."""
         alike = [one for one in scenario.stimuli if isinstance(one, Join) and one.name == self.name]
         if alike[0] is not self:
             yield ("name",), f"the name {self.name!r} is used twice"
-        if self.exchanged in [one.exchanged for one in scenario.stimuli if one.key == "publish"]:
+        sent = [one.exchanged for one in scenario.stimuli if Act.PUBLISH in one.provides]
+        if self.exchanged in sent:
             text = f"the probe publishes on {self.join!r} itself: a late joiner would receive that"
             yield ("join",), text

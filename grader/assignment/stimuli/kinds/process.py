@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field
 
@@ -24,11 +24,10 @@ class Kill(StimulusModel):
     after: DurationOrZero = Field(description="When, counted from the first match.")
     signal: Signal = Field("SIGINT", description="The signal: SIGINT is Ctrl-C.")
 
-    def order(self, making: Making) -> dict[str, Any]:
-        """The signal."""
+    def prepared(self, making: Making) -> Kill:
+        """The same with the name of the process, ``package/executable``."""
         process = making.process(self.key, self.kill, self.package)
-        signal, after_s = self.signal, self.after
-        return {"kind": "KillOrder", "process": process, "signal": signal, "after_s": after_s}
+        return self.model_copy(update={"kill": process})
 
 
 @kind
@@ -41,7 +40,7 @@ class Restart(StimulusModel):
     package: PackageName | None = Field(None, description="Its package, if several have it.")
     after: DurationOrZero = Field(description="When, counted from the first match.")
 
-    def order(self, making: Making) -> dict[str, Any]:
-        """The process."""
+    def prepared(self, making: Making) -> Restart:
+        """The same with the name of the process, ``package/executable``."""
         process = making.process(self.key, self.restart, self.package)
-        return {"kind": "RestartOrder", "process": process, "after_s": self.after}
+        return self.model_copy(update={"restart": process})

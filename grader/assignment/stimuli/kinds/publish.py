@@ -20,12 +20,15 @@ from grader.assignment.stimuli.stimulus_model import (
     StimulusModel,
     kind,
 )
+from grader.checks.need import Act
 from grader.spec.document import Place
 from grader.spec.name import Durability, InterfaceName, Reliability, TopicName
 from grader.spec.nearest_name import did_you_mean
 from grader.spec.quantity import Duration, DurationOrZero
 
 MOST_MESSAGES = 10_000
+Due = tuple[dict[str, Any] | bytes, float]
+"""A message, as fields or serialized, and its time in seconds."""
 
 
 @kind
@@ -39,6 +42,7 @@ class Publish(StimulusModel):
     """
 
     key = "publish"
+    provides = (Act.PUBLISH,)
 
     publish: TopicName = Field(description="Topic to publish on; it is not in `record`.")
     type: InterfaceName = Field(description="Interface, such as std_msgs/msg/String.")
@@ -81,6 +85,7 @@ class Publish(StimulusModel):
     reliability: Reliability = Field("reliable", description="Offered reliability.")
     durability: Durability = Field("volatile", description="Offered durability.")
     depth: int = Field(100, ge=1, le=10_000, description="Queue depth of the publisher.")
+    _due: tuple[Due, ...] = ()
 
     @model_validator(mode="after")
     def _consistent(self) -> Publish:
@@ -120,24 +125,22 @@ class Publish(StimulusModel):
         """Whether it publishes a last message."""
         return self.message is None or self.every is None or self.count is not None
 
-    def order(self, making: Making) -> dict[str, Any]:
-        """The messages with their times."""
-        due = list(self.due(making))
-        return {
-            "kind": "PublishOrder",
-            "topic": self.publish,
-            **self.model_dump(include={"type", "reliability", "durability", "depth"}),
-            "messages": [value for value, _ in due],
-            "times_s": [time_s for _, time_s in due],
-            "before_launch": self.before_launch,
-            "after_s": self.after,
-            "repeat_s": None if self.has_end else self.every,
-            "answer": self.answer,
-            "within_s": self.within,
-        }
+    @property
+    def due(self) -> tuple[Due, ...]:
+        """What a cell publishes; a message that is repeated without end is there once."""
+        return self._due
 
-    def due(self, making: Making) -> Iterator[tuple[dict[str, Any], float]]:
-        """Each message with its time in seconds; one that is repeated without end is there once."""
+    def prepared(self, making: Making) -> Publish:
+        """The same with its messages read."""
+        return self if self._due else self.sending(self._read(making))
+
+    def sending(self, due: Iterable[Due]) -> Publish:
+        """The same with these messages."""
+        found = self.model_copy()
+        found._due = tuple(due)
+        return found
+
+    def _read(self, making: Making) -> Iterator[Due]:
         given = list(self._given(making))
         key = "from" if self.from_ is not None else "python"
         if not given:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from grader.assignment.random_values import fill_in
 from grader.assignment.stimuli.message import StimulusError, part_of, read_message
 from grader.assignment.stimuli.stimulus_model import Making, StimulusModel, kind
+from grader.checks.need import Act
 from grader.errors import UsageError
 from grader.spec.document import Place
 from grader.spec.name import InterfaceName, QualifiedNodeName, TopicName
@@ -53,10 +54,6 @@ class ListParameters(StimulusModel):
         """It is called until the run ends."""
         return False
 
-    def order(self, making: Making) -> dict[str, Any]:
-        """The calls."""
-        return {"kind": "ListParametersOrder", "every_s": self.every}
-
 
 @kind
 class CallService(StimulusModel):
@@ -68,6 +65,7 @@ class CallService(StimulusModel):
     """
 
     key = "call"
+    provides = (Act.CALL,)
 
     call: TopicName = Field(description="Fully qualified service name.")
     type: InterfaceName = Field(description="Interface, such as std_srvs/srv/SetBool.")
@@ -101,25 +99,17 @@ class CallService(StimulusModel):
         return self
 
     @property
-    def sequence(self) -> tuple[dict[str, Any], ...]:
+    def given(self) -> tuple[dict[str, Any], ...]:
         """Every request, in order."""
         return self.requests or ((self.request or {},) * (self.count or 1))
 
-    def order(self, making: Making) -> dict[str, Any]:
-        """The requests."""
-        requests = [
+    def prepared(self, making: Making) -> CallService:
+        """The same with its requests read."""
+        requests = tuple(
             _fields(value, self, making, ("requests", index) if self.requests else ("request",))
-            for index, value in enumerate(self.sequence)
-        ]
-        return {
-            "kind": "CallOrder",
-            "service": self.call,
-            "type": self.type,
-            "requests": requests,
-            "at_once": self.at_once,
-            "every_s": self.every,
-            **_times(self),
-        }
+            for index, value in enumerate(self.given)
+        )
+        return self.model_copy(update={"requests": requests})
 
 
 @kind
@@ -127,6 +117,7 @@ class ReadParameters(StimulusModel):
     """Read every parameter of a node: its descriptor and its value."""
 
     key = "read_parameters"
+    provides = (Act.READ_PARAMETERS,)
 
     read_parameters: QualifiedNodeName = Field(
         description="Name of the node: `bot` is `/bot`; with a namespace `/robot/bot`."
@@ -134,10 +125,10 @@ class ReadParameters(StimulusModel):
     after: _After = 0.0
     within: _Within = 2.0
 
-    def order(self, making: Making) -> dict[str, Any]:
-        """The node, and nothing that is set."""
-        node = {"node": self.read_parameters, "values": {}}
-        return {"kind": "ParametersOrder", **node, **_times(self)}
+    @property
+    def node(self) -> str:
+        """The node."""
+        return self.read_parameters
 
 
 @kind
@@ -148,6 +139,7 @@ class SetParameters(StimulusModel):
     """
 
     key = "set_parameters"
+    provides = (Act.READ_PARAMETERS, Act.SET_PARAMETERS)
 
     set_parameters: dict[str, Any] = Field(
         min_length=1, description="Name -> value; all are set in one call."
@@ -163,12 +155,22 @@ class SetParameters(StimulusModel):
         """The node."""
         return self.node
 
-    def order(self, making: Making) -> dict[str, Any]:
-        """The node, and what is set."""
+    @property
+    def given(self) -> Sequence[Mapping[str, Any]]:
+        """The values by name."""
+        return (self.set_parameters,)
+
+    def prepared(self, making: Making) -> SetParameters:
+        """The same with its values read."""
         drawn = dict(making.drawn)
         values = {name: _value(name, it, drawn) for name, it in self.set_parameters.items()}
-        node = {"node": self.node, "values": values}
-        return {"kind": "ParametersOrder", **node, **_times(self)}
+        return self.model_copy(update={"set_parameters": values})
+
+
+class AskDeclared(StimulusModel):
+    """Ask every node which parameters it declares: part of a run that is given parameters."""
+
+    names: tuple[str, ...]
 
 
 def _value(name: str, value: Any, drawn: dict[str, float]) -> Any:
@@ -194,6 +196,7 @@ class SendGoal(StimulusModel):
     """
 
     key = "send_goal"
+    provides = (Act.SEND_GOAL,)
 
     send_goal: TopicName = Field(description="Fully qualified action name.")
     type: InterfaceName = Field(
@@ -207,21 +210,14 @@ class SendGoal(StimulusModel):
     preempt: bool = Field(False, description="Send the goal while the previous goal is executed.")
     within: Duration = Field(10.0, description="How long to wait for its result.")
 
-    def order(self, making: Making) -> dict[str, Any]:
+    @property
+    def given(self) -> Sequence[Mapping[str, Any]]:
         """The goal."""
-        return {
-            "kind": "GoalOrder",
-            "action": self.send_goal,
-            "type": self.type,
-            "goal": _fields(self.goal, self, making, ("goal",)),
-            "cancel_after_s": self.cancel_after,
-            "preempt": self.preempt,
-            **_times(self),
-        }
+        return (self.goal,)
 
-
-def _times(item: CallService | ReadParameters | SetParameters | SendGoal) -> dict[str, float]:
-    return {"after_s": item.after, "within_s": item.within}
+    def prepared(self, making: Making) -> SendGoal:
+        """The same with its goal read."""
+        return self.model_copy(update={"goal": _fields(self.goal, self, making, ("goal",))})
 
 
 def _fields(

@@ -16,6 +16,7 @@ from grader.assignment.stimuli.stimulus_model import (
     StimulusModel,
     kind,
 )
+from grader.checks.need import Act
 from grader.spec.document import Place
 from grader.spec.name import InterfaceName, TopicName
 from grader.spec.quantity import Duration, DurationOrZero, Speed
@@ -39,6 +40,11 @@ class Answer(Model):
     delay: _Lasting = Field(
         0.0, description="Time until it is given; `forever` for a request that gets no answer."
     )
+
+    @property
+    def delay_s(self) -> float:
+        """The same in seconds, perhaps infinite."""
+        return _seconds(self.delay)
 
 
 class ServiceAnswer(Answer):
@@ -92,6 +98,13 @@ class GoalAnswer(Answer):
         None, description="Drive the simulated robot to the pose of the goal, which then succeeds."
     )
 
+    @property
+    def takes_s(self) -> float:
+        """How long it takes, perhaps infinite; by default as long as the feedback lasts."""
+        if "takes" in self.model_fields_set:
+            return _seconds(self.takes)
+        return len(self.feedback) * self.every
+
 
 def _fits(read: Callable[..., Any], path: str) -> bool:
     try:
@@ -109,6 +122,7 @@ class Serve(StimulusModel):
     """Part of both: a server with its name, its type and its answers."""
 
     key = "serve"
+    provides = (Act.SERVE,)
     folder: ClassVar[str]
     usual: ClassVar[Answer]
     """The answer where none is given."""
@@ -127,45 +141,36 @@ class Serve(StimulusModel):
         """Whether its type is a service; the first kind, and else an action."""
         return cls.folder == "action" or "/srv/" in str(value.get("type"))
 
-    def order(self, making: Making) -> dict[str, Any]:
-        """The server and what it answers."""
+    def prepared(self, making: Making) -> Serve:
+        """The same with its answers read, or the usual one."""
         if f"/{self.folder}/" not in self.type:
             raise StimulusError("expected an interface in srv or action", ("type",))
-        answers = self.answers or (self.usual,)
-        return {
-            "kind": f"{type(self).__name__}Order",
-            "name": self.serve,
-            "type": self.type,
-            "after_s": self.after,
-            "answers": [self._read(one, n, making) for n, one in enumerate(answers)],
-        }
+        answers = enumerate(self.answers or (self.usual,))
+        read = tuple(self._read(one, number, making) for number, one in answers)
+        return self.model_copy(update={"answers": read})
 
-    def _read(self, answer: Answer, number: int, making: Making) -> dict[str, Any]:
+    def _read(self, answer: Answer, number: int, making: Making) -> Answer:
         def read(value: Mapping[str, Any], part: int, *place: str | int) -> dict[str, Any]:
             find = part_of(making.find, self.type, part)
             inside = ("answers", number, *place)
             return read_message(value, self.type, find, making.drawn, inside)
 
-        found = {**answer.model_dump(), "delay": _seconds(answer.delay)}
-        if isinstance(answer, GoalAnswer):
-            is_given = "takes" in answer.model_fields_set
-            lasts_s = len(answer.feedback) * answer.every
-            found["takes"] = _seconds(answer.takes) if is_given else lasts_s
-            if answer.drive is not None:
-                to = answer.drive.to
-                read({to: {}}, 0, "drive", "to")
-                if not any(_fits(read, f"{to}.{x}") for x in _POSITIONS):
-                    place: Place = ("answers", number, "drive", "to")
-                    raise StimulusError(f"the field {to!r} of the goal has no position", place)
-                if answer.drive.distance is not None:
-                    read({answer.drive.distance: 0.0}, 2, "drive", "distance")
+        if isinstance(answer, GoalAnswer) and answer.drive is not None:
+            to = answer.drive.to
+            read({to: {}}, 0, "drive", "to")
+            if not any(_fits(read, f"{to}.{x}") for x in _POSITIONS):
+                place: Place = ("answers", number, "drive", "to")
+                raise StimulusError(f"the field {to!r} of the goal has no position", place)
+            if answer.drive.distance is not None:
+                read({answer.drive.distance: 0.0}, 2, "drive", "distance")
+        found: dict[str, Any] = {}
         for key, part in answer.parts.items():
             value = getattr(answer, key)
             if isinstance(value, tuple):
-                found[key] = [read(one, part, key, index) for index, one in enumerate(value)]
+                found[key] = tuple(read(one, part, key, index) for index, one in enumerate(value))
             else:
                 found[key] = read(value, part, key)
-        return found
+        return answer.model_copy(update=found)
 
     def mistakes(self, making: Making, scenario: ScenarioOfStimuli) -> Iterator[tuple[Place, str]]:
         """It stands twice, or drives a robot that is not there, or its answers do not fit."""
