@@ -171,7 +171,7 @@ def _tell_github(result: Result, submission: Path | None, environment: Mapping[s
         used_bytes = Path(summary).stat().st_size if Path(summary).exists() else 0
         _append(Path(summary), github.summary(result, used_bytes))
     if outputs:
-        _append(Path(outputs), github.outputs(result, f"rosgrade_{secrets.token_hex(16)}"))
+        _append(Path(outputs), github.outputs(result))
 
 
 def _prefix(submission: Path | None, workspace: Path) -> str | None:
@@ -199,8 +199,8 @@ def _write_classroom50(result: Result, folder: Path) -> None:
     from grader.report.files import write_whole
     from grader.report.formats import classroom50
 
-    who = classroom50.identity(os.environ)
-    text = classroom50.render_result(result, who, _committed(folder))
+    who = {**classroom50.identity(os.environ), "datetime": _committed(folder)}
+    text = classroom50.render_result(result, **who)
     write_whole(folder / classroom50.RESULT_FILE, text)
     write_whole(folder / classroom50.RELEASE_FILE, classroom50.render_release(result))
 

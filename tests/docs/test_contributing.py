@@ -92,6 +92,14 @@ def test_a_new_explanation_is_listed_and_found_without_a_list(copy: Path) -> Non
 def test_a_new_output_format_is_an_option(copy: Path) -> None:
     assert "--points" in rosgrade(copy, "check", "--help")
     assert "Write the points, a line for each check" in rosgrade(copy, "report", "--help")
+    python(
+        copy,
+        "from grader.report.audience import RENDERERS, Audience\n"
+        "from grader.report.formats.points import render\n"
+        "from tests.report.sample import lost_points\n"
+        "assert RENDERERS[render] is Audience.STUDENT\n"
+        "assert render(lost_points().result).startswith('builds ')\n",
+    )
 
 
 def test_a_new_stimulus_is_valid_described_and_played(copy: Path) -> None:

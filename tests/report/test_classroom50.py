@@ -43,7 +43,7 @@ SCHEMA = obj(
 
 
 def rendered(result):
-    return json.loads(render_result(result, identity(ENVIRONMENT), WHEN))
+    return json.loads(render_result(result, **identity(ENVIRONMENT), datetime=WHEN))
 
 
 def points(*worth, credit=0.0):
@@ -79,7 +79,7 @@ def test_partial_credit_is_rounded_down_so_that_only_a_passed_check_is_full():
 
 def test_hidden_checks_are_neither_named_nor_counted():
     result = lost_points().result
-    text = render_result(result, identity(ENVIRONMENT), WHEN) + render_release(result)
+    text = render_result(result, **identity(ENVIRONMENT), datetime=WHEN) + render_release(result)
     assert "SIGINT" not in text and "ends" not in [t["id"] for t in rendered(result)["tests"]]
     assert "1 hidden check, 1 point, runs at grading" in render_release(result)
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from contextlib import suppress
+from importlib import import_module
+from pkgutil import iter_modules
 
 import pytest
 from hypothesis import assume, given, settings
@@ -12,12 +15,14 @@ from hypothesis import strategies as st
 from grader.assignment.model import SHOWN_FROM
 from grader.assignment.selection import visible_part
 from grader.checks.check import Subject
+from grader.errors import GraderFault
 from grader.findings.finding import Evidence, Finding, Moment, Plot, Table
 from grader.grade import grade
-from grader.report.formats import classroom50, github, gradescope, junit
+from grader.report import formats
+from grader.report.audience import RENDERERS, Audience
+from grader.report.formats import gradescope
 from grader.report.formats.foxglove import render_layout
 from grader.report.formats.gradebook import grades_csv
-from grader.report.formats.markdown import render_markdown
 from grader.report.html.report import render_report
 from grader.report.model.class_row import ClassRow
 from grader.report.model.result import result_json
@@ -30,9 +35,10 @@ from tests.report.sample import Sample, judged, make_facts, make_run
 SECRET = "zq"
 """In every text of a hidden check, and in no other."""
 SCENARIOS = ("listen", "zqhard")
-IDENTITY = {
-    name: "x" for name in ("classroom", "assignment", "submission", "commit", "release", "review")
-}
+MODULES = [
+    import_module(f"{formats.__name__}.{one.name}") for one in iter_modules(formats.__path__)
+]
+HOSTILE = "\x1b[31mred\x00\u202e\x85\ufffe"
 
 
 def say(status, mark):
@@ -114,15 +120,10 @@ def formats_of(result):
     """Every text that is made for students from a whole result."""
     copy = for_student(result)
     yield result_json(copy)
-    yield junit.render(copy, xunit1=True)
-    yield render_markdown(copy)
     yield grades_csv([ClassRow(copy.submission.id, result=copy)])
-    yield from github.annotation_lines(result)
-    yield github.summary(result)
-    yield github.outputs(result, "EOF")
-    yield classroom50.render_release(result)
-    if copy.graded:
-        yield classroom50.render_result(result, IDENTITY, "2026-06-01T14:32:01Z")
+    for render, audience in RENDERERS.items():
+        with suppress(GraderFault):
+            yield str(render(result if audience is Audience.STUDENT else copy))
     data = json.loads(gradescope.render(result))
     # Gradescope itself hides the others.
     data["tests"] = [test for test in data["tests"] if test["visibility"] == "visible"]
@@ -143,6 +144,22 @@ def test_no_string_of_a_hidden_check_is_in_anything_for_students(loaded):
         render_layout(alone.recordings.values()),
     ):
         assert SECRET not in text
+
+
+def test_every_format_declares_who_reads_it():
+    renders = [module.render for module in MODULES if hasattr(module, "render")]
+    assert renders
+    assert {*renders} <= {*RENDERERS}
+
+
+@pytest.mark.parametrize("render", RENDERERS)
+def test_what_acts_on_a_screen_reaches_no_format(render):
+    failed = Finding.failed(HOSTILE, HOSTILE, HOSTILE, Evidence(log=(HOSTILE,)))
+    result = judged([Told("a", failed, title=HOSTILE)]).result
+    named = result.submission.model_copy(update={"id": HOSTILE, "problem": HOSTILE})
+    text = str(render(result.model_copy(update={"submission": named})))
+    assert not {*"\x1b\x00\u202e\x85\ufffe"} & {*text}
+    assert not any(escape in text for escape in ("\\u001b", "\\x1b", "\\u0000", "\\x00"))
 
 
 @settings(max_examples=60, deadline=None)

@@ -15,9 +15,9 @@ from typing import Any
 
 from grader.errors import GraderFault, UsageError
 from grader.findings.finding import Status
+from grader.report.audience import Audience, written_for
 from grader.report.formats.markdown import COMMENT_BYTES, render_markdown
 from grader.report.model.result_model import Result
-from grader.report.model.student import for_student
 from grader.report.text import words
 
 SCHEMA = "classroom50/result/v1"
@@ -42,16 +42,17 @@ def identity(environment: Mapping[str, str]) -> dict[str, str]:
     return {**found, "review": environment.get("REVIEW_URL") or found["commit"]}
 
 
-def render_result(result: Result, identity: Mapping[str, str], committed: str) -> str:
-    """Render ``result.json``; students can read it, so it is made from their copy.
+@written_for(Audience.STUDENT)
+def render_result(result: Result, **identity: str) -> str:
+    """Render ``result.json``.
 
     Args:
-        committed: When the graded commit was made, ISO 8601 in UTC; a regrade does not move it.
+        identity: As of :func:`identity`; ``datetime`` is when the graded commit was made, ISO 8601
+            in UTC: a regrade does not move it.
     """
-    copy = for_student(result)
-    if not copy.graded:
+    if not result.graded:
         raise GraderFault("not graded, so there is no result for Classroom 50")
-    factor = whole_factor(copy)
+    factor = whole_factor(result)
     tests: list[dict[str, Any]] = [
         {
             "test-name": check.title,
@@ -62,13 +63,12 @@ def render_result(result: Result, identity: Mapping[str, str], committed: str) -
             "status": check.status.value,
             "observed": check.observed,
         }
-        for check in copy.checks
+        for check in result.checks
     ]
     data = {
         "schema": SCHEMA,
         **identity,
-        "datetime": committed,
-        "graded_at": copy.started,
+        "graded_at": result.started,
         "score": sum(test["score"] for test in tests),
         "max-score": sum(test["max-score"] for test in tests),
         "tests": tests,
@@ -76,18 +76,18 @@ def render_result(result: Result, identity: Mapping[str, str], committed: str) -
     return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
 
 
+@written_for(Audience.STUDENT)
 def render_release(result: Result) -> str:
-    """Render ``release-body.md``, which students read."""
-    copy = for_student(result)
+    """Render ``release-body.md``."""
     # A release may be twice as long, but its reader wants no more than the reader of a comment.
-    text = render_markdown(copy, COMMENT_BYTES)
-    factor = whole_factor(copy)
+    text = render_markdown(result, COMMENT_BYTES)
+    factor = whole_factor(result)
     if factor == 1:
         return text
     return (
         f"{text}\nClassroom 50 counts in whole points, so it shows every point as {factor}: "
-        f"{words.counted_points(copy.max_score)} are {_whole(copy.max_score, factor)} there, and "
-        "partial credit is rounded down.\n"
+        f"{words.counted_points(result.max_score)} are {_whole(result.max_score, factor)} there, "
+        "and partial credit is rounded down.\n"
     )
 
 

@@ -9,15 +9,17 @@ limits of annotations: actions/runner, ``ExecutionContext.cs``.
 
 from __future__ import annotations
 
+import secrets
+
 from grader.findings.finding import Status
+from grader.report.audience import Audience, written_for
 from grader.report.formats.markdown import render_markdown
 from grader.report.model.excerpt import places
 from grader.report.model.mistakes import only_shown
 from grader.report.model.result_model import CheckPart, Result
-from grader.report.model.student import for_student
 from grader.report.text import explanation
 from grader.report.text.words import number
-from grader.safe_text import clean, one_line
+from grader.safe_text import one_line
 
 MOST_ANNOTATIONS = 10
 """Of each kind and step; the runner drops what comes after."""
@@ -28,46 +30,51 @@ SUMMARY_BYTES = 1 << 20
 _LEFT_OUT = ("where", "printed")
 
 
+@written_for(Audience.STUDENT)
 def annotation_lines(result: Result, prefix: str | None = "") -> tuple[str, ...]:
     """Workflow commands that put the most useful findings at the student's lines.
 
     At most :data:`MOST_ANNOTATIONS` lines: the check to fix first, then those that cost the most
-    points, and only what students get to see. What is not graded is one warning.
+    points. What is not graded is one warning.
 
     Args:
         prefix: Folder of the submission in the repository, such as ``src/``; empty for its top,
             None where its files are not in the repository.
     """
-    copy = for_student(result)
-    if not copy.graded:
-        return (command("warning", explanation.headline(copy), title="Not graded"),)
-    failed = [check for check in copy.checks if check.status is Status.FAILED]
-    failed.sort(key=lambda check: (check.id != copy.first_to_fix, check.points - check.max_points))
-    shown = only_shown(copy.checks)
+    if not result.graded:
+        return (command("warning", explanation.headline(result), title="Not graded"),)
+    failed = [check for check in result.checks if check.status is Status.FAILED]
+    failed.sort(key=lambda it: (it.id != result.first_to_fix, it.points - it.max_points))
+    shown = only_shown(result.checks)
     return tuple(
-        _annotation(check, copy, "notice" if check.id in shown else "error", prefix)
+        _annotation(check, result, "notice" if check.id in shown else "error", prefix)
         for check in failed[:MOST_ANNOTATIONS]
     )
 
 
+@written_for(Audience.STUDENT)
 def summary(result: Result, used_bytes: int = 0) -> str:
-    """Markdown for ``$GITHUB_STEP_SUMMARY``, only of what students get to see."""
-    return render_markdown(for_student(result), SUMMARY_BYTES - used_bytes)
+    """Markdown for ``$GITHUB_STEP_SUMMARY``."""
+    return render_markdown(result, SUMMARY_BYTES - used_bytes)
 
 
-def outputs(result: Result, delimiter: str) -> str:
+@written_for(Audience.STUDENT)
+def outputs(result: Result, delimiter: str = "") -> str:
     """Lines for ``$GITHUB_OUTPUT``.
 
     They set ``score`` (empty where there is none), ``max-score``, ``status`` (``passed`` with full
     points, ``failed`` without, ``error`` where there is no grade) and ``summary``.
+
+    Args:
+        delimiter: What ends a value; by default one that nobody can know.
     """
-    copy = for_student(result)
-    ended = "passed" if copy.known_score == copy.known_max_score else "failed"
+    delimiter = delimiter or f"rosgrade_{secrets.token_hex(16)}"
+    ended = "passed" if result.known_score == result.known_max_score else "failed"
     values = {
-        "score": number(copy.known_score) if copy.known_score is not None else "",
-        "max-score": number(copy.known_max_score),
-        "status": ended if copy.graded else "error",
-        "summary": explanation.headline(copy),
+        "score": number(result.known_score) if result.known_score is not None else "",
+        "max-score": number(result.known_max_score),
+        "status": ended if result.graded else "error",
+        "summary": explanation.headline(result),
     }
     return "".join(f"{name}<<{delimiter}\n{value}\n{delimiter}\n" for name, value in values.items())
 
@@ -75,7 +82,7 @@ def outputs(result: Result, delimiter: str) -> str:
 def command(name: str, message: str, **properties: str) -> str:
     """Write a workflow command; its properties, such as ``file``, are decoded by the runner."""
     settings = ",".join(f"{key}={_property(value)}" for key, value in properties.items())
-    return f"::{name}{' ' if settings else ''}{settings}::{_data(clean(message)[:MOST_CHARACTERS])}"
+    return f"::{name}{' ' if settings else ''}{settings}::{_data(message[:MOST_CHARACTERS])}"
 
 
 def _annotation(check: CheckPart, result: Result, level: str, prefix: str | None) -> str:

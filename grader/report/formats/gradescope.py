@@ -16,6 +16,7 @@ from pydantic import AwareDatetime, BaseModel, ValidationError
 
 from grader.errors import UsageError
 from grader.findings.finding import Status
+from grader.report.audience import Audience, written_for
 from grader.report.formats import markdown
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
@@ -48,6 +49,7 @@ def unfinished() -> str:
     )
 
 
+@written_for(Audience.INSTRUCTOR)
 def render(result: Result, *, metadata: Path | None = None) -> str:
     """The whole file.
 

@@ -15,6 +15,7 @@ import re
 from collections import Counter
 
 from grader.findings.finding import Status
+from grader.report.audience import Audience, written_for
 from grader.report.html.page import environment
 from grader.report.model.mistakes import only_shown
 from grader.report.model.result_model import Result
@@ -22,6 +23,7 @@ from grader.report.model.result_model import Result
 _ENDINGS = {Status.FAILED: "failure", Status.ERROR: "error", Status.SKIPPED: "skipped"}
 
 
+@written_for(Audience.INSTRUCTOR)
 def render(result: Result, *, xunit1: bool = False) -> str:
     """The whole file, in the dialect xunit2 or xunit1."""
     shown = only_shown(result.checks)

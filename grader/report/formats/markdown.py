@@ -12,12 +12,12 @@ import re
 from collections.abc import Iterator
 
 from grader.findings.finding import Status
+from grader.report.audience import Audience, written_for
 from grader.report.model.excerpt import places
 from grader.report.model.result_model import CheckPart, Result
-from grader.report.model.student import for_student
 from grader.report.text import additions, explanation
 from grader.report.text.words import cut
-from grader.safe_text import clean, one_line
+from grader.safe_text import one_line
 
 # Within a word an underscore is no markup; names would be hard to read with it escaped.
 _MARKUP = re.compile(r"[\\`*\[\]~|$]|(?<![^\W_])_|_(?![^\W_])")
@@ -33,9 +33,10 @@ _CELL_BAR = "\\|"
 _MORE = "… the rest is in the report.\n"
 
 
+@written_for(Audience.STUDENT)
 def render(result: Result) -> str:
     """The whole file, short enough for a comment."""
-    return render_markdown(for_student(result), COMMENT_BYTES)
+    return render_markdown(result, COMMENT_BYTES)
 
 
 def render_markdown(result: Result, most_bytes: int | None = None) -> str:
@@ -84,10 +85,9 @@ def literal(text: str) -> str:
 
 def fence(text: str) -> str:
     """Lines as a block of code, with any content."""
-    shown = clean(text)
-    longest = max((len(run) for run in re.findall(r"`+", shown)), default=0)
+    longest = max((len(run) for run in re.findall(r"`+", text)), default=0)
     marks = "`" * max(3, longest + 1)
-    return f"{marks}text\n{shown}\n{marks}"
+    return f"{marks}text\n{text}\n{marks}"
 
 
 def explained(check: CheckPart, result: Result) -> str:
