@@ -250,7 +250,8 @@ def _fields_table(one: type[BaseModel]) -> str:
     required = schema.get("required", [])
     fields = {field.alias or name: field for name, field in one.model_fields.items()}
     rows = []
-    for key, found in schema.get("properties", {}).items():
+    properties = schema.get("properties", {}).items()
+    for key, found in sorted(properties, key=lambda item: item[0] not in required):
         default = "required" if key in required else _default(found, fields[key].default)
         meaning = _outside_code(str(found.get("description", "")).replace("\n", " "))
         rows.append((f"`{key}`", _value(found, definitions), default, meaning))

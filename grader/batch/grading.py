@@ -21,7 +21,7 @@ from grader.checks.need import Bags, Need, StudentTests
 from grader.errors import GraderFault, UsageError, machine_fault
 from grader.findings.finding import Status
 from grader.grade import Grade, grade
-from grader.grade.naming import named, with_stand_ins
+from grader.grade.naming import named
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording, to_json
 from grader.report.files import write_whole
@@ -30,6 +30,7 @@ from grader.run.admission import Admission
 from grader.run.host.load import cpu_count
 from grader.run.runner import Runner, scenario_seed
 from grader.sandbox.python_tree import check_installed
+from grader.spec.names import Names
 from grader.submission.build.bounded import OutputLimits
 from grader.submission.build.colcon import BuildLimits
 from grader.submission.build.own_tests import LIBRARY
@@ -118,9 +119,7 @@ class Grading:
 
         def tested(record: SubmissionRecord) -> frozenset[str]:
             self._on_recorded(record, {})
-            record = replace(record, given=outside)
-            loaded, _ = named(self._loaded, record)
-            record = with_stand_ins(loaded, record)
+            loaded, record, _ = named(self._loaded, replace(record, given=outside))
             return frozenset(one.name for name in _tested(loaded) if (one := record.package(name)))
 
         prepared = prepare(
@@ -167,7 +166,7 @@ class Grading:
 
     def grade_prepared(self, prepared: Prepared, folder: Path) -> Graded:
         """Run and judge a submission that is built already."""
-        record = with_stand_ins(named(self._loaded, prepared.record)[0], prepared.record)
+        loaded, record, unnamed = named(self._loaded, prepared.record)
         prepared = replace(prepared, record=record)
         for old in folder.glob("*.mcap"):
             old.unlink()
@@ -175,7 +174,6 @@ class Grading:
         runs: dict[str, int] = {}
         faults: dict[str, str] = {}
         recordings: dict[str, Recording] = {}
-        loaded, unnamed = named(self._loaded, prepared.record)
         support = self._type_support
         if loaded is not self._loaded:
             support = TypeSupport(loaded, self._runner.ros, self._cache, self._stop)
@@ -186,11 +184,11 @@ class Grading:
         again = [scenario.id for scenario in longest] if can_run else []
         alone: list[str] = []
         # What is wrong in what was built is known before any run.
-        remaps = grade(self._loaded, prepared.record, {}).remaps
+        names = grade(self._loaded, prepared.record, {}).names
         first = 1
         repeats: list[str] = []
         for attempt in range(1, MOST_RUNS + 1):
-            run = partial(self._run, loaded, support, prepared, folder, remaps)
+            run = partial(self._run, loaded, support, prepared, folder, names)
             told = partial(self._on_recorded, prepared.record, recordings)
             self._run_all(run, again, recordings, faults, told, alone=False)
             self._run_all(run, alone, recordings, faults, told, alone=True)
@@ -200,12 +198,11 @@ class Grading:
             renamed = [
                 scenario.id
                 for scenario in result.assignment.scenarios
-                if scenario not in run_so_far
-                or not result.remaps[scenario.id] <= remaps[scenario.id]
+                if scenario not in run_so_far or not result.names[scenario.id] <= names[scenario.id]
             ]
             if attempt < MOST_RUNS and renamed:
-                remaps = {name: known | result.remaps[name] for name, known in remaps.items()}
-                loaded, _ = named(self._loaded, prepared.record, recordings)
+                names = {name: known | result.names[name] for name, known in names.items()}
+                loaded, _, _ = named(self._loaded, prepared.record, recordings)
                 again, alone, first = renamed, [], attempt + 1
                 # What is run again for its names is not run again for the machine.
                 runs.update(dict.fromkeys(renamed, 0))
@@ -275,7 +272,7 @@ class Grading:
         support: TypeSupport,
         prepared: Prepared,
         folder: Path,
-        remaps: Mapping[str, frozenset[str]],
+        names: Mapping[str, Names],
         name: str,
         alone: bool,
     ) -> Recording:
@@ -295,7 +292,7 @@ class Grading:
                 underlays=prepared.underlays,
                 type_support=support.prefixes(),
                 alone=alone,
-                remaps=sorted(remaps[name]),
+                names=names[name],
                 pauses=any(
                     bound.parameters.pauses and scenario in loaded.scenarios_of(bound)
                     for bound in loaded.checks

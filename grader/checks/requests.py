@@ -1,13 +1,26 @@
-"""Calls and goals that the probe sent: which a check judges, and why an answer is not as asked."""
+"""Services and actions that are asked: whether they are there, and what the probe asked."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
+
+from pydantic import Field
 
 from grader.checks.check import stop_if
-from grader.diagnosis.no_endpoint import SERVICE, Word, why_not_met, why_not_offered
+from grader.checks.need import Doubt
+from grader.checks.wrong_name import Named, misnamed
+from grader.diagnosis.destroyed_endpoint import why_withdrawn
+from grader.diagnosis.no_endpoint import (
+    ACTION,
+    SERVICE,
+    Word,
+    meant_endpoint,
+    offered,
+    why_not_met,
+    why_not_offered,
+)
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.fields import (
     difference_table,
@@ -21,10 +34,53 @@ from grader.findings.value import EXACT, Tolerance
 from grader.findings.wording import code
 from grader.recording.interaction import NO_SERVER, Goal
 from grader.recording.model import Call, Recording
+from grader.spec.name import InterfaceName
+from grader.spec.names import Thing
 
 _MOST_ROWS, _MOST_MOMENTS = 50, 8
 
 Request = TypeVar("Request", Call, Goal)
+
+
+class Offered(Named):
+    """Part of the parameters of the checks that a service or an action is offered."""
+
+    doubt = Doubt.ANSWER_MISSED
+    word: ClassVar[Word]
+
+    type: InterfaceName | None = Field(
+        None, description="Its interface, as `ros2 interface list` shows it; by default any."
+    )
+
+    @property
+    def asked_name(self) -> tuple[Thing, str]:
+        """The service or action, in the field of that name."""
+        return Thing(self.word.noun), getattr(self, self.word.noun)
+
+    def _asked(self) -> str:
+        article = "an" if self.word is ACTION else "a"
+        type_ = f" of {code(self.type)}" if self.type else ""
+        return f"{article} {self.word.noun} {code(self.asked_name[1])}{type_}"
+
+
+def is_offered(recording: Recording, parameters: Offered) -> Finding:
+    """The finding of a check that a node of the student offers a service or action."""
+    word, (_, name) = parameters.word, parameters.asked_name
+    cause = why_not_offered(recording, word, name, parameters.type)
+    servers = offered(recording, word, name)
+    times_s = [recording.since_launch_s(one.appeared_ns) for one in servers[:1]]
+    shown = Evidence(moments=tuple(Moment(f"{word.noun} {name} appeared", s) for s in times_s))
+    meant = meant_endpoint(recording, word, name, parameters.type)
+    if wrong := misnamed(recording, parameters, cause, meant, shown):
+        return wrong
+    stop_if(why_withdrawn(recording, f"the {word.noun} {code(name)}", servers))
+    found = servers[0]
+    return Finding.passed(
+        parameters.asked_for,
+        f"{code(found.node)} offers it, with the type {code(found.type)}, seen {times_s[0]:.2f} s "
+        "after launch",
+        shown,
+    )
 
 
 def judged_requests(

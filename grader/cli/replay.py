@@ -62,7 +62,7 @@ def replay(
         installation = TypeSupport(loaded, installation, cache_folder()).student(progress.say)
         prepared = prepare(submission, installation, cache=cache_folder(), on_progress=progress.say)
         record = replace(prepared.record, given=recorded.submission.given)
-        loaded, _ = named(loaded, record, {recorded.scenario: recorded})
+        loaded, _, _ = named(loaded, record, {recorded.scenario: recorded})
         type_support = TypeSupport(loaded, ros.find(), cache_folder()).prefixes(progress.say)
     reason = why_not_run(prepared.record, [one.name for one in loaded.assignment.packages])
     if prepared.install is None or reason is not None:

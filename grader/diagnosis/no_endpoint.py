@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from grader.diagnosis.destroyed_endpoint import why_dropped, why_withdrawn
+from grader.diagnosis.destroyed_endpoint import why_dropped
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import crashed, why_crashed
@@ -16,6 +16,7 @@ from grader.findings.wording import code, codes
 from grader.measure import declarations
 from grader.recording.interaction import Service
 from grader.recording.model import Kind, Owner, Recording
+from grader.spec.name import TOPIC
 from grader.spec.nearest_name import nearest
 
 # Every rclpy node has these by itself; they say nothing of what the student wrote.
@@ -27,7 +28,7 @@ _OWN_SERVICE = re.compile(
 _SEND_GOAL = "/_action/send_goal"
 _MOST_ROWS = 50
 # The name becomes an argument, and a DDS participant that is not of ROS may use any.
-_NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
+_NAME = re.compile(TOPIC)
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,8 @@ ACTION_CLIENT = Word(
     "action client", "has an action client of", "ActionClient(self, {type}, '{name}')"
 )
 _WORDS = (PUBLISHER, SUBSCRIPTION, SERVICE, ACTION, CLIENT, ACTION_CLIENT)
+ENDPOINTS = {Kind.PUBLISHER: PUBLISHER, Kind.SUBSCRIPTION: SUBSCRIPTION}
+"""The word for each kind of endpoint."""
 
 
 @dataclass(frozen=True)
@@ -121,8 +124,7 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Finding | N
     if kind is Kind.PUBLISHER and recording.on(topic) and not known:
         return None
     types = tuple(sorted({item.type for item in others if item.owner is Owner.PROBE}))
-    word = PUBLISHER if kind is Kind.PUBLISHER else SUBSCRIPTION
-    return cause_of(NoEndpoint(recording, word, topic, types))
+    return cause_of(NoEndpoint(recording, ENDPOINTS[kind], topic, types))
 
 
 def why_not_offered(
@@ -133,30 +135,6 @@ def why_not_offered(
     if any(one.name == name and interface in (None, one.type) for one in symptom.there):
         return None
     return cause_of(symptom)
-
-
-def is_offered(recording: Recording, word: Word, name: str, interface: str | None) -> Finding:
-    """The finding of a check that a node of the student offers a service or action.
-
-    Args:
-        interface: Its type, or None where any will do.
-    """
-    article = "an" if word is ACTION else "a"
-    type_ = f" of {code(interface)}" if interface else ""
-    expected = f"{article} {word.noun} {code(name)}{type_}"
-    cause = why_not_offered(recording, word, name, interface)
-    servers = offered(recording, word, name)
-    cause = cause or why_withdrawn(recording, f"the {word.noun} {code(name)}", servers)
-    if cause is not None:
-        return replace(cause, expected=expected)
-    found = servers[0]
-    when_s = recording.since_launch_s(found.appeared_ns)
-    return Finding.passed(
-        expected,
-        f"{code(found.node)} offers it, with the type {code(found.type)}, seen {when_s:.2f} s "
-        "after launch",
-        Evidence(moments=(Moment(f"{word.noun} {found.name} appeared", when_s),)),
-    )
 
 
 def why_not_met(recording: Recording, word: Word, name: str, asked_ns: int) -> Finding:
@@ -170,23 +148,26 @@ def why_not_met(recording: Recording, word: Word, name: str, asked_ns: int) -> F
     )
 
 
-def misnamed(recording: Recording, kind: Kind, topic: str) -> str:
-    """The remapping rule for the student's one endpoint of the right type on a topic of its own.
+def meant_endpoint(
+    recording: Recording, word: Word, name: str, type_: str | None = None
+) -> str | None:
+    """The name of the student's one endpoint or server of the right type that nobody asks for.
 
-    Returns:
-        Such as ``/cmdvel:=/cmd_vel``; empty where there is no such endpoint, or more than one, or
-        where the rule has been tried.
+    Args:
+        type_: The right type; by default what the probe has or asks under the name.
     """
-    others = [item for item in recording.endpoints if item.owner is not Owner.STUDENT]
-    wanted = {item.type for item in others if item.topic == topic}
-    asked_for = {item.topic for item in others} | OWN_TOPICS
+    asked = [(e.topic, e.type) for e in recording.endpoints if e.owner is not Owner.STUDENT]
+    if word is SERVICE:
+        asked = [(call.service, call.type) for call in recording.calls]
+    elif word is ACTION:
+        asked = [(goal.action, goal.type) for goal in recording.goals]
+    wanted = {type_} if type_ else {type for other, type in asked if other == name}
     found = {
-        item.topic
-        for item in recording.student_endpoints(kind)
-        if item.type in wanted and item.topic not in asked_for and _NAME.fullmatch(item.topic)
+        item.name
+        for item in _of_students(recording, word)
+        if item.type in wanted and item.name not in dict(asked) and _NAME.fullmatch(item.name)
     }
-    rule = f"{found.pop()}:={topic}" if len(found) == 1 else ""
-    return "" if rule in recording.remaps else rule
+    return found.pop() if len(found) == 1 else None
 
 
 @explanation(NoEndpoint)
@@ -244,7 +225,7 @@ def process_crashed(symptom: NoEndpoint) -> Finding | None:
 @explanation(NoEndpoint)
 def dropped(symptom: NoEndpoint) -> Finding | None:
     """It ended with the constructor or the callback that created it."""
-    kind = {PUBLISHER: Kind.PUBLISHER, SUBSCRIPTION: Kind.SUBSCRIPTION}.get(symptom.word)
+    kind = next((kind for kind, word in ENDPOINTS.items() if word is symptom.word), None)
     return why_dropped(symptom.recording, kind, symptom.name) if kind else None
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.not_built import why_not_built
 from grader.diagnosis.process.blocked_executor import at_its_place
-from grader.diagnosis.process.process_exit import why_crashed, why_ended
+from grader.diagnosis.process.process_exit import ended_early, why_crashed, why_ended
 from grader.diagnosis.process.standing import where_it_stands
 from grader.diagnosis.undeclared import why_never_appeared
 from grader.findings.finding import Evidence, Finding
@@ -15,9 +16,12 @@ from grader.findings.first_seen import nodes_seen, until_the_end
 from grader.findings.wording import code, codes
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
+from grader.spec.name import TOPIC
 from grader.spec.nearest_name import nearest
 
 _LOG_LINES = 10
+# The name becomes an argument; one with `_` in front is hidden.
+_NAME = re.compile(rf"(?!.*/_){TOPIC}")
 # How the cell calls the wait for a process that it could not start.
 _START = "start of "
 
@@ -83,6 +87,22 @@ def why_not_node(recording: Recording, name: str) -> Finding | None:
     if name in [node.name for node in recording.student_nodes]:
         return None
     return why_no_node(recording) or cause_of(OtherNode(recording, name))
+
+
+def meant_node(recording: Recording, name: str) -> str | None:
+    """The name of the one node that a student probably means, or None.
+
+    It has the right name in another namespace, or is the only one, or has the nearest name.
+    """
+    if any(ended_early(recording, process) for process in recording.processes):
+        # What is missing is perhaps not misnamed.
+        return None
+    there = {one.name for one in recording.student_nodes if _NAME.fullmatch(one.name)}
+    bases = {one: one.rpartition("/")[2] for one in there}
+    base = name.rpartition("/")[2]
+    alike = nearest(base, bases.values())
+    found = [one for one in there if len(there) == 1 or bases[one] == alike]
+    return found[0] if len(found) == 1 else None
 
 
 @explanation(NoNode)

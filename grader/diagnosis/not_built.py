@@ -11,6 +11,7 @@ from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.findings.finding import Evidence, Finding, Status
 from grader.findings.wording import code, codes
 from grader.spec.name import package_name
+from grader.spec.names import Thing
 from grader.spec.nearest_name import nearest
 from grader.submission.build.build_log import modules_not_found, not_found
 from grader.submission.build.ros_damage import damage_in
@@ -53,7 +54,8 @@ class NoPackage(Symptom[Finding], concept="packages"):
     @property
     def match(self) -> str | None:
         """The package whose name is nearly the wanted one."""
-        return dict(self.submission.stand_ins).get(self.name) or nearest(self.name, self.names)
+        own = self.submission.names.own(Thing.PACKAGE, self.name)
+        return own if own != self.name else nearest(self.name, self.names)
 
 
 def why_no_package(submission: SubmissionRecord, name: str) -> Finding | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+from grader.spec.names import NO_NAMES, Names
 from grader.spec.unit import format_duration
 from grader.submission.record import SourceError
 
@@ -178,8 +179,8 @@ class Finding:
         credit: Share of the points in [0, 1].
         disturbed: The run should be repeated. For an error: the delays of the machine were too
             large for a fair verdict. For a failure: the machine may be part of the cause.
-        remap: If wrong names are the only cause of the failure: the rules that correct them, such
-            as ``/cmdvel:=/cmd_vel``. The other checks are then judged in a run with these rules.
+        names: If wrong names are the only cause of the failure: those. The other checks are then
+            judged in a run that puts them right.
         concept: The page of ``docs/concepts`` that explains the idea behind a failure.
         stands_alone: Whether the checks that require this one can be judged although it failed.
     """
@@ -191,7 +192,7 @@ class Finding:
     expected: str = ""
     credit: float = 0.0
     disturbed: bool = False
-    remap: str = ""
+    names: Names = NO_NAMES
     concept: str = ""
     stands_alone: bool = False
 

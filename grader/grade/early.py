@@ -37,5 +37,5 @@ def judge_early(
         for one in grade(part, submission, recordings).results
         if one.id in decided
         and one.status in (Status.PASSED, Status.FAILED)
-        and not any(item.finding.disturbed or item.finding.remap for item in one.findings)
+        and not any(item.finding.disturbed or item.finding.names for item in one.findings)
     )

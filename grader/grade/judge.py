@@ -25,7 +25,7 @@ from grader.findings.wording import percent
 from grader.findings.words import speaking
 from grader.grade.language import finding_in_cpp, is_cpp
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
-from grader.grade.naming import named, with_stand_ins
+from grader.grade.naming import named
 from grader.grade.origins import with_origins
 from grader.grade.runtime_imports import with_runtime_imports
 from grader.grade.windowed import judged_in
@@ -64,8 +64,7 @@ def grade(
         recordings: By scenario id; empty where nothing could be launched.
         faults: By scenario id: why there is no recording.
     """
-    loaded, unnamed = named(loaded, submission, recordings)
-    submission = with_stand_ins(loaded, submission)
+    loaded, submission, unnamed = named(loaded, submission, recordings)
     bound = {item.spec.id: item for item in loaded.checks}
     known = with_runtime_imports(submission, recordings.values())
     results: dict[str, CheckResult] = {}
@@ -110,6 +109,7 @@ def grade(
             hints=hints,
             credit=credit,
             put_right=put_right and status is Status.FAILED,
+            asked_name=getattr(bound[name].parameters, "asked_name", None),
         )
     ordered = tuple(results[name] for name in bound)
     return Grade(
@@ -137,10 +137,10 @@ def _counted(counts: Counts, findings: Sequence[Finding]) -> tuple[Status, float
 
 def _is_put_right(item: ScenarioFinding, recordings: Mapping[str, Recording]) -> bool:
     """Whether no check has to wait for a finding: it passed, or the others do not need it."""
-    rule = item.finding.remap
+    names = item.finding.names
     runs = [run for name, run in recordings.items() if item.scenario in (None, name)]
     goes_on = item.finding.status is Status.PASSED or item.finding.stands_alone
-    return goes_on or (bool(rule) and all(set(rule.split()) <= set(run.remaps) for run in runs))
+    return goes_on or (bool(names) and all(names <= run.names for run in runs))
 
 
 def _has_other_parameters(item: ScenarioFinding, recordings: Mapping[str, Recording]) -> bool:
@@ -302,9 +302,9 @@ def _with_what_was_not_taken(finding: Finding, recording: Recording) -> Finding:
 
     That costs the points of a check of its own, and may be why this one failed too.
     """
-    right = {rule.partition(":=")[2] for rule in recording.remaps}
+    right = {one.asked for one in recording.names.wrong}
     cause = why_not_taken(recording, set(recording.given_parameters) - right)
-    if cause is None or finding.remap or finding.observed.startswith(cause.observed):
+    if cause is None or finding.names or finding.observed.startswith(cause.observed):
         return finding
     seen = f"{cause.observed}; {finding.observed}"
     return replace(finding, observed=seen, hint=cause.hint)

@@ -9,6 +9,7 @@ from typing import Any
 
 from grader.assignment.model import NOTHING_WITHHELD, Assignment, Visibility, Withheld
 from grader.findings.finding import Finding, Status
+from grader.spec.names import Names, Thing
 from grader.submission.record import SubmissionRecord
 
 STEP = Decimal("0.01")
@@ -43,6 +44,7 @@ class CheckResult:
         credit: Share of the points in [0, 1].
         put_right: It failed alone, such as by a wrong name that the runs put right, so nothing
             waits for it.
+        asked_name: What it asks for by its name, if anything.
     """
 
     id: str
@@ -57,6 +59,7 @@ class CheckResult:
     hints: tuple[str, ...] = ()
     put_right: bool = False
     credit: float = 0.0
+    asked_name: tuple[Thing, str] | None = None
 
     @property
     def decisive(self) -> ScenarioFinding:
@@ -108,27 +111,38 @@ class Grade:
         return {result.id: result for result in self.results}[check]
 
     @property
-    def remaps(self) -> dict[str, frozenset[str]]:
-        """Rules that put wrong names right, by the scenario that needs them.
+    def names(self) -> dict[str, Names]:
+        """Wrong names to put right, by the scenario that needs it.
 
-        A name that is wrong in one scenario is wrong wherever one of its programs is launched.
+        A name that is wrong in one scenario is wrong wherever one of its programs is launched. What
+        lies in a namespace follows the node; only what is wrong then is put right for itself.
         """
         programs = {
             scenario.id: {(launch.package, launch.program) for launch in scenario.launch}
             for scenario in self.assignment.scenarios
         }
+        # A launch file says itself how its nodes and their topics are called.
+        of_files = {
+            scenario.id
+            for scenario in self.assignment.scenarios
+            if not any(launch.executable for launch in scenario.launch)
+        }
+        asked = {result.asked_name for result in self.results}
         wrong = [
-            (item.finding.remap, programs.get(item.scenario or ""))
+            (one, programs.get(item.scenario or ""))
             for result in self.results
             for item in result.findings
-            if item.finding.remap
+            for one in item.finding.names.wrong
+            if not (one.rules and (one.thing, one.own) in asked)
         ]
+        nodes = [one for one, _ in wrong if one.thing is Thing.NODE]
         return {
-            name: frozenset(
+            name: Names.of(
                 one
-                for rules, others in wrong
+                for one, others in wrong
                 if others is None or not others.isdisjoint(launched)
-                for one in rules.split()
+                if not (one.rules and name in of_files)
+                if not any(node.explains(one) for node in nodes)
             )
             for name, launched in programs.items()
         }

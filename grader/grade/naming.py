@@ -17,6 +17,7 @@ from grader.errors import AssignmentError, UsageError
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes
 from grader.recording.model import Recording
+from grader.spec.names import Names, Thing, WrongName
 from grader.spec.nearest_name import nearest
 from grader.submission.read.cmake import read_commands
 from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
@@ -46,7 +47,7 @@ class Unnamed:
     variables: frozenset[str]
 
 
-def with_stand_ins(loaded: LoadedAssignment, submission: SubmissionRecord) -> SubmissionRecord:
+def _with_stand_ins(loaded: LoadedAssignment, submission: SubmissionRecord) -> SubmissionRecord:
     """The submission with packages of wrong names in the places of those that are asked for.
 
     Such a package has a name like the right one, or one of its executables.
@@ -69,7 +70,8 @@ def with_stand_ins(loaded: LoadedAssignment, submission: SubmissionRecord) -> Su
         only = having[0] if len(having) == 1 else None
         if stand_in := only or nearest(name, having or [one.name for one in others]):
             found[name] = stand_in
-    return replace(submission, stand_ins=tuple(found.items()))
+    wrong = (WrongName(Thing.PACKAGE, own, asked) for asked, own in found.items())
+    return replace(submission, names=Names.of(wrong))
 
 
 def _programs(package: PackageRecord) -> list[str]:
@@ -85,19 +87,27 @@ def named(
     loaded: LoadedAssignment,
     submission: SubmissionRecord,
     recordings: Mapping[str, Recording] = {},
-) -> tuple[LoadedAssignment, Unnamed | None]:
-    """The assignment with the names of a submission in it.
+) -> tuple[LoadedAssignment, SubmissionRecord, Unnamed | None]:
+    """The assignment with the names of a submission in it, and the submission with wrong ones told.
 
     What is found only in runs is the author's example until recordings show exactly one such name.
     So is an executable of what was not built: that is told first.
 
     Returns:
-        The assignment, and why the submission cannot be run. The author's examples then stand in
-        place of the names that were not found.
+        The assignment, the submission, and why that cannot be run. The author's examples then
+        stand in place of the names that were not found.
 
     Raises:
         UsageError: The roster has no value for a variable.
     """
+    loaded, unnamed = _with_chosen(loaded, submission, recordings)
+    return loaded, _with_stand_ins(loaded, submission), unnamed
+
+
+def _with_chosen(
+    loaded: LoadedAssignment, submission: SubmissionRecord, recordings: Mapping[str, Recording]
+) -> tuple[LoadedAssignment, Unnamed | None]:
+    """The assignment with a submission's values of its variables, and why one has none."""
     variables = loaded.assignment.variables
     if not variables or submission.problem is not None:
         return loaded, None

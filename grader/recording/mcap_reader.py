@@ -32,7 +32,8 @@ from grader.recording.mcap_writer import (
     RawMessage,
 )
 from grader.recording.model import Message, Recording
-from grader.submission.record import SubmissionRecord
+from grader.spec.names import old_names
+from grader.submission.record import SubmissionRecord, record_of
 
 # Types of the primitive fields, and of an array of bytes.
 _PLAIN = frozenset({bool, int, float, str, bytes})
@@ -94,7 +95,7 @@ def _read(stream: Any) -> Recording:
         elif isinstance(record, Metadata) and record.name == "rosgrade":
             frame = _frame(record)
         elif isinstance(record, Attachment) and record.name == "submission.json":
-            submission = _adapter(SubmissionRecord).validate_json(record.data)
+            submission = record_of(record.data)
         elif isinstance(record, Attachment) and record.name.removesuffix(FACTS_SUFFIX) in FACTS:
             name = record.name.removesuffix(FACTS_SUFFIX)
             data = gzip.decompress(record.data)
@@ -223,6 +224,8 @@ def _frame(record: Metadata) -> dict[str, Any]:
     frame = {key: json.loads(value) for key, value in record.metadata.items()}
     if frame.pop("format", None) not in ("2", FORMAT):
         raise _NotARecording(f"made by another version of rosgrade (not format {FORMAT})")
+    if "names" not in frame:
+        frame["names"] = old_names(frame["environment"])
     return frame
 
 

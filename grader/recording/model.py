@@ -19,6 +19,7 @@ from typing import Any
 from grader.recording.event import Breach, Disturbance, Intervention, Pause, Wait
 from grader.recording.interaction import Asked, Goal, Service
 from grader.recording.simulated import Incident, Scene, Truth
+from grader.spec.names import NO_NAMES, Names
 from grader.submission.record import SubmissionRecord
 
 NS = 1_000_000_000
@@ -317,6 +318,7 @@ class Recording:
             ``ros_imports`` that are installed; the ``parameters`` of the launch, by name;
             ``other_domains`` that the student joined;
             ``compiled_tracer``: ``preloaded``, ``lacking``, or ``none`` where nothing is compiled.
+        names: Wrong names of the student that were put right in this run.
     """
 
     scenario: str
@@ -354,11 +356,7 @@ class Recording:
     scene: Scene | None = None
     values: Mapping[str, float] = field(default_factory=dict)
     environment: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def remaps(self) -> tuple[str, ...]:
-        """Rules such as ``/cmdvel:=/cmd_vel`` that correct wrong names in this run."""
-        return tuple(self.environment.get("remaps", "").split())
+    names: Names = NO_NAMES
 
     @property
     def given_parameters(self) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from grader.run.process.process_sandbox import ProcessSandbox
+from grader.spec.names import NO_NAMES, Names
 
 if TYPE_CHECKING:
     from grader.assignment.stimuli.stimulus_model import StimulusModel
@@ -97,6 +98,7 @@ class CellOrder:
         compiled_tracer: The library that compiled programs are started with, or None.
         process_sandbox: The sandbox of each process of the student, or None.
         pauses: Whether the executors pause before the processes are stopped.
+        names: Wrong names that the commands put right.
     """
 
     scenario: str
@@ -118,6 +120,7 @@ class CellOrder:
     process_sandbox: ProcessSandbox | None = None
     tells_output: bool = False
     pauses: bool = False
+    names: Names = NO_NAMES
 
     def to_bytes(self) -> bytes:
         """For the cell's folder; written before anything of a student's runs in the cell."""

@@ -29,6 +29,7 @@ from grader.run.host.load import cpu_count
 from grader.run.order import CellOrder, ProcessCommand, RunLimits, SimulatorOrder, Topic, Until
 from grader.run.sandboxed_order import sandboxed
 from grader.sandbox.python_tree import unlisted
+from grader.spec.names import NO_NAMES, Names, Thing
 from grader.submission.record import SubmissionRecord
 
 if TYPE_CHECKING:
@@ -57,15 +58,9 @@ def scenario_seed(assignment: str, scenario: str, submission_sha256: str, base: 
 def ros_arguments(
     launch: Launch,
     values: dict[str, float],
-    topics: Mapping[str, str],
-    others: Mapping[str, str],
+    names: Names = NO_NAMES,
 ) -> tuple[str, ...]:
-    """Command line arguments of a launch, as ``ros2 run`` passes them on.
-
-    Args:
-        topics: Rules that put wrong names of topics right, besides those of the launch.
-        others: Right names of parameters -> wrong ones, which get the same values.
-    """
+    """Command line arguments of a launch, as ``ros2 run`` passes them on, with names put right."""
     from grader.assignment.random_values import fill_in
 
     rules: list[str] = []
@@ -73,12 +68,13 @@ def ros_arguments(
         rules += ["-r", f"__node:={launch.name}"]
     if launch.namespace:
         rules += ["-r", f"__ns:={launch.namespace}"]
-    for old, new in {**launch.remap, **topics}.items():
-        rules += ["-r", f"{old}:={new}"]
+    written = (f"{old}:={new}" for old, new in launch.remap.items())
+    for rule in (*written, *names.rules):
+        rules += ["-r", rule]
     for name, value in launch.parameters.items():
         # The value is YAML to rcl, and JSON is YAML.
         text = json.dumps(fill_in(value, values))
-        for one in dict.fromkeys((name, others.get(name, name))):
+        for one in dict.fromkeys((name, names.own(Thing.PARAMETER, name))):
             rules += ["-p", f"{one}:={text}"]
     ros_args = ("--ros-args", *rules) if rules else ()
     return (*launch.arguments, *ros_args)
@@ -103,31 +99,23 @@ def process_command(
     assignment: Assignment,
     install: Path,
     values: dict[str, float],
-    remaps: Sequence[str] = (),
+    names: Names = NO_NAMES,
 ) -> ProcessCommand:
-    """What to execute for a launch.
-
-    Args:
-        remaps: Rules such as ``/cmdvel:=/cmd_vel`` that put wrong names right; of a file of
-            the install space, without a slash in front; of a package or parameter, without any.
-    """
-    rules = [rule.split(":=") for rule in remaps]
-    topics = {old: new for old, new in rules if old.startswith("/")}
-    others = {new: old for old, new in rules if not old.startswith("/")}
+    """What to execute for a launch, with names put right."""
     asked = launch.package or assignment.packages[0].name
-    package = others.get(asked, asked)
+    package = names.own(Thing.PACKAGE, asked)
     if launch.executable is None:
         program = launch_file_program(ros, package, launch.program)
-        # It says itself how topics of its nodes are called.
-        topics = {}
+        # It says itself how its nodes and their topics are called.
+        names = NO_NAMES
     else:
         place, right = (f"lib/{one}/{launch.executable}" for one in (package, asked))
         # The setup.cfg of a package with a wrong name may say the right one.
         place = right if (install / right).is_file() else place
-        program = _program(ros, install / others.get(place, place))
+        program = _program(ros, install / names.own(Thing.FILE, place))
     return ProcessCommand(
         name=f"{asked}/{launch.program}",
-        argv=(*program, *ros_arguments(launch, values, topics, others)),
+        argv=(*program, *ros_arguments(launch, values, names)),
         after_s=launch.after,
         is_launch_file=launch.file is not None,
     )
@@ -275,7 +263,7 @@ class Runner:
         underlays: tuple[Path, ...] = (),
         type_support: tuple[Path, ...] = (),
         alone: bool = False,
-        remaps: Sequence[str] = (),
+        names: Names = NO_NAMES,
         pauses: bool = False,
     ) -> None:
         """Run one scenario and write its recording.
@@ -283,7 +271,7 @@ class Runner:
         Args:
             install: The submission's install space (merged layout).
             worlds: Folder that world files are relative to.
-            remaps: As of :func:`process_command`.
+            names: Wrong names to put right.
             pauses: Whether the executors pause after the observation.
 
         Raises:
@@ -303,7 +291,7 @@ class Runner:
                     cell.folder,
                     seed,
                     worlds,
-                    remaps,
+                    names,
                 )
                 order = replace(order, pauses=pauses)
                 recording.parent.mkdir(parents=True, exist_ok=True)
@@ -392,7 +380,7 @@ class Runner:
         folder: Path,
         seed: int,
         worlds: Path,
-        remaps: Sequence[str],
+        names: Names,
     ) -> CellOrder:
         from grader.assignment.random_values import draw_values
 
@@ -400,7 +388,7 @@ class Runner:
         scratch.mkdir()
         values = draw_values(scenario, seed)
         commands = tuple(
-            process_command(ros, launch, assignment, install, values, remaps)
+            process_command(ros, launch, assignment, install, values, names)
             for launch in scenario.launch
         )
         compiled = has_compiled_programs(install)
@@ -435,8 +423,8 @@ class Runner:
                 "cpus": str(cpu_count()),
                 "compiled_tracer": "preloaded" if tracer else "lacking" if compiled else "none",
                 "parameters": " ".join(given_parameters(scenario)),
-                **({"remaps": " ".join(remaps)} if remaps else {}),
             },
+            names=names,
             type_support=tuple(map(str, type_support)),
             tells_output=self.verbose,
         )

@@ -6,12 +6,14 @@ files nor ROS. All paths are relative to the submission, with forward slashes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
 from grader.errors import UsageError
+from grader.spec.names import NO_NAMES, Names, Thing, WrongName
 
 PYTHON, CPP = "Python", "C++"
 """What programs of students are written in."""
@@ -302,7 +304,7 @@ class SubmissionRecord:
         bags: Recordings of ``ros2 bag record``; None where no check asked for them.
         build: None where nothing was built.
         given: Variable of the assignment -> its value, from the roster or from `--set`.
-        stand_ins: Package that is asked for -> the one that was handed in under a wrong name.
+        names: Wrong names of packages; the others are judged and run in their place.
     """
 
     id: str
@@ -315,7 +317,7 @@ class SubmissionRecord:
     headings: tuple[tuple[str, tuple[str, ...]], ...] = ()
     bags: tuple[BagRecord, ...] | None = None
     given: tuple[tuple[str, str], ...] = ()
-    stand_ins: tuple[tuple[str, str], ...] = ()
+    names: Names = NO_NAMES
 
     @property
     def foreign_imports(self) -> frozenset[str]:
@@ -338,11 +340,22 @@ class SubmissionRecord:
 
     def package(self, name: str) -> PackageRecord | None:
         """The package of that name, or what stands in for it; else None."""
-        own = dict(self.stand_ins).get(name, name)
+        own = self.names.own(Thing.PACKAGE, name)
         return next((package for package in self.packages if package.name == own), None)
 
 
 _RECORD = TypeAdapter(SubmissionRecord)
+# Records of before called the names of packages so, in pairs.
+_STAND_INS = "stand_ins"
+
+
+def record_of(data: bytes) -> SubmissionRecord:
+    """The record in some JSON; a ValidationError says that it holds none."""
+    if f'"{_STAND_INS}":[['.encode() not in data:
+        return _RECORD.validate_json(data)
+    old = json.loads(data)
+    names = Names.of(WrongName(Thing.PACKAGE, own, asked) for asked, own in old[_STAND_INS])
+    return replace(_RECORD.validate_python(old), names=names)
 
 
 def read_record(file: Path) -> SubmissionRecord:
@@ -352,6 +365,6 @@ def read_record(file: Path) -> SubmissionRecord:
         UsageError: It cannot be read, or holds no record.
     """
     try:
-        return _RECORD.validate_json(file.read_bytes())
+        return record_of(file.read_bytes())
     except (OSError, ValidationError) as error:
         raise UsageError(f"{file}: is not the record of a submission: {error}") from error

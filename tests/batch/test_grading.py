@@ -34,6 +34,7 @@ from grader.recording.mcap_writer import write_recording
 from grader.recording.model import Ending, Endpoint, Kind, Node, Owner, Qos, Recording
 from grader.report.model.facts import Clock
 from grader.run.runner import Runner
+from grader.spec.names import Names, Thing, WrongName
 from grader.submission.build.colcon import BuildLimits
 from grader.submission.prepare import Prepared
 from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
@@ -103,14 +104,14 @@ class ScriptedRunner(Runner):
         super().__init__(ros.RosInstallation("wheels", Path("python"), ()))
         self._outcomes: Iterator[Recording | Exception] = iter(outcomes)
         self.alone: list[bool] = []
-        self.remaps: list[object] = []
+        self.names: list[object] = []
         self.scenarios: list[Any] = []
 
     def run(self, *arguments: object, alone: bool = False, **more: object) -> None:
         outcome = next(self._outcomes)
         self.scenarios.append(arguments[1])
         self.alone.append(alone)
-        self.remaps.append(more["remaps"])
+        self.names.append(more["names"])
         if isinstance(outcome, Exception):
             raise outcome
         file = arguments[4]
@@ -255,7 +256,9 @@ def test_a_misnamed_package_is_found_by_the_names_that_the_submission_chose(
     grading = Grading(load_assignment(folder), ScriptedRunner(), tmp_path / "cache")
     graded = grading.grade(tmp_path, tmp_path / "out")
     assert asked == [{"grup3_gp2"}]
-    assert graded.prepared.record.stand_ins == (("group3_gp2", "grup3_gp2"),)
+    assert graded.prepared.record.names == Names.of(
+        [WrongName(Thing.PACKAGE, "grup3_gp2", "group3_gp2")]
+    )
 
 
 def test_what_has_not_the_name_of_the_roster_is_not_run(
@@ -282,15 +285,15 @@ def test_a_wrong_name_is_put_right_in_one_more_run(tmp_path: Path) -> None:
         right.endpoints[0], kind=Kind.SUBSCRIPTION, owner=Owner.PROBE, node="/probe", gid="02"
     )
     wrong = dataclasses.replace(right.endpoints[0], topic="/cmdvel")
-    rule = "/cmdvel:=/cmd_vel"
+    names = Names.of([WrongName(Thing.TOPIC, "/cmdvel", "/cmd_vel")])
     runner = ScriptedRunner(
         dataclasses.replace(right, endpoints=(wrong, probe)),
-        dataclasses.replace(right, environment={"remaps": rule}),
+        dataclasses.replace(right, names=names),
     )
     grading = Grading(load_assignment(folder), runner, tmp_path / "cache")
     prepared = Prepared(record=SUBMISSION, install=tmp_path / "install")
     graded = grading.grade_prepared(prepared, tmp_path / "recordings")
-    assert runner.remaps == [[], [rule]]
+    assert runner.names == [Names(), names]
     # It was no machine that disturbed it.
     assert graded.runs == {"run": 1}
     assert graded.grade.result("topic").put_right

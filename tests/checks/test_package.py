@@ -327,8 +327,9 @@ class TestExecutable:
     )
     def test_the_one_program_of_a_package_is_run_in_place_of_what_is_missing(self, there, rule):
         record = submission(package(**{"executables": (), **there}))
-        assert judge("package.executable", record, **self.WANTED, remap=True).remap == rule
-        assert not judge("package.executable", record, **self.WANTED).remap
+        names = judge("package.executable", record, **self.WANTED, remap=True).names
+        assert " ".join(map(str, names.wrong)) == rule
+        assert not judge("package.executable", record, **self.WANTED).names
 
     def test_a_failed_build_is_the_deeper_cause(self):
         subject = submission(package(executables=()), build=failed_build(NAME, culprit=CULPRIT))

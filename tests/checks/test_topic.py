@@ -7,6 +7,7 @@ import pytest
 from grader.findings.finding import Status
 from grader.recording.event import Intervention
 from grader.recording.model import Ending, Kind, Owner
+from grader.spec.names import Names, Thing, WrongName
 from tests.checks.builder import (
     BOT,
     NODE,
@@ -62,12 +63,16 @@ def ended_at(
     return with_endpoints(gone, **more)
 
 
+CMDVEL = Names.of([WrongName(Thing.TOPIC, "/cmdvel", "/cmd_vel")])
+
+
 class TestRemap:
     """A wrong name costs the points of one check."""
 
     def rule(self, *endpoints, **changes):
         run = with_endpoints(*endpoints, **changes)
-        return judge("topic.published", run, topic="/cmd_vel", remap=True).remap
+        names = judge("topic.published", run, topic="/cmd_vel", remap=True).names
+        return " ".join(map(str, names.wrong))
 
     def test_the_one_topic_of_the_right_type_is_taken_for_the_one_that_was_meant(self):
         assert self.rule(endpoint("/cmdvel")) == "/cmdvel:=/cmd_vel"
@@ -83,19 +88,19 @@ class TestRemap:
         assert not self.rule(endpoint("/cmd -r __node"))
 
     def test_a_rule_that_did_not_help_is_not_tried_again(self):
-        assert not self.rule(endpoint("/cmdvel"), environment={"remaps": "/cmdvel:=/cmd_vel"})
+        assert not self.rule(endpoint("/cmdvel"), names=CMDVEL)
 
     def test_it_is_off_unless_the_author_wants_it(self):
         run = with_endpoints(endpoint("/cmdvel"))
-        assert not judge("topic.published", run, topic="/cmd_vel").remap
+        assert not judge("topic.published", run, topic="/cmd_vel").names
 
     @pytest.mark.parametrize("check", ["topic.published", "topic.type"])
     def test_in_the_run_that_puts_it_right_the_name_is_still_wrong(self, check):
-        run = recording(environment={"remaps": "/cmdvel:=/cmd_vel"})
+        run = recording(names=CMDVEL)
         more = {"type": TWIST} if check == "topic.type" else {}
         finding = judge(check, run, topic="/cmd_vel", remap=True, **more)
-        assert (finding.status, finding.remap) == (Status.FAILED, "/cmdvel:=/cmd_vel")
-        assert finding.observed.startswith("one on `/cmdvel` instead")
+        assert (finding.status, finding.names) == (Status.FAILED, CMDVEL)
+        assert finding.observed.startswith("found `/cmdvel` instead")
 
 
 class TestPublished:

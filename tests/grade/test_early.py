@@ -8,6 +8,7 @@ from grader.checks.check import Subject
 from grader.findings.finding import Status
 from grader.grade.early import judge_early
 from grader.grade.judge import grade
+from grader.spec.names import Names, Thing, WrongName
 from tests.grade.sample import FAIL, PASS, Told, make_loaded, make_recording, make_submission
 
 SCENARIOS = ("near", "far")
@@ -41,6 +42,10 @@ def test_what_it_requires_is_judged_in_the_runs_so_far():
 
 def test_what_may_be_run_again_is_not_told():
     disturbed = Told("period", replace(FAIL, disturbed=True), scenarios=("near",))
-    misnamed = Told("topic", replace(FAIL, remap="/cmdvel:=/cmd_vel"), scenarios=("near",))
+    misnamed = Told(
+        "topic",
+        replace(FAIL, names=Names.of([WrongName(Thing.TOPIC, "/cmdvel", "/cmd_vel")])),
+        scenarios=("near",),
+    )
     broken = Told("broken", ZeroDivisionError(), scenarios=("near",))
     assert early(disturbed, misnamed, broken) == {}

@@ -14,6 +14,7 @@ from grader.recording.model import NS, Call, Ending, Node, Owner
 from grader.recording.simulated import Truth
 from grader.report.model.facts import RunFacts
 from grader.report.model.result import make_result
+from grader.spec.names import Names, Thing, WrongName
 from grader.submission.record import BuildRecord, Import, PackageRecord, SourceError
 from tests.grade.sample import (
     FAIL,
@@ -361,12 +362,12 @@ class TestNotRun:
 
 @pytest.mark.parametrize("put_right", [True, False])
 def test_what_requires_a_name_is_judged_where_the_run_put_the_name_right(put_right):
-    rule = "/cmdvel:=/cmd_vel"
-    run = make_recording(environment={"remaps": rule} if put_right else {})
-    checks = (Told("topic", replace(FAIL, remap=rule)), Told("sent", requires=("topic",)))
+    names = Names.of([WrongName(Thing.TOPIC, "/cmdvel", "/cmd_vel")])
+    run = make_recording(names=names if put_right else Names())
+    checks = (Told("topic", replace(FAIL, names=names)), Told("sent", requires=("topic",)))
     result = judge(*checks, recordings={"listen": run})
     assert statuses(result) == {"topic": "failed", "sent": "passed" if put_right else "skipped"}
-    assert result.remaps == {"listen": {rule}}
+    assert result.names == {"listen": names}
 
 
 def lacking_parameter(scenario="listen"):
@@ -429,9 +430,9 @@ def test_a_parameter_that_the_node_does_not_take_takes_no_partial_credit_away():
 
 
 def test_a_name_is_put_right_only_where_the_program_that_has_it_wrong_is_launched():
-    rule = "/cmdvel:=/cmd_vel"
+    names = Names.of([WrongName(Thing.TOPIC, "/cmdvel", "/cmd_vel")])
     loaded = make_loaded(
-        [Told("topic", replace(FAIL, remap=rule), scenarios=("one",))], ("one", "again", "other")
+        [Told("topic", replace(FAIL, names=names), scenarios=("one",))], ("one", "again", "other")
     )
     other = loaded.assignment.scenarios[2].model_copy(
         update={"launch": (Launch(executable="bot_sub"),)}
@@ -441,4 +442,40 @@ def test_a_name_is_put_right_only_where_the_program_that_has_it_wrong_is_launche
         loaded, assignment=loaded.assignment.model_copy(update={"scenarios": scenarios})
     )
     result = grade(loaded, make_submission(), {"one": make_recording("one")})
-    assert result.remaps == {"one": {rule}, "again": {rule}, "other": frozenset()}
+    assert result.names == {"one": names, "again": names, "other": Names()}
+
+
+def wrong(thing, own, asked):
+    return Names.of([WrongName(thing, own, asked)])
+
+
+def test_what_lies_in_the_namespace_of_a_misnamed_node_is_put_right_with_it():
+    node = wrong(Thing.NODE, "/lab/bot", "/bot")
+    topic = wrong(Thing.TOPIC, "/lab/cmd_vel", "/cmd_vel")
+    other = wrong(Thing.SERVICE, "/ligth", "/light")
+    checks = [
+        Told(name, replace(FAIL, names=names))
+        for name, names in (("node", node), ("topic", topic), ("service", other))
+    ]
+    result = judge(*checks, recordings={"listen": make_recording()})
+    assert result.names == {"listen": node | other}
+
+
+def test_what_another_check_asks_for_is_not_misnamed():
+    loaded = make_loaded([Told("topic", replace(FAIL, names=wrong(Thing.NODE, "/bot", "/robot")))])
+    result = grade(loaded, make_submission(), {"listen": make_recording()})
+    asked = replace(result.results[0], id="node", asked_name=(Thing.NODE, "/bot"))
+    assert result.names["listen"]
+    assert not replace(result, results=(*result.results, asked)).names["listen"]
+
+
+def test_a_launch_file_names_its_nodes_itself():
+    loaded = make_loaded([Told("topic", replace(FAIL, names=wrong(Thing.NODE, "/bot", "/robot")))])
+    scenario = loaded.assignment.scenarios[0].model_copy(
+        update={"launch": (Launch(file="bot.launch.py"),)}
+    )
+    loaded = replace(
+        loaded, assignment=loaded.assignment.model_copy(update={"scenarios": (scenario,)})
+    )
+    result = grade(loaded, make_submission(), {"listen": make_recording()})
+    assert result.names == {"listen": Names()}

@@ -14,7 +14,7 @@ from grader.assignment.selection import select
 from grader.errors import UsageError
 from grader.findings.finding import Status
 from grader.grade import Grade, grade
-from grader.grade.naming import named, with_stand_ins
+from grader.grade.naming import named
 from grader.recording.interaction import Service
 from grader.recording.model import Recording
 from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
@@ -88,7 +88,7 @@ def test_names_of_the_submission_stand_everywhere_and_a_number_alone_is_a_number
     loaded: LoadedAssignment,
 ) -> None:
     record = submission("group12_gp2", "blue_maps", scripts=("driver",))
-    found, why = named(loaded, record)
+    found, _, why = named(loaded, record)
     assert why is None
     launch = found.assignment.scenarios[0].launch[0]
     assert (launch.package, launch.executable) == ("group12_gp2", "driver")
@@ -99,7 +99,7 @@ def test_names_of_the_submission_stand_everywhere_and_a_number_alone_is_a_number
 
 def test_a_part_of_an_assignment_stays_the_same_part(loaded: LoadedAssignment) -> None:
     part = select(loaded, ("maps",))
-    found, _ = named(part, submission("group12_gp2", "blue_maps"))
+    found, *_ = named(part, submission("group12_gp2", "blue_maps"))
     assert [check.spec.id for check in found.checks] == ["maps"]
     assert found.assignment.scenarios == ()
 
@@ -127,7 +127,7 @@ def test_two_names_that_fit_are_both_told(loaded: LoadedAssignment) -> None:
 
 
 def test_a_free_choice_must_be_a_single_one(loaded: LoadedAssignment) -> None:
-    _, why = named(loaded, submission("group7_gp2", scripts=("bot", "test")))
+    *_, why = named(loaded, submission("group7_gp2", scripts=("bot", "test")))
     assert why is not None
     assert why.finding.expected == "one executable of `group7_gp2` of any name, such as `bot`"
     assert why.finding.observed == "found `bot` and `test`"
@@ -149,13 +149,13 @@ def test_a_name_of_what_was_not_built_is_not_asked_for_and_the_build_is_told(
     loaded: LoadedAssignment,
 ) -> None:
     record = failed_build(submission("group12_gp2", "red_maps"), "group12_gp2")
-    found, why = named(loaded, record)
+    found, _, why = named(loaded, record)
     assert why is None
     assert (found.assignment.title, found.values["run"]) == ("The bot of group 12", "driver")
     silent = dataclasses.replace(
         record, packages=tuple(dataclasses.replace(one, cmake="") for one in record.packages)
     )
-    found, why = named(loaded, silent)
+    found, _, why = named(loaded, silent)
     assert why is None
     assert (found.assignment.title, found.values["run"]) == ("The bot of group 12", "bot")
 
@@ -173,7 +173,7 @@ def test_a_check_of_a_name_that_was_found_does_not_fail_by_another(
 
 def test_the_roster_comes_before_what_was_handed_in(loaded: LoadedAssignment) -> None:
     record = submission("group7_gp2", "blue_maps", team="green")
-    found, _ = named(loaded, record)
+    found, *_ = named(loaded, record)
     assert found.values["team"] == "green"
     result = grade(loaded, record, {}).result("maps")
     assert "green_maps" in result.decisive.finding.expected
@@ -209,7 +209,7 @@ def test_a_package_name_that_begins_with_a_digit_breaks_rep_144_and_is_graded(
     loaded: LoadedAssignment,
 ) -> None:
     record = submission("group7_gp2", "7up_maps")
-    found, why = named(loaded, record)
+    found, _, why = named(loaded, record)
     assert why is None and found.values["team"] == "7up"
     finding = grade(loaded, record, {}).result("maps").decisive.finding
     assert finding.status is Status.FAILED
@@ -221,7 +221,7 @@ def test_a_name_that_ros_does_not_allow_is_told_and_not_run(tmp_path: Path) -> N
     folder.mkdir()
     text = YAML.replace('{call: "{toggle}"', '{call: "/{team}/toggle"')
     (folder / "assignment.yaml").write_text(text, encoding="utf-8")
-    _, why = named(load_assignment(folder), submission("group7_gp2", "7up_maps"))
+    *_, why = named(load_assignment(folder), submission("group7_gp2", "7up_maps"))
     assert why is not None
     assert "'/7up/toggle' is not a ROS topic name" in why.finding.observed
 
@@ -256,7 +256,7 @@ def stand_in(tmp_path: Path, **facts: Any) -> tuple[Grade, SubmissionRecord]:
     loaded = load_assignment(folder)
     package = PackageRecord(**{"name": "bot_publish", "path": "bot_publish", **facts})
     record = dataclasses.replace(submission(), packages=(package,))
-    return grade(loaded, record, {}), with_stand_ins(loaded, record)
+    return grade(loaded, record, {}), named(loaded, record)[1]
 
 
 @pytest.mark.parametrize(
@@ -277,18 +277,16 @@ def test_a_package_with_a_wrong_name_costs_the_points_of_its_own_check(
     assert record.packages[0].name in package.decisive.finding.observed
     assert graded.result("builds").status is Status.PASSED
     assert graded.result("executable").status is Status.PASSED
-    rule = f"{record.packages[0].name}:=bot_publisher"
-    assert graded.remaps == {"main": {rule}}
-    run = dataclasses.replace(
-        recording(), scenario="main", submission=record, environment={"remaps": rule}
-    )
+    names = record.names
+    assert graded.names == {"main": names} and names
+    run = dataclasses.replace(recording(), scenario="main", submission=record, names=names)
     graded = grade(load_assignment(tmp_path / "stand_in"), record, {"main": run})
     assert graded.result("starts").status is not Status.SKIPPED
 
 
 def test_another_package_does_not_stand_in_for_the_one_that_is_asked_for(tmp_path: Path) -> None:
     graded, record = stand_in(tmp_path, name="notes", executables=("talker",))
-    assert record.stand_ins == ()
+    assert not record.names
     assert graded.result("builds").status is Status.SKIPPED
 
 
@@ -299,4 +297,6 @@ def test_a_setup_cfg_that_names_another_package_costs_the_points_of_the_executab
     graded, _ = stand_in(tmp_path, **wrong)
     finding = graded.result("executable").decisive.finding
     assert "lib/my_package/, where `ros2 run` does not look" in finding.observed
-    assert finding.remap == "lib/my_package/bot_pub:=lib/bot_publisher/bot_pub"
+    assert [str(one) for one in finding.names.wrong] == [
+        "lib/my_package/bot_pub:=lib/bot_publisher/bot_pub"
+    ]

@@ -19,6 +19,7 @@ from grader.recording.model import (
     Recording,
 )
 from grader.report.model.remarks import remarks
+from grader.spec.names import Names, Thing, WrongName
 from tests.grade.sample import make_recording
 
 TWIST = "geometry_msgs/msg/Twist"
@@ -53,7 +54,7 @@ def test_an_ordinary_run_is_not_worth_a_word() -> None:
     ("values", "begins", "ends"),
     [
         (
-            {"environment": {"remaps": "/cmdvel:=/cmd_vel"}},
+            {"names": Names.of([WrongName(Thing.TOPIC, "/cmdvel", "/cmd_vel")])},
             "this run corrected wrong names",
             "`/cmdvel:=/cmd_vel`",
         ),

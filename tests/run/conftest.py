@@ -16,6 +16,7 @@ from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording
 from grader.run.process.descendants import command_line
 from grader.run.runner import Runner
+from grader.spec.names import NO_NAMES, Names
 from grader.submission.record import SubmissionRecord
 
 PACKAGE, EXECUTABLE = "bot_publisher", "bot_pub"
@@ -79,6 +80,7 @@ def run_node(runner: Runner, tmp_path: Path) -> RunNode:
         progress: Callable[[str, Mapping[str, Any]], None] | None = None,
         worlds: Path = Path(),
         pauses: bool = False,
+        names: Names = NO_NAMES,
         **scenario: Any,
     ) -> Recording:
         folder = tmp_path / str(next(numbers))
@@ -94,6 +96,7 @@ def run_node(runner: Runner, tmp_path: Path) -> RunNode:
             seed=1,
             worlds=worlds,
             pauses=pauses,
+            names=names,
         )
         return read_recording(file)
 

@@ -17,16 +17,22 @@ from grader.checks.check import (
     toleranced,
 )
 from grader.checks.need import Act, Doubt, Stimulated
-from grader.checks.requests import judged_requests, timeline, why_other_fields
+from grader.checks.requests import (
+    Offered,
+    is_offered,
+    judged_requests,
+    timeline,
+    why_other_fields,
+)
 from grader.diagnosis.no_answer import why_late, why_raised, why_unanswered
-from grader.diagnosis.no_endpoint import ACTION, is_offered
+from grader.diagnosis.no_endpoint import ACTION
 from grader.findings.fields import FieldTolerance, the_goal, words
 from grader.findings.finding import Evidence, Finding
 from grader.findings.value import EXACT
 from grader.findings.wording import code, counted, percent
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
-from grader.spec.name import InterfaceName, TopicName
+from grader.spec.name import TopicName
 from grader.spec.quantity import Duration, Frequency, Ratio
 from grader.spec.unit import format_duration
 
@@ -34,15 +40,12 @@ from grader.spec.unit import format_duration
 _ANSWER_S = 1.0
 
 
-class ActionExists(Parameters):
+class ActionExists(Offered):
     """Parameters of action.exists."""
 
-    doubt = Doubt.ANSWER_MISSED
+    word = ACTION
 
     action: TopicName = Field(description="Fully qualified action name.")
-    type: InterfaceName | None = Field(
-        None, description="Interface, such as example_interfaces/action/Fibonacci; by default any."
-    )
 
 
 @check("action.exists", Subject.RECORDING, ActionExists)
@@ -51,7 +54,7 @@ def exists(recording: Recording, parameters: ActionExists) -> Finding:
 
     Judged by the ROS graph: the student's node had an action server of this type.
     """
-    return is_offered(recording, ACTION, parameters.action, parameters.type)
+    return is_offered(recording, parameters)
 
 
 class OfGoals(Parameters):

@@ -7,7 +7,8 @@ from functools import partial
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.diagnosis.no_node import why_no_node, why_not_node
+from grader.checks.wrong_name import Named, misnamed
+from grader.diagnosis.no_node import meant_node, why_no_node, why_not_node
 from grader.diagnosis.process.blocked_executor import left_s
 from grader.diagnosis.process.process_exit import (
     ended_early,
@@ -17,12 +18,13 @@ from grader.diagnosis.process.process_exit import (
     why_it_exited,
 )
 from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.first_seen import endpoints_seen
+from grader.findings.first_seen import endpoints_seen, nodes_seen
 from grader.findings.wording import code, codes, counted
 from grader.measure import declarations
 from grader.recording.event import LONGEST_STRETCH
 from grader.recording.model import NS, Kind, Node, Owner, Process, Recording
 from grader.spec.name import QualifiedNodeName, TopicName
+from grader.spec.names import Thing
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
 
@@ -51,7 +53,7 @@ def _appeared(recording: Recording, parameters: Parameters, node: Node, what: st
     return Finding.passed(parameters.asked_for, observed, shown)
 
 
-class NodeExists(Parameters):
+class NodeExists(Named):
     """Parameters of node.exists."""
 
     asks = "a node `{self.name}`"
@@ -63,6 +65,11 @@ class NodeExists(Parameters):
         None, description="Topic on which only this node of the student publishes."
     )
 
+    @property
+    def asked_name(self) -> tuple[Thing, str]:
+        """The node."""
+        return Thing.NODE, self.name
+
 
 @check("node.exists", Subject.RECORDING, NodeExists, concept="names")
 def exists(recording: Recording, parameters: NodeExists) -> Finding:
@@ -70,7 +77,10 @@ def exists(recording: Recording, parameters: NodeExists) -> Finding:
 
     Judged by the ROS graph: a node of the student with this fully qualified name was seen.
     """
-    stop_if(why_not_node(recording, parameters.name))
+    cause, shown = why_not_node(recording, parameters.name), Evidence(moments=nodes_seen(recording))
+    meant = meant_node(recording, parameters.name)
+    if wrong := misnamed(recording, parameters, cause, meant, shown):
+        return wrong
     publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.publishes)
     others = sorted({item.node for item in publishers} - {parameters.name})
     if parameters.publishes is not None and others:

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Need, Submitted
+from grader.checks.wrong_name import Named
 from grader.diagnosis.build_error import EMPTY_HINT
 from grader.diagnosis.no_executable import why_no_executable, why_nothing_to_run
 from grader.diagnosis.not_built import (
@@ -25,6 +26,7 @@ from grader.diagnosis.process.exceptions import import_of
 from grader.findings.finding import Evidence, Finding, Table
 from grader.findings.wording import code, codes
 from grader.spec.name import BuildTypes, PackageName
+from grader.spec.names import NO_NAMES, Names, Thing, WrongName
 from grader.spec.nearest_name import nearest
 from grader.submission.read.dependencies import meant
 from grader.submission.read.includes import CODE
@@ -40,17 +42,17 @@ class OfPackage(Parameters):
     package: PackageName = Field(description="Name in package.xml.")
 
 
-class PackageFound(OfPackage):
+class PackageFound(OfPackage, Named):
     """Parameters of package.found."""
 
     build_type: BuildTypes = Field(
         (), description="Expected build type, or several; by default any."
     )
-    remap: bool = Field(
-        False,
-        description="If no package has this name, judge and run one with a similar name or with "
-        "one of the executables. This check fails, and checks that require it are still judged.",
-    )
+
+    @property
+    def asked_name(self) -> tuple[Thing, str]:
+        """The package."""
+        return Thing.PACKAGE, self.package
 
     def _asked(self) -> str:
         types = f" with the build type {' or '.join(self.build_type)}" if self.build_type else ""
@@ -68,7 +70,7 @@ def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding:
     package = existing_package(submission, parameters.package)
     if finding := why_misnamed(submission, parameters.package):
         seen = f"{finding.observed}; everything else was judged in this package"
-        return replace(finding, observed=seen, remap=f"{package.name}:={parameters.package}")
+        return replace(finding, observed=seen, names=parameters.wrong(package.name))
     if breach := breach_of_rep_144(package.name):
         seen = f"found in {code(package.path)}{breach}"
         return Finding(seen, "Give the package another name.")
@@ -102,22 +104,22 @@ def builds(submission: SubmissionRecord, parameters: Builds) -> Finding:
     return Finding.passed(parameters.asked_for, "it builds")
 
 
-# Its name is the student's, and stands in a list of rules.
+# Its name is the student's, and becomes an argument.
 _FILE = re.compile(r"[\w.-]+(/[\w.-]+)+")
 
 
-class Executable(OfPackage):
+class Executable(OfPackage, Named):
     """Parameters of package.executable."""
 
     needs = (Submitted(executable="executable"),)
     asks = "the executable `{self.executable}`, for `ros2 run {self.package} {self.executable}`"
 
     executable: str = Field(min_length=1, description="Name in the command `ros2 run`.")
-    remap: bool = Field(
-        False,
-        description="If the only executable of the package has another name, or it is in another "
-        "folder, run that instead. This check fails, and checks that require it are still judged.",
-    )
+
+    @property
+    def asked_name(self) -> tuple[Thing, str]:
+        """Where it is installed."""
+        return Thing.FILE, f"lib/{self.package}/{self.executable}"
 
 
 @check("package.executable", Subject.SUBMISSION, Executable, concept="packages")
@@ -130,20 +132,20 @@ def executable(submission: SubmissionRecord, parameters: Executable) -> Finding:
     cause = why_no_executable(submission, parameters.package, parameters.executable)
     if cause is None:
         return Finding.passed(parameters.asked_for, f"installed in lib/{parameters.package}")
-    remap = _misnamed(submission, parameters) if parameters.remap else ""
-    return replace(cause, remap=remap)
+    return replace(cause, names=_names(submission, parameters)) if parameters.remap else cause
 
 
-def _misnamed(submission: SubmissionRecord, parameters: Executable) -> str:
-    """The rule by which the only file of the install space runs in place of the missing one."""
+def _names(submission: SubmissionRecord, parameters: Executable) -> Names:
+    """The only file of the install space that can run in place of the missing one."""
     if why_not_built(submission, parameters.package) is not None:
-        return ""
+        return NO_NAMES
     package, name = existing_package(submission, parameters.package), parameters.executable
     there = [package.misplaced(name)]
     if not there[0]:
         there = [f"lib/{package.name}/{other}" for other in package.executables]
     runs = len(there) == 1 and name not in package.executables and _FILE.fullmatch(there[0])
-    return f"{there[0]}:=lib/{package.name}/{name}" if runs else ""
+    asked = f"lib/{package.name}/{name}"
+    return Names.of([WrongName(Thing.FILE, there[0], asked)] if runs else [])
 
 
 # Tags that make a package be there when the code runs or is built (REP-149).

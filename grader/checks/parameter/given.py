@@ -6,16 +6,18 @@ from dataclasses import replace
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Subject, check
 from grader.checks.need import Doubt, ParametersGiven
+from grader.checks.wrong_name import Renamable
 from grader.diagnosis.no_parameter import why_not_taken
 from grader.findings.finding import Finding
 from grader.findings.wording import code, codes, listing
 from grader.measure.parameter_calls import misnamed_parameters
 from grader.recording.model import Recording
+from grader.spec.names import Names, Thing, WrongName
 
 
-class Given(Parameters):
+class Given(Renamable):
     """Parameters of parameter.given."""
 
     doubt = Doubt.ANSWER_MISSED
@@ -23,11 +25,6 @@ class Given(Parameters):
 
     names: tuple[str, ...] = Field(
         (), description="Names of the parameters; by default all that the launch gives."
-    )
-    remap: bool = Field(
-        False,
-        description="Where the node declares parameters with similar names instead, run again and "
-        "give them the values. This check fails, and all others are judged in that run.",
     )
 
     def _asked(self) -> str:
@@ -45,14 +42,14 @@ def given(recording: Recording, parameters: Given) -> Finding:
     answer of each node it passes: what the node does is judged by other checks. If it fails, others
     that fail in the same scenario, without partial credit, are skipped, but for those it requires.
     """
-    names, asked = parameters.names or recording.given_parameters, parameters.asked_for
-    finding = why_not_taken(recording, names)
+    given, asked = parameters.names or recording.given_parameters, parameters.asked_for
+    finding = why_not_taken(recording, given)
     if finding is None:
         return Finding.passed(asked, "no other parameter is given")
-    likely = misnamed_parameters(recording, names) if parameters.remap else {}
+    likely = misnamed_parameters(recording, given) if parameters.remap else {}
     if not likely:
         return finding
-    rules = " ".join(f"{other}:={name}" for name, other in likely.items())
+    names = Names.of(WrongName(Thing.PARAMETER, other, name) for name, other in likely.items())
     meant = listing(f"{code(other)} for {code(name)}" for name, other in likely.items())
     seen = f"{finding.observed}; everything else was judged with {meant}"
-    return replace(finding, observed=seen, remap=rules)
+    return replace(finding, observed=seen, names=names)

@@ -19,15 +19,15 @@ from grader.checks.check import (
     toleranced,
 )
 from grader.checks.need import Act, Doubt, Stimulated
-from grader.checks.requests import judged_requests, why_other_fields
+from grader.checks.requests import Offered, is_offered, judged_requests, why_other_fields
 from grader.diagnosis.no_answer import why_late
-from grader.diagnosis.no_endpoint import SERVICE, is_offered
+from grader.diagnosis.no_endpoint import SERVICE
 from grader.findings.fields import FieldTolerance, brief, words
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.value import EXACT, value_at
 from grader.findings.wording import code, codes, counted
 from grader.recording.model import NS, Call, Recording
-from grader.spec.name import InterfaceName, TopicName
+from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
 
@@ -36,15 +36,12 @@ from grader.spec.unit import format_duration
 _TOGETHER, _APART = 0.5, 0.75
 
 
-class ServiceExists(Parameters):
+class ServiceExists(Offered):
     """Parameters of service.exists."""
 
-    doubt = Doubt.ANSWER_MISSED
+    word = SERVICE
 
     service: TopicName = Field(description="Fully qualified service name.")
-    type: InterfaceName | None = Field(
-        None, description="Interface, such as std_srvs/srv/SetBool; by default any."
-    )
 
 
 @check("service.exists", Subject.RECORDING, ServiceExists)
@@ -53,7 +50,7 @@ def exists(recording: Recording, parameters: ServiceExists) -> Finding:
 
     Judged by the ROS graph: the student's node had a service server of this type.
     """
-    return is_offered(recording, SERVICE, parameters.service, parameters.type)
+    return is_offered(recording, parameters)
 
 
 class Responds(Parameters):

@@ -9,29 +9,30 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Recorded
+from grader.checks.wrong_name import Named, misnamed
 from grader.diagnosis.destroyed_endpoint import why_dropped
-from grader.diagnosis.no_endpoint import misnamed, why_no_endpoint
+from grader.diagnosis.no_endpoint import ENDPOINTS, meant_endpoint, why_no_endpoint
 from grader.diagnosis.no_node import why_no_node
-from grader.findings.finding import Evidence, Finding, Status
+from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import endpoints_seen, nodes_seen
 from grader.findings.wording import code, codes
 from grader.recording.model import Kind, Recording
 from grader.spec.name import InterfaceName, TopicName
+from grader.spec.names import Thing
 
 PROBE = "rosgrade_probe"
 """Name of the node through which a run is watched."""
 
 
-class Topic(Parameters):
+class Topic(Named):
     """Part of the parameters of the checks of one topic."""
 
     topic: TopicName = Field(description="Fully qualified topic name.")
-    remap: bool = Field(
-        False,
-        description="If the node uses the right type on a topic that the assignment does not name, "
-        "run again with that topic remapped to this one. This check fails, and the checks that "
-        "require it are judged in the second run: a wrong name costs the points of one check.",
-    )
+
+    @property
+    def asked_name(self) -> tuple[Thing, str]:
+        """The topic."""
+        return Thing.TOPIC, self.topic
 
 
 class Published(Topic):
@@ -89,24 +90,11 @@ def _presence(recording: Recording, kind: Kind, parameters: Topic) -> Finding:
 
 def _absence(recording: Recording, kind: Kind, parameters: Topic) -> Finding | None:
     """The finding of an endpoint that is not there, or only under another name."""
-    topic = parameters.topic
-    finding = why_no_endpoint(recording, kind, topic)
-    if finding is not None:
-        remap = misnamed(recording, kind, topic) if parameters.remap else ""
-        return replace(finding, remap=remap) if finding.status is Status.FAILED else finding
-    for remap in recording.remaps if parameters.remap else ():
-        found, _, name = remap.partition(":=")
-        if name == topic:
-            endpoints = recording.student_endpoints(kind, name)
-            failed = Finding.failed(
-                parameters.asked_for,
-                f"one on {code(found)} instead; everything else was judged in a second run, with "
-                f"`--ros-args -r {remap}` to correct the name",
-                f"Write the topic's name as '{name.lstrip('/')}'.",
-                Evidence(moments=endpoints_seen(recording, endpoints)),
-            )
-            return replace(failed, remap=remap)
-    return None
+    cause = why_no_endpoint(recording, kind, parameters.topic)
+    there = recording.student_endpoints(kind, parameters.topic)
+    shown = Evidence(moments=endpoints_seen(recording, there))
+    meant = meant_endpoint(recording, ENDPOINTS[kind], parameters.topic)
+    return misnamed(recording, parameters, cause, meant, shown)
 
 
 class Type(Topic):

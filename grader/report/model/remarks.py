@@ -19,8 +19,8 @@ def remarks(recording: Recording) -> tuple[str, ...]:
 
     A limit of the sandbox that was reached is reported elsewhere (``Recording.breaches``).
     """
-    names = f"so that everything else could be judged: {codes(recording.remaps)}"
-    renamed = (f"this run corrected wrong names, {names}",) if recording.remaps else ()
+    names = f"so that everything else could be judged: {codes(map(str, recording.names.wrong))}"
+    renamed = (f"this run corrected wrong names, {names}",) if recording.names else ()
     return (*renamed, *_posing(recording), *_excess(recording), *_tricks(recording))
 
 

@@ -186,6 +186,7 @@ class Cell:
             incidents=tuple(self._robot.incidents) if self._robot else (),
             scene=self._robot.scene() if self._robot else None,
             values=self._order.values,
+            names=self._order.names,
             environment={
                 **self._order.facts,
                 "domain_id": str(self._domain_id),

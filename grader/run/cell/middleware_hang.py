@@ -97,4 +97,5 @@ def hung_recording(order: CellOrder, submission: SubmissionRecord, launched_ns: 
         breaches=(breach,),
         values=order.values,
         environment=order.facts,
+        names=order.names,
     )

@@ -1,0 +1,72 @@
+"""Wrong names: what ROS itself puts right, and what a recording of before says."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from grader.recording.model import to_json
+from grader.spec.names import NO_NAMES, Names, Thing, WrongName, old_names
+from grader.submission.record import PackageRecord, SubmissionRecord, record_of
+
+
+@pytest.mark.parametrize(
+    ("thing", "own", "asked", "rules"),
+    [
+        (Thing.TOPIC, "/cmdvel", "/cmd_vel", ["/cmdvel:=/cmd_vel"]),
+        (Thing.SERVICE, "/bot/go", "/go", ["/bot/go:=/go"]),
+        (Thing.NODE, "/bot", "/robot", ["bot:__node:=robot"]),
+        (Thing.NODE, "/lab/bot", "/bot", ["bot:__ns:=/"]),
+        (Thing.NODE, "/b", "/lab/bot", ["b:__node:=bot", "bot:__ns:=/lab"]),
+        (Thing.PACKAGE, "bot", "robot", []),
+        (Thing.FILE, "lib/bot/go", "lib/bot/run", []),
+        (Thing.PARAMETER, "velocity", "speed", []),
+    ],
+)
+def test_what_ros_can_put_right_has_rules(thing, own, asked, rules):
+    assert list(WrongName(thing, own, asked).rules) == rules
+
+
+def test_an_action_is_put_right_by_all_that_it_consists_of():
+    rules = WrongName(Thing.ACTION, "/fibb", "/fib").rules
+    assert "/fibb/_action/send_goal:=/fib/_action/send_goal" in rules and len(rules) == 5
+
+
+@pytest.mark.parametrize(
+    ("node", "other", "follows"),
+    [
+        (("/lab/bot", "/bot"), "/lab/cmd_vel", True),
+        (("/lab/bot", "/lab/robot"), "/lab/cmd_vel", False),
+        (("/bot", "/robot"), "/bot/reset", True),
+        (("/bot", "/robot"), "/bottom", False),
+        (("/bot", "/lab/bot"), "/cmd_vel", False),
+    ],
+)
+def test_what_stands_in_the_namespace_of_a_node_follows_it(node, other, follows):
+    moved = WrongName(Thing.NODE, *node)
+    assert moved.explains(WrongName(Thing.TOPIC, other, "/asked")) is follows
+
+
+def test_names_of_a_recording_of_before_are_read_once():
+    text = "/cmdvel:=/cmd_vel lib/bot/go:=lib/bot/run pkg:=bot velocity:=speed"
+    assert old_names({"remaps": text, "parameters": "speed"}) == Names.of(
+        [
+            WrongName(Thing.TOPIC, "/cmdvel", "/cmd_vel"),
+            WrongName(Thing.FILE, "lib/bot/go", "lib/bot/run"),
+            WrongName(Thing.PACKAGE, "pkg", "bot"),
+            WrongName(Thing.PARAMETER, "velocity", "speed"),
+        ]
+    )
+    assert old_names({}) == NO_NAMES
+
+
+def test_packages_of_a_record_of_before_still_stand_in_for_others():
+    record = SubmissionRecord("ana", "ab" * 32, packages=(PackageRecord("week3", "week3"),))
+    before = {**json.loads(to_json(record)), "stand_ins": [["bot", "week3"]]}
+    del before["names"]
+    found = record_of(json.dumps(before, separators=(",", ":")).encode())
+    assert found.package("bot") == record.packages[0]
+    assert record_of(to_json(found)) == found
+    before["stand_ins"] = []
+    assert record_of(json.dumps(before, separators=(",", ":")).encode()) == record
