@@ -11,6 +11,7 @@ from pathlib import Path
 from grader import resources
 from grader.assignment import rules, simulation
 from grader.assignment.binding import BoundCheck, bind
+from grader.assignment.contract.expand import expanded
 from grader.assignment.interfaces import Interfaces, field_problems, interface_problems
 from grader.assignment.model import NOTHING_WITHHELD, Assignment, Scenario, Withheld
 from grader.assignment.own_check import lesson_checks
@@ -103,7 +104,7 @@ def load_assignment(
     file = find_assignment(name)
     written = read_source(file)
     values = {name: str(one.example) for name, one in read_variables(written).items()}
-    source = filled(written, values)
+    source = expanded(filled(written, values))
     assignment, tried, found = bound_checks(source, catalogue)
     found += rules.problems(source, assignment, tried)
     for number, given in enumerate(assignment.underlays):

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
+from grader.assignment.contract.model import Contract
 from grader.assignment.limits import BuildLimitOptions, LimitOptions
 from grader.assignment.stimuli.stimulus import Stimulus
 from grader.assignment.variable import Variable
@@ -445,8 +446,13 @@ class Assignment(Model):
         default_factory=dict,
         description="Names that students, groups or the roster choose: name -> its origin.",
     )
+    contract: Contract | None = Field(
+        None,
+        description="What the ROS graph of a right submission looks like; the packages and the "
+        "standard checks are made from it.",
+    )
     packages: tuple[Package, ...] = Field(
-        min_length=1, description="Packages that students hand in."
+        min_length=1, description="Packages that students hand in; they come from the contract."
     )
     limits: LimitOptions = Field(
         default_factory=LimitOptions, description="Limits of the student's processes."

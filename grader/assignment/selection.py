@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Collection
 
+from grader.assignment.contract.expand import expanded
 from grader.assignment.load import LoadedAssignment, bound_checks
 from grader.assignment.model import Visibility, Withheld
 from grader.assignment.mutant import required_by
@@ -94,7 +95,7 @@ def with_values(loaded: LoadedAssignment, values: Values) -> LoadedAssignment:
     """
     if loaded.source is None or values == loaded.values:
         return loaded
-    source = filled(loaded.source, values)
+    source = expanded(filled(loaded.source, values))
     assignment, bound, problems = bound_checks(source)
     if problems:
         raise AssignmentError(source.file, problems)

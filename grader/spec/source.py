@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -38,11 +38,13 @@ class Source:
     Attributes:
         data: Plain dicts, lists and scalars; a dict at the top.
         lines: Line (from 1) of each value and, for a mapping entry, of its key.
+        origins: Where a part that was made or moved is written, by its place.
     """
 
     file: Path
     data: dict[str, Any]
     lines: dict[Place, int]
+    origins: Mapping[Place, Place] = field(default_factory=dict)
 
     def line(self, place: Place) -> int | None:
         """Line of a place, or of the nearest enclosing place that was written down."""
@@ -53,7 +55,15 @@ class Source:
 
     def problem(self, place: Place, message: str) -> Problem:
         """A problem at a place of this document."""
-        return Problem(message=message, line=self.line(place), where=path(place))
+        return Problem(message=message, line=self.line(place), where=path(self._written(place)))
+
+    def _written(self, place: Place) -> Place:
+        """Where the author wrote a part: of one that was made, what it was made from."""
+        for end in range(len(place), 0, -1):
+            origin = self.origins.get(place[:end])
+            if origin is not None:
+                return origin + place[end:] if origin[0] == place[0] else origin
+        return place
 
     def duplicates(self, name: str, *keys: str) -> Iterator[Problem]:
         """Entries of the lists under some keys that have the name of an earlier one."""

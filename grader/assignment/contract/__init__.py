@@ -1,0 +1,1 @@
+"""The contract of an assignment: what the ROS graph of a right submission looks like."""

@@ -1,0 +1,140 @@
+"""An assignment with a contract as an author would write it without one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from grader.assignment.contract.derive import Derivation
+from grader.assignment.contract.model import Contract
+from grader.errors import AssignmentError
+from grader.spec.document import Place
+from grader.spec.source import Source, in_order
+from sim.description import Topics
+
+KEY = "contract"
+
+
+def expanded(source: Source) -> Source:
+    """A document with the packages, checks, launches and records that its contract stands for.
+
+    Raises:
+        AssignmentError: The contract is not as it must be, or contradicts the rest.
+    """
+    if KEY not in source.data:
+        return source
+    contract, problems = source.examine(Contract, (KEY,))
+    if contract is None:
+        raise AssignmentError(source.file, problems)
+    derivation = Derivation(contract)
+    found = [*derivation.problems(), *_twice(source, derivation)]
+    if found:
+        problems = [source.problem(place, text) for place, text in found]
+        raise AssignmentError(source.file, in_order(problems))
+    written = _Written(source)
+    packages = [written.package(contract, name) for name in contract.packages]
+    derived = [(derivation.entry(one), one.place) for one in derivation.kept]
+    authors = source.data.get("checks") or []
+    checks = [entry for entry, _ in derived]
+    written.move("checks", len(checks))
+    for index, (entry, place) in enumerate(derived):
+        written.stand_for(("checks", index), entry, place)
+    scenarios = [
+        written.scenario(contract, index, one)
+        for index, one in enumerate(source.data.get("scenarios") or [])
+    ]
+    data = {**source.data, "packages": packages, "checks": [*checks, *authors]}
+    if scenarios:
+        data["scenarios"] = scenarios
+    return replace(source, data=data, lines=written.lines, origins=written.origins)
+
+
+def _twice(source: Source, derivation: Derivation) -> Iterator[tuple[Place, str]]:
+    if "packages" in source.data:
+        yield ("packages",), "the packages stand in the contract: leave 'packages' out"
+    ids = {one.id for one in derivation.kept}
+    authors = source.data.get("checks")
+    for index, entry in enumerate(authors if isinstance(authors, list) else ()):
+        if isinstance(entry, dict) and entry.get("id") in ids:
+            text = (
+                f"{entry['id']!r} comes from the contract already: write what differs under "
+                f"'contract: checks: {entry['id']}', or take its points away there"
+            )
+            yield ("checks", index, "id"), text
+
+
+class _Written:
+    """The lines of an expanded document: where the author wrote what a part is made of."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.lines = dict(source.lines)
+        self.origins: dict[Place, Place] = {}
+
+    def stand_for(self, place: Place, value: Any, origin: Place) -> None:
+        """Note that a part which is made stands for one that is written."""
+        self.origins[place] = origin
+        self.lines.update(dict.fromkeys(_places(place, value), self.source.line(origin) or 1))
+
+    def move(self, key: str, by: int) -> None:
+        """Note that the entries of a list have come to stand further down."""
+        entries = {place: line for place, line in self.lines.items() if place[:1] == (key,)}
+        self.lines = {place: line for place, line in self.lines.items() if place not in entries}
+        self.lines[key,] = entries.pop((key,), self.source.line((KEY,)) or 1)
+        for place, line in entries.items():
+            moved = (key, int(place[1]) + by)
+            self.lines[(*moved, *place[2:])] = line
+            self.origins[moved] = place[:2]
+
+    def package(self, contract: Contract, name: str) -> dict[str, Any]:
+        """The entry of ``packages``."""
+        one = contract.packages[name]
+        kinds = list(one.build_type)
+        entry = {
+            "name": name,
+            "build_type": kinds if len(kinds) > 1 else kinds[0],
+            "depends": list(one.depends),
+            "executables": list(one.executables),
+        }
+        place: Place = ("packages", list(contract.packages).index(name))
+        self.lines.setdefault(("packages",), self.source.line((KEY, "packages")) or 1)
+        self.stand_for(place, entry, (KEY, "packages", name))
+        return entry
+
+    def scenario(self, contract: Contract, index: int, entry: Any) -> Any:
+        """A scenario; by default it runs the only program and records its topics."""
+        if not isinstance(entry, dict):
+            return entry
+        programs = contract.programs
+        made: dict[str, Any] = {}
+        if "launch" not in entry and len(programs) == 1:
+            ((package, executable),) = programs
+            several = len(contract.packages) > 1
+            made["launch"] = [
+                {"executable": executable, **({"package": package} if several else {})}
+            ]
+        launched = entry.get("launch", made.get("launch"))
+        names = [one.get("executable") for one in launched or [] if isinstance(one, dict)]
+        topics = {
+            topic: published.type
+            for (_, executable), program in programs.items()
+            if executable in names
+            for topic, published in program.publishes.items()
+        }
+        if "world" in entry:
+            topics.pop(Topics().command.topic, None)
+        if "record" not in entry and topics:
+            made["record"] = [{"topic": topic, "type": type_} for topic, type_ in topics.items()]
+        for key, value in made.items():
+            self.stand_for(("scenarios", index, key), value, (KEY, "packages"))
+        return {**entry, **made}
+
+
+def _places(place: Place, value: Any) -> Iterator[Place]:
+    yield place
+    steps = (
+        value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    )
+    for step in steps:
+        yield from _places((*place, step), value[step])
