@@ -1,11 +1,10 @@
 """The starter package of an assignment: real ROS packages that build and run, and solve nothing.
 
-Made from the assignment's ``packages`` and from what a student may see of its checks.
+Made from the assignment's ``packages`` and its contract.
 """
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -14,8 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader import resources
+from grader.assignment.contract.standard import ANY
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.model import Assignment, Package, Visibility
+from grader.assignment.model import Assignment, Package
 from grader.errors import UsageError
 from grader.report.files import check_folder, write_whole
 
@@ -148,7 +148,7 @@ def _package(assignment: Assignment, package: Package) -> Iterator[tuple[str, st
             f"starter/node.{'cpp' if is_cpp(package) else 'py'}",
             package=package,
             program=program,
-            node=_node_name(assignment, package, program) or program.module,
+            node=_node_name(assignment, package, program),
             assignment=assignment.id,
         )
         for program in programs(package)
@@ -160,32 +160,21 @@ def _package(assignment: Assignment, package: Package) -> Iterator[tuple[str, st
         yield f"{package.name}/{path}", content
 
 
-def _node_name(assignment: Assignment, package: Package, program: Program) -> str | None:
-    """The node name that a visible check expects of a program that is launched alone."""
-    alone = {
-        scenario.id
-        for scenario in assignment.scenarios
-        if [(launch.package or package.name, launch.executable) for launch in scenario.launch]
-        == [(package.name, program.executable)]
-    }
-    for spec in assignment.checks:
-        judged = set(spec.scenarios) or {scenario.id for scenario in assignment.scenarios}
-        visible = spec.visibility is Visibility.VISIBLE
-        if spec.uses == "node.exists" and visible and judged and judged <= alone:
-            return str(spec.with_["name"]).rpartition("/")[2]
-    return None
+def _node_name(assignment: Assignment, package: Package, program: Program) -> str:
+    """The name of a program's node: the contract's, or that of its module."""
+    programs = assignment.contract.programs if assignment.contract else {}
+    said = programs.get((package.name, program.executable))
+    name = said.node.rpartition("/")[2] if said else ANY
+    return program.module if name == ANY else name
 
 
 def _interfaces(assignment: Assignment, package: Package) -> Iterator[Interface]:
-    """The interfaces of a package that the visible checks name."""
-    if package.build_type != "ament_cmake":
-        return
-    visible = [spec.with_ for spec in assignment.checks if spec.visibility is Visibility.VISIBLE]
-    named = re.findall(
-        rf'"{package.name}/(msg|srv|action)/([A-Z][A-Za-z0-9]*)"', json.dumps(visible, default=str)
-    )
-    for kind, name in dict.fromkeys(named):
-        yield Interface(kind, name)
+    """The interfaces that the contract wants in a package."""
+    contract = assignment.contract
+    said = contract.packages[package.name].interfaces if contract else {}
+    for name in said:
+        kind, _, short = name.partition("/")
+        yield Interface(kind, short)
 
 
 def rendered(name: str, **values: object) -> str:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
+from grader.assignment.contract.derive import Derivation
+from grader.assignment.contract.expand import expanded
+from grader.assignment.contract.model import Contract
 from grader.assignment.load import ASSIGNMENT_FILE, LoadedAssignment
 from grader.assignment.model import Assignment, Visibility
 from grader.assignment.mutant import LANGUAGES
@@ -67,13 +70,11 @@ def _visible_data(loaded: LoadedAssignment, part: LoadedAssignment) -> dict[str,
     assert loaded.source is not None
     data = loaded.source.data
     shown = {scenario.id for scenario in part.assignment.scenarios}
-    scenarios = filled(loaded.source, loaded.values).read(Assignment).scenarios
+    scenarios = expanded(filled(loaded.source, loaded.values)).read(Assignment).scenarios
+    visible = {one.spec.id for one in loaded.checks if one.spec.visibility is Visibility.VISIBLE}
     kept = {
-        "checks": [
-            entry
-            for entry, bound in zip(data["checks"], loaded.checks, strict=True)
-            if bound.spec.visibility is Visibility.VISIBLE
-        ],
+        **_visible_contract(data, loaded.assignment.contract, visible),
+        "checks": [entry for entry in data.get("checks", ()) if entry["id"] in visible],
         "scenarios": [
             entry
             for entry, scenario in zip(data.get("scenarios", []), scenarios, strict=True)
@@ -82,6 +83,17 @@ def _visible_data(loaded: LoadedAssignment, part: LoadedAssignment) -> dict[str,
         "withheld": {"checks": part.withheld.checks, "points": part.withheld.points},
     }
     return {name: value for name, value in {**data, **kept}.items() if name != "points"}
+
+
+def _visible_contract(
+    data: dict[str, Any], contract: Contract | None, visible: Collection[str]
+) -> dict[str, Any]:
+    """The contract without the hidden ones of its checks; what it says is in the handout anyway."""
+    if contract is None:
+        return {}
+    points = {one: count for one, count in Derivation(contract).points.items() if one in visible}
+    changed = {one: entry for one, entry in contract.checks.items() if one in visible}
+    return {"contract": {**data["contract"], "points": points, "checks": changed}}
 
 
 def _names(data: Any, path: str, loaded: LoadedAssignment) -> bool:

@@ -19,28 +19,25 @@ LESSON = """\
 rosgrade: 1
 id: lesson
 title: {title}
-packages:
-  - {{name: talker, executables: [hear, speak], depends: [rclpy]}}
-  - {{name: talker_msgs, build_type: ament_cmake, depends: [std_msgs], executables: [tool]}}
+contract:
+  packages:
+    talker:
+      depends: [rclpy]
+      executables:
+        hear: {{}}
+        speak: {{node: /robot/speaker}}
+    talker_msgs:
+      build_type: ament_cmake
+      depends: [std_msgs]
+      executables: {{tool: {{}}}}
+      interfaces:
+        srv/Ask: {{definition: "---"}}
+        action/Go: {{definition: "---\\n---"}}
+  points: {{talker_builds: 1, node: 1}}
 scenarios:
   - id: run
     launch: [{{package: talker, executable: speak}}]
     timeout: 5 s
-checks:
-  - {{id: builds, uses: package.builds, with: {{package: talker}}, points: 1}}
-  - {{id: ask, uses: interface.found, with: {{interface: talker_msgs/srv/Ask}}, points: 1}}
-  - {{id: go, uses: interface.found, with: {{interface: talker_msgs/action/Go}}, points: 1}}
-  - id: secret
-    uses: interface.found
-    with: {{interface: talker_msgs/msg/Secret}}
-    points: 1
-    visibility: hidden
-  - id: secret_name
-    uses: node.exists
-    with: {{name: Secret}}
-    points: 1
-    visibility: hidden
-  - {{id: speaker, uses: node.exists, with: {{name: speaker}}, points: 1}}
 """
 
 
@@ -79,7 +76,7 @@ def test_a_single_program_lies_in_the_module_that_the_handouts_name() -> None:
     assert setup["install"]["install_scripts"] == "$base/lib/bot_publisher"
 
 
-def test_a_node_is_called_as_a_visible_check_wants_it(tmp_path: Path) -> None:
+def test_a_node_is_called_as_the_contract_wants_it(tmp_path: Path) -> None:
     files = starter_files(load_assignment("executors"))
     for module in ("single_threaded", "multi_threaded"):
         code = files[f"executors_demo/executors_demo/{module}.py"]
@@ -89,7 +86,7 @@ def test_a_node_is_called_as_a_visible_check_wants_it(tmp_path: Path) -> None:
     assert "super().__init__('hear')" in files["talker/talker/hear.py"]
 
 
-def test_an_interface_package_generates_what_the_visible_checks_name(tmp_path: Path) -> None:
+def test_an_interface_package_generates_what_the_contract_names(tmp_path: Path) -> None:
     files = starter_files(lesson(tmp_path))
     assert files["talker_msgs/srv/Ask.srv"].splitlines()[-1:] == ["---"]
     assert files["talker_msgs/action/Go.action"].splitlines()[-2:] == ["---", "---"]
@@ -143,10 +140,6 @@ def test_a_package_for_cmake_that_needs_rclpy_installs_its_programs(tmp_path: Pa
     files = starter_files(load_assignment(tmp_path / "lesson"))
     assert files["talker_msgs/scripts/talker_msgs.py"].startswith("#!/usr/bin/env python3\n")
     assert "RENAME tool" in files["talker_msgs/CMakeLists.txt"]
-
-
-def test_nothing_of_a_hidden_check_is_in_it(tmp_path: Path) -> None:
-    assert "Secret" not in str(starter_files(lesson(tmp_path)))
 
 
 def test_a_title_may_hold_any_character(tmp_path: Path) -> None:

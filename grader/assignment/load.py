@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 from grader import resources
 from grader.assignment import rules, simulation
@@ -60,6 +62,12 @@ class LoadedAssignment:
         own = place.resolve().parent == resources.assignments().resolve()
         return None if own else str(place.absolute())
 
+    @cached_property
+    def entries(self) -> dict[str, Any]:
+        """The checks as they are written, with the variables in them, by their id."""
+        written = expanded(self.source).data["checks"] if self.source else ()
+        return {entry["id"]: entry for entry in written}
+
     def scenarios_of(self, bound: BoundCheck) -> tuple[Scenario, ...]:
         """The scenarios that a check of a run judges: those that it names, or all."""
         if bound.check.subject is Subject.SUBMISSION:
@@ -104,6 +112,8 @@ def load_assignment(
     file = find_assignment(name)
     written = read_source(file)
     values = {name: str(one.example) for name, one in read_variables(written).items()}
+    # A place that takes no variable is found here, and not when a submission is judged.
+    expanded(written)
     source = expanded(filled(written, values))
     assignment, tried, found = bound_checks(source, catalogue)
     found += rules.problems(source, assignment, tried)

@@ -46,6 +46,12 @@ def assignment_schema(catalogue: Mapping[str, Check] = CATALOGUE) -> dict[str, A
     entry["allOf"] = [
         _parameters_of(check, references[check.parameters]) for check in catalogue.values()
     ]
+    # What a contract stands for need not be written.
+    whole = schema["$defs"][references[Assignment]["$ref"].rpartition("/")[2]]
+    made = {"packages", "checks"}
+    whole["required"] = [name for name in whole["required"] if name not in made]
+    whole["anyOf"] = [{"required": sorted(made)}, {"required": ["contract"]}]
+    schema["$defs"]["Scenario"]["required"].remove("launch")
     return {**references[Assignment], **schema}
 
 

@@ -28,18 +28,32 @@ def validate(
         list[str],
         typer.Argument(help="assignment.yaml or course.yaml, folders, or ids of assignments."),
     ],
+    whole: Annotated[
+        bool,
+        typer.Option(
+            "--expanded", help="Print the YAML with all that the contract stands for, and stop."
+        ),
+    ] = False,
 ) -> None:
     """Check assignments without running anything.
 
     Shows the file and line of every mistake, and what is allowed there.
     """
+    from grader.assignment.contract.expand import plain
     from grader.assignment.lint_warnings import lint_warnings
     from grader.assignment.load import load_assignment
     from grader.assignment.mutant import LANGUAGES, load_mutants
     from grader.batch.type_support import missing_underlays
     from grader.course.load import COURSE_FILE, load_course
     from grader.sandbox.python_tree import not_installed
+    from grader.spec.document import write_yaml
 
+    if whole:
+        for name in files:
+            loaded = load_assignment(name)
+            assert loaded.source is not None
+            typer.echo(write_yaml(plain(loaded.source)), nl=False)
+        return
     broken = 0
     for name in files:
         try:

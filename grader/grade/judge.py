@@ -222,8 +222,7 @@ def _findings(
 
 def _needs_names(bound: BoundCheck, loaded: LoadedAssignment, names: Collection[str]) -> bool:
     """Whether a check needs a run, or one of some names that the submission chooses."""
-    written = loaded.source.data["checks"] if loaded.source else ()
-    own = str([entry.get("with") for entry in written if entry.get("id") == bound.spec.id])
+    own = str(loaded.entries.get(bound.spec.id, {}).get("with"))
     is_run = bound.check.subject is Subject.RECORDING
     return is_run or any(f"{{{name}}}" in own for name in names)
 

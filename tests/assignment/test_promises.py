@@ -15,7 +15,8 @@ why none is needed::
 A sentence stands there as in the handout, without its line breaks. ``no_promise`` is for what
 demands nothing of the submission: an explanation, advice, how to try it, what the grader does.
 What demands something that is not checked gets a check, or leaves the handout. To begin a table,
-write ``lesson: []`` and run this test: it prints the sentences that are missing.
+write ``lesson: []`` and run this test: it prints the sentences that are missing. The rows that the
+contract makes are not written there: each promises what its checks hold.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ from markdown_it import MarkdownIt
 from pydantic import BaseModel, ConfigDict
 
 from grader import resources
+from grader.assignment.contract.table import told_by
 from grader.assignment.load import LoadedAssignment, list_assignments, load_assignment
+from grader.report.html.handout import make_handout
 
 TABLES = Path(__file__).with_name("promises")
 EXAMPLES = {
@@ -72,8 +75,12 @@ def loaded(request: pytest.FixtureRequest) -> LoadedAssignment:
 
 @pytest.fixture
 def table(loaded: LoadedAssignment) -> Table:
+    """The table as it is written, with the rows that the contract makes and what they promise."""
     text = (TABLES / f"{loaded.assignment.id}.yaml").read_text(encoding="utf-8")
-    return Table.model_validate(yaml.safe_load(text))
+    table = Table.model_validate(yaml.safe_load(text))
+    contract = loaded.assignment.contract
+    made = told_by(contract) if contract else {}
+    return table.model_copy(update={"promises": {**table.promises, **made}})
 
 
 def sentences(markdown: str) -> Iterator[str]:
@@ -129,7 +136,7 @@ ros2 run
 def test_every_sentence_of_a_handout_has_a_check_or_needs_none(
     loaded: LoadedAssignment, table: Table
 ) -> None:
-    said = list(sentences((loaded.folder / "README.md").read_text(encoding="utf-8")))
+    said = list(sentences(make_handout(loaded).text))
     missing = [one for one in dict.fromkeys(said) if one not in table.sentences]
     rows = yaml.safe_dump(missing, allow_unicode=True, width=1000)
     assert not missing, f"sentences that do not stand in the table:\n{rows}"

@@ -12,6 +12,7 @@ from typing import Any
 
 from grader.assignment.contract.model import Contract
 from grader.assignment.contract.standard import Fact, Spot, spots
+from grader.findings.words import Words
 from grader.spec.document import Place
 from grader.spec.nearest_name import nearest_or_all
 
@@ -64,12 +65,11 @@ class Derivation:
 
     def entry(self, one: Derived) -> dict[str, Any]:
         """A check as an author would write it."""
-        words, hint = one.spot.words, one.fact.hint
+        words = one.spot.words
         asked = dict(one.asked)
         opened = next((other for other in self._before(one) if other.asked.get("remap")), None)
         if opened is not None and opened not in self.kept and one.fact.uses == "topic.type":
             asked["remap"] = True
-        python, cpp = hint.python.format(**words), hint.cpp.format(**words)
         entry: dict[str, Any] = {
             "id": one.id,
             "title": one.fact.title.format(**words),
@@ -78,7 +78,7 @@ class Derivation:
             "scenarios": list(one.spot.program.scenarios) if self._is_of_a_run(one) else [],
             "points": self.points[one.id],
             "requires": list(dict.fromkeys(found.id for found in self._required(one))),
-            "hint": {"python": python, "cpp": cpp} if cpp else python,
+            "hint": _filled(one.fact.hint, words),
         }
         other = self.contract.checks.get(one.id, {})
         if isinstance(other.get("with"), dict):
@@ -185,6 +185,13 @@ def _shared(total: float, every: Collection[Derived]) -> dict[str, float]:
     heaviest = max(every, key=lambda one: one.fact.weight)
     shares[heaviest.id] += total - math.fsum(shares.values())
     return {name: round(points, 6) for name, points in shares.items()}
+
+
+def _filled(hint: str | Words, words: Mapping[str, str]) -> str | dict[str, str]:
+    """A hint as an author would write it."""
+    if isinstance(hint, str):
+        return hint.format(**words)
+    return {"python": hint.python.format(**words), "cpp": hint.cpp.format(**words)}
 
 
 def _own_ids(spot: Spot) -> Mapping[str, str]:

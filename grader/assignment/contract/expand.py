@@ -50,6 +50,16 @@ def expanded(source: Source) -> Source:
     return replace(source, data=data, lines=written.lines, origins=written.origins)
 
 
+_ORDER = ("rosgrade", "id", "title", "variables", "packages")
+
+
+def plain(source: Source) -> dict[str, Any]:
+    """A document with all that its contract stands for, and without the contract."""
+    data = expanded(source).data
+    names = [*(name for name in _ORDER if name in data), *(n for n in data if n not in _ORDER)]
+    return {name: data[name] for name in names if name != KEY}
+
+
 def _twice(source: Source, derivation: Derivation) -> Iterator[tuple[Place, str]]:
     if "packages" in source.data:
         yield ("packages",), "the packages stand in the contract: leave 'packages' out"
@@ -97,6 +107,7 @@ class _Written:
             "depends": list(one.depends),
             "executables": list(one.executables),
         }
+        entry = {name: value for name, value in entry.items() if value}
         place: Place = ("packages", list(contract.packages).index(name))
         self.lines.setdefault(("packages",), self.source.line((KEY, "packages")) or 1)
         self.stand_for(place, entry, (KEY, "packages", name))

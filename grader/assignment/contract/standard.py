@@ -25,19 +25,12 @@ from grader.assignment.contract.model import (
     Subscription,
 )
 from grader.findings.wording import listing, value_text
+from grader.findings.words import Words
 from grader.spec.document import Place
 
 ANY = "any"
 _STAY_ALIVE = "rclpy.spin(node) keeps the node running until it is interrupted."
 _NAME_HINT = "The {} argument of create_{} is the name of the topic."
-
-
-@dataclass(frozen=True)
-class Words:
-    """A hint in the words of Python and of C++; the same where only one is given."""
-
-    python: str
-    cpp: str = ""
 
 
 @dataclass(frozen=True)
@@ -55,7 +48,7 @@ class Fact:
     uses: str
     asked: Callable[[Spot], dict[str, Any] | None]
     title: str
-    hint: Words
+    hint: str | Words
     requires: tuple[str, ...] = ()
     weight: int = 1
 
@@ -231,9 +224,7 @@ PACKAGE = (
         "package.builds",
         lambda it: {"package": it.package} if it.of_package.executables else None,
         "The package{of_package} builds with colcon",
-        Words(
-            "Run `colcon build` in your workspace (the folder above src) and read its first error."
-        ),
+        "Run `colcon build` in your workspace (the folder above src) and read its first error.",
         ("package", "generated"),
     ),
     Fact(
@@ -271,9 +262,7 @@ PROGRAM = (
         "node.starts",
         lambda it: {},
         "{program} starts and creates a node",
-        Words(
-            "Run `ros2 run {package} {executable}` yourself and read the last lines that it prints."
-        ),
+        "Run `ros2 run {package} {executable}` yourself and read the last lines that it prints.",
         ("executable",),
     ),
     Fact(
@@ -380,7 +369,7 @@ PUBLICATION = (
             {"topic": it.name, "exactly": count} if (count := _publication(it).count) else None
         ),
         "Exactly {count} {are} published",
-        Words("Publish neither in a loop nor in a timer that goes on."),
+        "Publish neither in a loop nor in a timer that goes on.",
         ("sent",),
         4,
     ),
@@ -391,7 +380,7 @@ PUBLICATION = (
             {"topic": it.name, "value": value} if (value := _publication(it).value) else None
         ),
         "Every message has {value}",
-        Words("Set the fields before you publish; all others keep their default of 0."),
+        "Set the fields before you publish; all others keep their default of 0.",
         ("sent",),
         4,
     ),
@@ -404,7 +393,7 @@ PUBLICATION = (
             else None
         ),
         "A message comes every {period}",
-        Words("`ros2 topic hz {name}` shows the rate."),
+        "`ros2 topic hz {name}` shows the rate.",
         ("sent", "alive"),
         8,
     ),
@@ -480,7 +469,7 @@ AFTERWARDS = (
         "executor.responsive",
         lambda it: it.program.responsive or None,
         "The callbacks {whose}do not block the executor",
-        Words("Do not loop or sleep in a callback: let it do its work once, and return."),
+        "Do not loop or sleep in a callback: let it do its work once, and return.",
         ("sent", "alive"),
         4,
     ),
@@ -495,7 +484,7 @@ AFTERWARDS = (
             else {"topics": list(it.program.leaves_alone)}
         ),
         "{subject} does not publish on the robot's own topics",
-        Words("Only the robot publishes its sensors. Your node only subscribes to them."),
+        "Only the robot publishes its sensors. Your node only subscribes to them.",
         ("starts",),
     ),
 )
@@ -554,7 +543,7 @@ INTERFACE = (
         "interface.found",
         lambda it: {"interface": it.interface},
         "The definition is in {file}",
-        Words("Its folder is beside package.xml, and the file has the name of the interface."),
+        "Its folder is beside package.xml, and the file has the name of the interface.",
         ("package",),
     ),
     Fact(
@@ -562,7 +551,7 @@ INTERFACE = (
         "interface.fields",
         _definition,
         "{interface} has the fields that are asked for",
-        Words("Two programs can communicate only if they have the same definition."),
+        "Two programs can communicate only if they have the same definition.",
         ("definition",),
         4,
     ),
@@ -571,7 +560,7 @@ INTERFACE = (
         "interface.constants",
         _constants,
         "{interface} has the constants that are asked for",
-        Words("A constant has a name in upper case and an equals sign."),
+        "A constant has a name in upper case and an equals sign.",
         ("definition",),
         4,
     ),
@@ -580,7 +569,7 @@ INTERFACE = (
         "interface.generated",
         lambda it: {"interface": it.interface},
         "The build generates {interface}",
-        Words("After `colcon build` and sourcing, `ros2 interface show {interface}` works."),
+        "After `colcon build` and sourcing, `ros2 interface show {interface}` works.",
         ("definition",),
     ),
     Fact(
@@ -588,7 +577,7 @@ INTERFACE = (
         "interface.manifest",
         lambda it: {"interface": it.interface},
         "package.xml{of_package} declares that the package holds interfaces",
-        Words(
+        (
             "Your machine has these packages already. Another machine installs only the packages "
             "that package.xml names."
         ),

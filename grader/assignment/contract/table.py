@@ -1,0 +1,121 @@
+"""The table "What to build" of a handout, made from the contract."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from grader.assignment.contract.derive import Derivation
+from grader.assignment.contract.model import Connection, Contract, Program
+from grader.assignment.contract.standard import ANY, leaves, period_of
+from grader.findings.wording import codes, listing
+from grader.spec.document import Place
+
+MARKER = "<!-- contract -->"
+_HEAD = "| | |\n| --- | --- |"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the table, with the facts of a part of the contract that it tells."""
+
+    label: str
+    text: str
+    place: Place
+    facts: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """The row in Markdown, without its outer bars."""
+        return f"{self.label} | {self.text}"
+
+
+def with_table(text: str, contract: Contract | None) -> str:
+    """A handout with the table in place of its marker; what follows may be more of its rows."""
+    if contract is None or MARKER not in text:
+        return text
+    lines = "\n".join(f"| {row} |" for row in rows(contract))
+    return text.replace(MARKER, f"{_HEAD}\n{lines}")
+
+
+def told_by(contract: Contract) -> dict[str, list[str]]:
+    """The ids of the checks that hold what a row promises, by the row."""
+    found: dict[str, list[str]] = {}
+    for row in rows(contract):
+        for one in Derivation(contract).kept:
+            if one.place == row.place and one.fact.name in row.facts:
+                found.setdefault(str(row), []).append(one.id)
+    return found
+
+
+def rows(contract: Contract) -> Iterator[Row]:
+    """The rows: packages, their programs and interfaces, and what the nodes do."""
+    for package, one in contract.packages.items():
+        place: Place = ("contract", "packages", package)
+        yield Row("package", f"`{package}`", place, ("package", "builds", "dependencies"))
+        for name in one.interfaces:
+            facts = ("definition", "fields", "constants", "generated", "manifest")
+            yield Row("defines", f"`{package}/{name}`", (*place, "interfaces", name), facts)
+        for executable, program in one.executables.items():
+            yield from _program(executable, program, (*place, "executables", executable))
+
+
+def _program(executable: str, program: Program, place: Place) -> Iterator[Row]:
+    yield Row("executable", f"`{executable}`", place, ("executable", "starts"))
+    if program.node != ANY:
+        yield Row("node", f"`{program.node}`", place, ("node",))
+    for key, said, prefix in (
+        ("subscribes", program.subscribes, "subscribed_"),
+        ("publishes", program.publishes, ""),
+    ):
+        for topic, part in said.items():
+            first = "topic" if key == "publishes" else "subscribes"
+            facts = (first, *(f"{prefix}{name}" for name in ("type", "qos", "depth")))
+            yield Row(key, _connection(topic, part), (*place, key, topic), facts)
+    for topic, part in program.publishes.items():
+        here = (*place, "publishes", topic)
+        on = f" on `{topic}`" if len(program.publishes) > 1 else ""
+        if part.value:
+            fields = listing(f"`{name}` = {_written(value)}" for name, value in leaves(part.value))
+            rest = "" if "rest" in part.value else "; all other fields 0"
+            yield Row(f"message{on}", f"{fields}{rest}", here, ("sent", "values"))
+        if part.count:
+            often = "exactly once" if part.count == 1 else f"exactly {part.count} times"
+            yield Row(f"how often{on}", often, here, ("once",))
+        if part.period is not None:
+            by = ", from the callback of a timer" if part.timer else ""
+            often = f"every {period_of(part)['period']}{by}"
+            yield Row(f"how often{on}", often, here, ("period", "timer"))
+    for key, label, fact in (
+        ("serves", "offers the service", "service"),
+        ("actions", "offers the action", "action"),
+    ):
+        for name, server in getattr(program, key).items():
+            yield Row(label, f"`{name}`, type `{server.type}`", (*place, key, name), (fact,))
+    for name, parameter in program.parameters.items():
+        kind = f", {parameter.type}" if parameter.type else ""
+        default = "" if parameter.default is None else f", default {_written(parameter.default)}"
+        yield Row(
+            "parameter", f"`{name}`{kind}{default}", (*place, "parameters", name), ("parameter",)
+        )
+    if program.leaves_alone not in ((), "robot"):
+        yield Row("does not publish on", codes(program.leaves_alone), place, ("untouched",))
+    ends = f", and ends within {program.ends} of it" if program.ends else ""
+    if program.alive:
+        yield Row("runs", f"until Ctrl+C{ends}", place, ("alive", "ends"))
+    if program.responsive:
+        answers = f"within {program.responsive.get('within', 'a second')}"
+        yield Row("answers services", answers, place, ("responsive",))
+
+
+def _connection(topic: str, part: Connection) -> str:
+    qos = [value.replace("_", " ") for value in part.qos.values()]
+    queue = [f"queue size {part.depth}"] if part.depth else []
+    return ", ".join(
+        [f"`{topic}`", f"type `{part.type}`", *filter(None, [" and ".join(qos)]), *queue]
+    )
+
+
+def _written(value: Any) -> str:
+    """A value as the author wrote it."""
+    return str(value)
