@@ -34,7 +34,9 @@ from markdown_it import MarkdownIt
 from pydantic import BaseModel, ConfigDict
 
 from grader import resources
-from grader.assignment.contract.table import told_by
+from grader.assignment.contract.derive import Derivation
+from grader.assignment.contract.model import Contract
+from grader.assignment.contract.table import rows
 from grader.assignment.load import LoadedAssignment, list_assignments, load_assignment
 from grader.report.html.handout import make_handout
 
@@ -81,6 +83,16 @@ def table(loaded: LoadedAssignment) -> Table:
     contract = loaded.assignment.contract
     made = told_by(contract) if contract else {}
     return table.model_copy(update={"promises": {**table.promises, **made}})
+
+
+def told_by(contract: Contract) -> dict[str, list[str]]:
+    """The checks that hold what a row of the contract's table promises, by the row."""
+    found: dict[str, list[str]] = {}
+    for row in rows(contract):
+        for one in Derivation(contract).kept:
+            if one.place == row.place and one.fact.name in row.facts:
+                found.setdefault(str(row), []).append(one.id)
+    return found
 
 
 def sentences(markdown: str) -> Iterator[str]:

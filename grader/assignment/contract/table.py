@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from grader.assignment.contract.derive import Derivation
 from grader.assignment.contract.model import Connection, Contract, Program
 from grader.assignment.contract.standard import ANY, leaves, period_of
 from grader.findings.wording import codes, listing
@@ -36,16 +35,6 @@ def with_table(text: str, contract: Contract | None) -> str:
         return text
     lines = "\n".join(f"| {row} |" for row in rows(contract))
     return text.replace(MARKER, f"{_HEAD}\n{lines}")
-
-
-def told_by(contract: Contract) -> dict[str, list[str]]:
-    """The ids of the checks that hold what a row promises, by the row."""
-    found: dict[str, list[str]] = {}
-    for row in rows(contract):
-        for one in Derivation(contract).kept:
-            if one.place == row.place and one.fact.name in row.facts:
-                found.setdefault(str(row), []).append(one.id)
-    return found
 
 
 def rows(contract: Contract) -> Iterator[Row]:
