@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -104,9 +104,9 @@ class Batch:
             paths |= self._keep_absent(earlier)
         named = with_teams(self._entries.values(), earlier, self.ledger)
         self._entries = {entry.key: entry for entry in named}
-        self._keep_attempts(earlier)
         to_do = {key: path for key, path in paths.items() if not self._is_done(key)}
-        self._refuse_changed(set(paths) - set(to_do))
+        self._refuse_changed(to_do)
+        self._keep_attempts(earlier)
         self._write()
         return list(self._entries.values()), to_do
 
@@ -159,19 +159,28 @@ class Batch:
             raise UsageError(f"{self.ledger.out}: holds the grades of {name}; use a new folder")
         return {entry.key: entry for entry in written.entries}
 
-    def _refuse_changed(self, keys: Iterable[str]) -> None:
+    def _refuse_changed(self, to_do: Collection[str]) -> None:
         """Let no grade of another version of the assignment stay beside the new ones."""
-        results = {key: self.ledger.result(key) for key in sorted(keys)}
-        versions = {key: one.assignment.sha256 for key, one in results.items() if one is not None}
-        changed = [key for key, version in versions.items() if version != self.loaded.sha256]
+        changed, places = [], set()
+        for key, entry in sorted(self._entries.items()):
+            result = self.ledger.result(key) if entry.sha256 and not entry.same_as else None
+            if key in to_do or result is None or result.submission.sha256 != entry.sha256:
+                continue
+            if result.assignment.sha256 != self.loaded.sha256:
+                changed.append(key)
+                places.add(result.assignment.location)
         if changed:
-            more = ", …" if len(changed) > _MOST_NAMED else ""
+            out, more = self.ledger.out, ", …" if len(changed) > _MOST_NAMED else ""
+            remedies = [
+                f"{regrade_command(out, self.loaded)} judges their recordings again with this one"
+            ]
+            if places != {self.loaded.location}:
+                remedies.append(f"`rosgrade batch {out}` goes on with theirs")
+            if not self.keep:
+                remedies.append("`--retry all` runs all of them again, `--retry NAME` one")
             raise UsageError(
-                f"{self.ledger.out}: {len(changed)} ({', '.join(changed[:_MOST_NAMED])}{more}) "
-                f"graded with another version of {self.loaded.assignment.id}. "
-                f"{regrade_command(self.ledger.out, self.loaded)} judges their recordings again "
-                f"with this one; `rosgrade batch {self.ledger.out}` goes on with theirs; "
-                "`--retry all` runs all of them again, `--retry NAME` one"
+                f"{out}: {len(changed)} ({', '.join(changed[:_MOST_NAMED])}{more}) graded with "
+                f"another version of {self.loaded.assignment.id}. {'; '.join(remedies)}"
             )
 
     def _take(self, key: str, partial: Path, future: Future[None]) -> None:

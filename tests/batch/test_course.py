@@ -163,6 +163,29 @@ def course(tmp_path: Path) -> Class:
     return Class(tmp_path)
 
 
+def test_an_assignment_that_was_edited_in_place_grades_nobody_beside_the_others(
+    course: Class,
+) -> None:
+    course.hand_in("ana", "bot")
+    course.grade()
+    yaml = course.folder / "lesson" / "assignment.yaml"
+    yaml.write_text(YAML.replace("points: 6", "points: 7"))
+    course.loaded = load_assignment(yaml.parent)
+    course.handed = course.folder / "new"
+    course.hand_in("ben", "bot", text="ben")
+    with pytest.raises(UsageError, match=r"1 \(ana\) graded with another version") as refused:
+        course.grade(handed=course.handed)
+    # Neither of these would change anything.
+    assert "`rosgrade batch" not in str(refused.value) and "--retry" not in str(refused.value)
+    assert f"`rosgrade regrade {course.out} {yaml.parent}`" in str(refused.value)
+    assert set(course.entries()) == {"ana"}
+    with Ledger(course.out).opened() as ledger:
+        list(regrade_class(course.loaded, ledger))
+    rows = course.grade(handed=course.handed)
+    versions = {one.result.assignment.sha256 for one in rows.values() if one.result}
+    assert set(rows) == {"ana", "ben"} and versions == {course.loaded.sha256}
+
+
 def test_gradescope_s_times_cost_what_the_rules_say(course: Class) -> None:
     course.hand_in("submission_1", "bot")
     course.hand_in("submission_2", "bot", text="ben")
