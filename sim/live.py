@@ -25,35 +25,34 @@ from sim.motion import NS, Pose
 from sim.node import RosSimulator, make_node
 from sim.robot import MODELS
 from sim.screen import Screen
-from sim.simulation import make_simulation
-from sim.world import read_world
+from sim.simulation import Simulation
+from sim.world import World, read_world
 
 _REFRESH_NS = NS // 10
 _LINE_NS = NS
 
 
+def described(
+    world: Path, values: Sequence[str], options: Path | None, robot: str | None, pose: str | None
+) -> tuple[World, SimulatorOptions]:
+    """The world and the options that a command line describes.
+
+    Args:
+        values: Of the world, each as ``NAME=VALUE``.
+        options: File with robot, sensors and topics, or None for the defaults.
+    """
+    return read_world(world, _read_values(values)), _options(options, robot, pose)
+
+
 def run(
-    world: Path,
-    *,
-    options: Path | None = None,
-    robot: str | None = None,
-    pose: str | None = None,
-    seed: int = 0,
-    domain_id: int | None = None,
-    values: Sequence[str] | None = None,
-    duration: float | None = None,
+    simulation: Simulation, *, domain_id: int | None = None, duration: float | None = None
 ) -> None:
     """Simulate in real time until Ctrl-C, with a view on a terminal, else a line in a second.
 
     Args:
-        options: File with robot, sensors and topics, or None for the defaults.
         domain_id: ROS domain, or None for ROS_DOMAIN_ID.
-        values: Of the world, each as ``NAME=VALUE``.
         duration: End after so many simulated seconds, or None.
     """
-    read = read_world(world, _read_values(values or ()))
-    chosen = _options(options, robot, pose)
-    simulation = make_simulation(read, chosen, seed)
     context = Context()
     # Ctrl-C is handled here: rclpy's handler would shut the context down within a step.
     rclpy.init(

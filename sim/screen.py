@@ -92,8 +92,7 @@ class Screen:
             simulation.model.radius_m,
             self.time_ns,
             hits,
-            columns,
-            max(4, lines - _SUMMARY_LINES - 1),
+            (columns, max(4, lines - _SUMMARY_LINES - 1)),
         )
         for label, *parts in self._summary(self._step) if self._step else ():
             style = "bold red" if label == "contact" and parts != ["none"] else ""
@@ -164,13 +163,15 @@ def _speeds(twist: Twist) -> tuple[str, str]:
 
 
 def draw(
-    world: World, pose: Pose, radius_m: float, time_ns: int, hits: Points, columns: int, rows: int
+    world: World, pose: Pose, radius_m: float, time_ns: int, hits: Points, size: tuple[int, int]
 ) -> Text:
     """Draw a world with its robot from above.
 
     Args:
         hits: Where the beams of the LiDAR ended (see :func:`hit_points`).
+        size: Columns and rows of characters.
     """
+    columns, rows = size
     x_min, y_min, x_max, y_max = world.extent((pose.x_m, pose.y_m))
     width_m = max(x_max - x_min + 2 * _MARGIN_M, _LEAST_M)
     height_m = max(y_max - y_min + 2 * _MARGIN_M, _LEAST_M)

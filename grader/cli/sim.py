@@ -31,15 +31,8 @@ def sim(
     Runs in real time. The robot subscribes to /cmd_vel and publishes /odom and /scan, like a
     TurtleBot3 in Gazebo.
     """
-    from sim.live import run
+    from sim.live import described, run
+    from sim.simulation import make_simulation
 
-    run(
-        world,
-        options=options,
-        robot=robot,
-        pose=pose,
-        seed=seed,
-        domain_id=domain_id,
-        values=values,
-        duration=duration,
-    )
+    simulation = make_simulation(*described(world, values or (), options, robot, pose), seed)
+    run(simulation, domain_id=domain_id, duration=duration)

@@ -61,7 +61,7 @@ WALL, MOVING, HIT, _, ROBOT = STYLES[1:]
 def drawn(
     world: World, pose: Pose, time_ns: int = 0, hits: tuple[tuple[float, float], ...] = ()
 ) -> Text:
-    return draw(world, pose, 0.05, time_ns, np.array(hits).reshape(-1, 2), 40, 20)
+    return draw(world, pose, 0.05, time_ns, np.array(hits).reshape(-1, 2), (40, 20))
 
 
 def places(text: Text, style: str) -> list[tuple[int, int, str]]:
