@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 from grader.errors import GraderFault
-from grader.submission.build.bounded import run_bounded
+from grader.submission.build.bounded import Command, run_bounded
 from grader.submission.intake.paths import shown
 
 _SAFE = {
@@ -36,9 +36,8 @@ def run_git(arguments: list[str], folder: Path, wall_s: float) -> str:
         raise GraderFault("git is not installed")
     settings = [part for key, value in _SAFE.items() for part in ("-c", f"{key}={value}")]
     environment = {key: value for key, value in os.environ.items() if key not in _FOREIGN}
-    done = run_bounded(
-        [git, *settings, *arguments], cwd=folder, environment=environment | _QUIET, wall_s=wall_s
-    )
+    command = Command([git, *settings, *arguments], folder, environment | _QUIET)
+    done = run_bounded(command, wall_s=wall_s)
     if done.ended_by_us:
         raise GraderFault(f"git {arguments[0]} took longer than {wall_s:.0f} s")
     if done.status:

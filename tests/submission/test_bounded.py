@@ -11,20 +11,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.submission.build import bounded
-from grader.submission.build.bounded import CappedOutput, Outcome, OutputLimits, run_bounded
+from grader.submission.build.bounded import (
+    CappedOutput,
+    Command,
+    Outcome,
+    OutputLimits,
+    run_bounded,
+)
 
 
 def run(
     program: str, folder: Path, wall_s: float = 20.0, output: OutputLimits | None = None
 ) -> Outcome:
     """Run a Python program, with what it must not leave behind marked in its environment."""
-    return run_bounded(
-        [sys.executable, "-I", "-S", "-c", program],
-        cwd=folder,
-        environment={"PATH": os.environ["PATH"], "MARK": str(folder)},
-        wall_s=wall_s,
-        output=output,
-    )
+    environment = {"PATH": os.environ["PATH"], "MARK": str(folder)}
+    command = Command([sys.executable, "-I", "-S", "-c", program], folder, environment)
+    return run_bounded(command, wall_s=wall_s, output=output)
 
 
 def left_behind(folder: Path) -> list[int]:
@@ -122,13 +124,9 @@ def test_too_much_output_ends_it_and_is_not_kept(tmp_path: Path) -> None:
 
 def test_lines_are_reported_while_it_runs(tmp_path: Path) -> None:
     lines: list[str] = []
-    run_bounded(
-        [sys.executable, "-c", "print('a'); print('b' * 10000); print('c', end='')"],
-        cwd=tmp_path,
-        environment={},
-        wall_s=20.0,
-        on_line=lines.append,
-    )
+    program = "print('a'); print('b' * 10000); print('c', end='')"
+    command = Command([sys.executable, "-c", program], tmp_path, {})
+    run_bounded(command, wall_s=20.0, on_line=lines.append)
     assert lines[0] == "a"
     assert len(lines[1]) == 4096
     assert len(lines) == 2
@@ -140,7 +138,7 @@ def test_a_command_that_kills_its_supervisor_has_no_success(tmp_path: Path) -> N
 
 
 def test_a_program_that_does_not_exist_says_so(tmp_path: Path) -> None:
-    outcome = run_bounded(["no-such"], cwd=tmp_path, environment={"PATH": "/bin"}, wall_s=20.0)
+    outcome = run_bounded(Command(["no-such"], tmp_path, {"PATH": "/bin"}), wall_s=20.0)
     assert outcome.status == 127
     assert "no-such" in outcome.output
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from grader.submission.build import bounded
-from grader.submission.build.bounded import Outcome, Starved, run_bounded
+from grader.submission.build.bounded import Command, Outcome, Starved, run_bounded
 from grader.submission.build.own_time import Look, OwnTime, stalled_s, taken_s, throttled_s
 
 BEGIN = Look(0.0)
@@ -90,7 +90,7 @@ def _start(program: str) -> subprocess.Popen[bytes]:
 def run(program: str, folder: Path, wall_s: float) -> Outcome:
     command = [sys.executable, "-I", "-S", "-c", f"import os, time\n{program}"]
     environment = {"PATH": os.environ["PATH"]}
-    return run_bounded(command, cwd=folder, environment=environment, wall_s=wall_s)
+    return run_bounded(Command(command, folder, environment), wall_s=wall_s)
 
 
 def test_a_program_that_shares_a_core_has_as_much_longer(

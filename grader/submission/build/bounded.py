@@ -91,11 +91,18 @@ class Starved(GraderFault):
     """The machine gave a command too little time to say how it ends; later it may."""
 
 
+@dataclass(frozen=True)
+class Command:
+    """A program to run, with its arguments, in a folder."""
+
+    arguments: Sequence[str]
+    folder: Path
+    environment: Mapping[str, str]
+
+
 def run_bounded(
-    command: Sequence[str],
+    command: Command,
     *,
-    cwd: Path,
-    environment: Mapping[str, str],
     wall_s: float,
     output: OutputLimits | None = None,
     on_line: Callable[[str], None] | None = None,
@@ -116,7 +123,7 @@ def run_bounded(
     kept = CappedOutput(limits, on_line)
     started = time.monotonic()
     clock = OwnTime(disk_s=wall_s)
-    with _supervised(command, cwd, environment) as process:
+    with _supervised(command) as process:
         ended_by_us = _drain(process, kept, _watch(process, clock, wall_s, excess))
     return Outcome(
         status=None if ended_by_us else process.returncode,
@@ -156,15 +163,13 @@ def _watch(
 
 
 @contextlib.contextmanager
-def _supervised(
-    command: Sequence[str], cwd: Path, environment: Mapping[str, str]
-) -> Iterator[subprocess.Popen[bytes]]:
+def _supervised(command: Command) -> Iterator[subprocess.Popen[bytes]]:
     """The process that runs the command; afterwards it is gone, and all that it started."""
     try:
         process = subprocess.Popen(
-            [sys.executable, "-I", "-S", str(_SUPERVISOR), *command],
-            cwd=cwd,
-            env=dict(environment),
+            [sys.executable, "-I", "-S", str(_SUPERVISOR), *command.arguments],
+            cwd=command.folder,
+            env=dict(command.environment),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -172,7 +177,7 @@ def _supervised(
             bufsize=0,
         )
     except OSError as error:
-        raise GraderFault(f"{command[0]} could not be started: {error}") from error
+        raise GraderFault(f"{command.arguments[0]} could not be started: {error}") from error
     try:
         yield process
     finally:

@@ -19,7 +19,7 @@ from grader.ros import RosInstallation, site_packages
 from grader.sandbox.limits import BUILD, SandboxLimits
 from grader.sandbox.usage import Usage
 from grader.submission.build import build_log, own_tests
-from grader.submission.build.bounded import Outcome, OutputLimits, run_bounded
+from grader.submission.build.bounded import Command, Outcome, OutputLimits, run_bounded
 from grader.submission.intake.members import MIB
 from grader.tree import MOST_DEEP, cut_deep
 
@@ -228,9 +228,7 @@ class Colcon:
 
             try:
                 outcome = run_bounded(
-                    command,
-                    cwd=self.scratch,
-                    environment=environment,
+                    Command(command, self.scratch, environment),
                     wall_s=wall_s,
                     output=setting.limits.output,
                     on_line=on_line,

@@ -23,7 +23,7 @@ from grader.out_of_memory import oom_kills
 from grader.ros import RosInstallation
 from grader.sandbox.limits import BUILD, size_words
 from grader.sandbox.usage import Usage, folder_usage
-from grader.submission.build.bounded import Outcome, OutputLimits, run_bounded
+from grader.submission.build.bounded import Command, Outcome, OutputLimits, run_bounded
 from grader.submission.intake.locate import Located
 from grader.submission.intake.paths import join, shown
 from grader.submission.record import BagRecord, BagTopic
@@ -117,11 +117,5 @@ def _run(
             )
             command, environment = room.command(command, environment), dict(room.environment)
             excess = room.excess
-        return run_bounded(
-            command,
-            cwd=scratch,
-            environment=environment,
-            wall_s=_WALL_S,
-            output=_OUTPUT,
-            excess=excess,
-        )
+        bounded = Command(command, scratch, environment)
+        return run_bounded(bounded, wall_s=_WALL_S, output=_OUTPUT, excess=excess)

@@ -20,7 +20,7 @@ from functools import cache
 from pathlib import Path
 
 from grader.errors import GraderFault
-from grader.submission.build.bounded import OutputLimits, run_bounded
+from grader.submission.build.bounded import Command, OutputLimits, run_bounded
 from grader.submission.intake.paths import shown
 from grader.submission.record import Lint, LintFinding, SourceError
 
@@ -117,11 +117,11 @@ def _check(
         f"--select ALL --line-length {LINE_LENGTH} --target-version py{python[0]}{python[1]} "
         "--output-format json-lines"
     )
+    paths = (f"./{file}" for file in sorted(files))
+    arguments = [str(ruff), "check", *options.split(), "--", *paths]
     try:
         outcome = run_bounded(
-            [str(ruff), "check", *options.split(), "--", *(f"./{file}" for file in sorted(files))],
-            cwd=root,
-            environment={"PATH": os.defpath},
+            Command(arguments, root, {"PATH": os.defpath}),
             wall_s=_WALL_S,
             output=OutputLimits(head=0, tail=2000),
             on_line=lambda line: found.extend(_findings(line, root)),
