@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_endpoint import Word, offered
-from grader.diagnosis.process.blocked_executor import HINT, at_its_place, why_never_spun
+from grader.diagnosis.process.blocked_executor import at_its_place, blocked_hint, why_never_spun
 from grader.diagnosis.process.process_exit import ended_early, exited, why_it_exited
 from grader.diagnosis.process.raised import in_brackets, own_frames, parse_failures, raised_at
 from grader.diagnosis.process.standing import Stand, where_it_stands
 from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.words import worded
 from grader.measure import declarations
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
@@ -151,8 +152,13 @@ def blocked_executor(symptom: NoAnswer) -> Finding | None:
         blocked = Finding(
             f"{symptom.what}: something blocks the executor; the node's parameter services do "
             "not answer either",
-            f"{HINT} A call() to another service waits for an answer that the same executor must "
-            "receive: use call_async().",
+            blocked_hint()
+            + worded(
+                python=" A call() to another service waits for an answer that the same executor "
+                "must receive: use call_async().",
+                cpp=" future.get() of a request to another service waits for an answer that the "
+                "same executor must receive: give async_send_request() a callback.",
+            ),
         )
     return blocked and symptom.placed(blocked)
 
@@ -164,8 +170,12 @@ def callback_does_not_answer(symptom: NoAnswer) -> Finding:
     return symptom.placed(
         Finding(
             f"{symptom.what}{spins}",
-            "Does the callback reach its end and return the response? A callback that waits for "
-            "another callback of the same callback group waits for ever.",
+            worded(
+                python="Does the callback reach its end and return the response?",
+                cpp="Does the callback reach its end, with the response filled in?",
+            )
+            + " A callback that waits for another callback of the same callback group waits for "
+            "ever.",
         )
     )
 
@@ -221,7 +231,10 @@ def why_raised(
             f"{what}: an exception was raised meanwhile, {raised}{in_brackets(place)}",
             "Correct the line that is named here."
             if place
-            else "Read the traceback from its last line.",
+            else worded(
+                python="Read the traceback from its last line.",
+                cpp="Read the message of the exception: what() prints it.",
+            ),
             Evidence(
                 moments=(Moment("the exception", recording.since_launch_s(lines[-1].time_ns)),),
                 places=(place,) if place else (),

@@ -13,6 +13,7 @@ from grader.diagnosis.undeclared import why_never_appeared
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.first_seen import nodes_seen
 from grader.findings.wording import code, codes
+from grader.findings.words import Words, type_in_code
 from grader.measure import declarations
 from grader.recording.interaction import Service
 from grader.recording.model import Kind, Owner, Recording
@@ -42,24 +43,57 @@ class Word:
 
     noun: str
     does: str
-    create: str
+    create: Words
 
 
-PUBLISHER = Word("publisher", "publishes on", "self.create_publisher({type}, '{name}', 10)")
+PUBLISHER = Word(
+    "publisher",
+    "publishes on",
+    Words(
+        python="self.create_publisher({type}, '{name}', 10)",
+        cpp='this->create_publisher<...::{type}>("{name}", 10)',
+    ),
+)
 SUBSCRIPTION = Word(
     "subscription",
     "subscribes to",
-    "self.create_subscription({type}, '{name}', self.callback, 10)",
+    Words(
+        python="self.create_subscription({type}, '{name}', self.callback, 10)",
+        cpp='this->create_subscription<...::{type}>("{name}", 10, callback)',
+    ),
 )
 SERVICE = Word(
-    "service", "offers the service", "self.create_service({type}, '{name}', self.callback)"
+    "service",
+    "offers the service",
+    Words(
+        python="self.create_service({type}, '{name}', self.callback)",
+        cpp='this->create_service<...::{type}>("{name}", callback)',
+    ),
 )
 ACTION = Word(
-    "action", "offers the action", "ActionServer(self, {type}, '{name}', self.execute_callback)"
+    "action",
+    "offers the action",
+    Words(
+        python="ActionServer(self, {type}, '{name}', self.execute_callback)",
+        cpp='rclcpp_action::create_server<...::{type}>(this, "{name}", handle_goal, '
+        "handle_cancel, handle_accepted)",
+    ),
 )
-CLIENT = Word("client", "has a client of", "self.create_client({type}, '{name}')")
+CLIENT = Word(
+    "client",
+    "has a client of",
+    Words(
+        python="self.create_client({type}, '{name}')",
+        cpp='this->create_client<...::{type}>("{name}")',
+    ),
+)
 ACTION_CLIENT = Word(
-    "action client", "has an action client of", "ActionClient(self, {type}, '{name}')"
+    "action client",
+    "has an action client of",
+    Words(
+        python="ActionClient(self, {type}, '{name}')",
+        cpp='rclcpp_action::create_client<...::{type}>(this, "{name}")',
+    ),
 )
 _WORDS = (PUBLISHER, SUBSCRIPTION, SERVICE, ACTION, CLIENT, ACTION_CLIENT)
 ENDPOINTS = {Kind.PUBLISHER: PUBLISHER, Kind.SUBSCRIPTION: SUBSCRIPTION}
@@ -105,7 +139,7 @@ class NoEndpoint(Symptom[Finding], concept="names"):
     def create(self) -> str:
         """The code that creates it."""
         type_ = self.types[0].rpartition("/")[2] if self.types else "Type"
-        return code(self.word.create.format(type=type_, name=self.name.lstrip("/")))
+        return code(str(self.word.create).format(type=type_, name=self.name.lstrip("/")))
 
 
 def offered(recording: Recording, word: Word, name: str) -> tuple[Service, ...]:
@@ -182,11 +216,10 @@ def other_interface(symptom: NoEndpoint) -> Finding | None:
     own = next((one for one in symptom.there if one.name == symptom.name), None)
     if own is None or not symptom.types:
         return None
-    package, folder, short = symptom.types[0].split("/")
     return Finding(
         f"the {symptom.word.noun} {code(own.name)} has the type {code(own.type)}",
         "A client and a server communicate only if they use the same type: "
-        f"`from {package}.{folder} import {short}`.",
+        f"{code(type_in_code(symptom.types[0]))}.",
         symptom.evidence,
     )
 

@@ -8,6 +8,7 @@ from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes
+from grader.findings.words import worded
 from grader.spec.nearest_name import nearest
 from grader.submission.record import CPP, PYTHON, PackageRecord, SourceError, SubmissionRecord
 
@@ -101,10 +102,11 @@ def not_installed_by_cmake(symptom: NoExecutable) -> Finding | None:
     elif name in package.executables:
         seen = f"ROS does not find the package, so `ros2 run {package.name}` does not either"
     line = f"install(TARGETS {name} DESTINATION lib/${{PROJECT_NAME}})"
+    script = worded(python=" (of a Python script only install(PROGRAMS ...))", cpp="")
     return Finding(
         seen,
-        f"CMakeLists.txt needs `add_executable({name} src/<file>.cpp)`, then {code(line)} "
-        "(of a Python script only install(PROGRAMS ...)), and `ament_package()` as its last line.",
+        f"CMakeLists.txt needs `add_executable({name} src/<file>.cpp)`, then {code(line)}{script}, "
+        "and `ament_package()` as its last line.",
         _at(package, "CMakeLists.txt", "install"),
     )
 

@@ -17,6 +17,7 @@ from grader.diagnosis.wrong_value import factor_words
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.wording import code, counted, listing
+from grader.findings.words import SILENT_EXCEPT, worded
 from grader.measure.printed import (
     UNFILLED,
     Echo,
@@ -151,9 +152,12 @@ def no_history(symptom: NotLogged) -> Finding | None:
             f"it requests durability {durability} and reliability {reliability}. It matches the "
             "publisher, but gets only what is published from then on",
             "A late subscription gets the kept messages only if it is transient_local too: "
-            "give create_subscription a QoSProfile with "
-            "durability=DurabilityPolicy.TRANSIENT_LOCAL and "
-            "reliability=ReliabilityPolicy.RELIABLE.",
+            "give create_subscription "
+            + worded(
+                python="a QoSProfile with durability=DurabilityPolicy.TRANSIENT_LOCAL and "
+                "reliability=ReliabilityPolicy.RELIABLE.",
+                cpp="rclcpp::QoS(10).reliable().transient_local().",
+            ),
             Evidence(moments=endpoints_seen(recording, (item,))),
         )
     return None
@@ -250,8 +254,11 @@ def only_some_logged(symptom: NotLogged) -> Finding | None:
     written = listing(f"{time_s:.2f} s" for time_s in times_s)
     return Finding(
         f"{symptom.seen}, written {written} after launch",
-        "Log in every call of the callback, or as often as is asked: an `if`, once=True, "
-        "skip_first=True and throttle_duration_sec=... leave lines out.",
+        "Log in every call of the callback, or as often as is asked: an `if`, "
+        + worded(
+            python="once=True, skip_first=True and throttle_duration_sec=... leave lines out.",
+            cpp="RCLCPP_INFO_ONCE, ..._SKIPFIRST and ..._THROTTLE leave lines out.",
+        ),
         Evidence(
             moments=tuple(Moment(f"logged a message on {topic}", time_s) for time_s in times_s),
             log=tuple(line.text for echo in found for line in echo.lines)[:_LOG_LINES],
@@ -269,8 +276,13 @@ def no_f_string(symptom: NotLogged) -> Finding | None:
     return Finding(
         f"log lines follow messages on {code(symptom.topic)}, but they show {code(unfilled[0])} "
         f"instead of a value: {quote(line.text)}",
-        "Python fills in braces only where an f stands before the quotes: "
-        "f'... {value}' instead of '... {value}'.",
+        worded(
+            python="Python fills in braces only where an f stands before the quotes: "
+            "f'... {value}' instead of '... {value}'.",
+            cpp='RCLCPP_INFO(this->get_logger(), "x = %.2f", x) fills in %.2f, and %s for '
+            "text.c_str(). RCLCPP_INFO_STREAM and std::cout take values after <<, and neither "
+            "fills in braces.",
+        ),
         symptom.evidence(line),
     )
 
@@ -334,12 +346,13 @@ def nothing_logged(symptom: NotLogged) -> Finding:
     )
     hint = (
         "Does the callback of this topic reach the line that logs the message? By default the "
-        "output of debug() is not shown, an `except: pass` hides an error, and an `if` may leave "
-        "messages out."
+        f"output of {worded('debug()', 'RCLCPP_DEBUG')} is not shown, an {SILENT_EXCEPT} hides an "
+        "error, and an `if` may leave messages out."
     )
     if symptom.own:
         seen = symptom.seen
-        hint = "Log the message where it is published: self.get_logger().info('...')."
+        log = worded("self.get_logger().info('...')", 'RCLCPP_INFO(get_logger(), "...")')
+        hint = f"Log the message where it is published: {log}."
     return Finding(
         seen + (f"; the process wrote {quote(lines[0].text)}" if lines else ""),
         hint,

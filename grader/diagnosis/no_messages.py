@@ -12,6 +12,7 @@ from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.wording import code, codes, counted
+from grader.findings.words import type_in_code, worded
 from grader.measure.compatibility import compatibility_table, refusals, sides
 from grader.measure.declarations import was_held_up
 from grader.recording.model import NS, Endpoint, Kind, Owner, Qos, Recording
@@ -135,7 +136,12 @@ class NotDelivered(OnTopic):
 
 def seconds_hint(period_s: float = 0.3) -> str:
     """What a timer takes as its period."""
-    return f"create_timer takes its period in seconds: {period_s:g} is {format_duration(period_s)}."
+    return worded(
+        python="create_timer takes its period in seconds: "
+        f"{period_s:g} is {format_duration(period_s)}.",
+        cpp="create_wall_timer takes a period with its unit, such as 300ms: `300s` is 300 seconds. "
+        "Of a number make one with std::chrono::milliseconds(number).",
+    )
 
 
 def why_silent(recording: Recording, topic: str) -> Finding:
@@ -206,13 +212,12 @@ def other_type(symptom: OnTopic) -> Finding | None:
     misdefined = symptom.recording.misdefined(symptom.topic) and symptom.kind is Kind.PUBLISHER
     if not wanted or not found or (set(wanted) & set(found) and not misdefined):
         return None
-    package, _, short = wanted[0].split("/")
     other = "with another definition" if misdefined else f"not {codes(wanted, last='or')}"
     return Finding(
         f"{symptom.seen}: the {symptom.kind.value} on {code(symptom.topic)} has the type "
         f"{codes(found)}, {other}",
         "A publisher and a subscription communicate only if they use the same type: "
-        f"`from {package}.msg import {short}`. If you define the type yourself, its fields must be "
+        f"{code(type_in_code(wanted[0]))}. If you define the type yourself, its fields must be "
         "as the task asks: types, names, array bounds and order.",
         Evidence(moments=endpoints_seen(symptom.recording, symptom.own)),
     )

@@ -14,6 +14,7 @@ from grader.diagnosis.undeclared import why_never_appeared
 from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import nodes_seen, until_the_end
 from grader.findings.wording import code, codes
+from grader.findings.words import INIT, INPUT, SLEEP, Words, worded
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.spec.name import TOPIC
@@ -124,7 +125,10 @@ def not_built(symptom: NoNode) -> Finding | None:
     )
 
 
-_NAMED = "The executable's name is the left side of an entry of console_scripts in setup.py."
+_NAMED = Words(
+    python="The executable's name is the left side of an entry of console_scripts in setup.py.",
+    cpp="The executable's name is the first argument of add_executable(...) in CMakeLists.txt.",
+)
 _NOT_STARTED = {
     "Exec format error": "A script begins with the line `#!/usr/bin/env python3`, and nothing "
     "stands above it.",
@@ -148,7 +152,7 @@ def no_executable(symptom: NoNode) -> Finding | None:
         f"{code(what)} could not be started: {why}{there}"
         if why
         else f"nothing was launched, because the executable does not exist{there}",
-        next((hint for words, hint in _NOT_STARTED.items() if words in why), _NAMED),
+        next((hint for words, hint in _NOT_STARTED.items() if words in why), str(_NAMED)),
     )
 
 
@@ -173,15 +177,16 @@ def main_does_not_come_to_it(symptom: NoNode) -> Finding:
     stand = where_it_stands(recording, name)
     done = "created no node"
     if symptom.declares("init"):
-        done = "called rclpy.init() but created no node"
+        done = f"called {INIT} but created no node"
     elif declarations.traced(recording, name):
-        done = "never called rclpy.init()"
+        done = f"never called {INIT}"
     lines = tuple(line.text for line in recording.log if line.process == name)
     cause = Finding(
         f"the process {code(name)} ran until the end, but {done}",
-        "main() must call rclpy.init() and create the node right after it. Look for a loop, "
-        "time.sleep() or input() before that, also at the top level of a module: a launched node "
-        "has no keyboard.",
+        f"main() must call {INIT} and create the node right after it. Look for a loop, {SLEEP} or "
+        f"{INPUT} before that, also "
+        + worded("at the top level of a module", "in the constructors of global objects")
+        + ": a launched node has no keyboard.",
         Evidence(
             moments=(until_the_end(recording, "still no node when the observation ended"),),
             log=lines[-_LOG_LINES:],
@@ -224,9 +229,14 @@ def other_name(symptom: OtherNode) -> Finding:
             how = f": the name is right, but the node is in the namespace {code(space or '/')}"
     return Finding(
         f"{symptom.seen}{how}",
-        f"The node's name is the argument of super().__init__('{symptom.base}') in its "
-        "constructor. Upper and lower case matter, and a namespace (the argument or `__ns`) "
-        "stands in front of it. If it is another node of yours, look whether each executable "
-        "runs its own function.",
+        worded(
+            python="The node's name is the argument of "
+            f"super().__init__('{symptom.base}') in its constructor.",
+            cpp=f'The node\'s name is the argument of Node("{symptom.base}") in its '
+            "constructor's initialiser list.",
+        )
+        + " Upper and lower case matter, and a namespace (the argument or `__ns`) stands in front "
+        "of it. If it is another node of yours, look whether each executable runs its own "
+        "function.",
         Evidence(moments=nodes_seen(symptom.recording)),
     )

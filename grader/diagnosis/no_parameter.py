@@ -12,6 +12,7 @@ from grader.diagnosis.no_node import why_not_node
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code, codes
+from grader.findings.words import worded
 from grader.measure.parameter_calls import calls_to, descriptor, undeclared
 from grader.measure.parameter_calls import names as declared
 from grader.recording.interaction import NO_SERVER
@@ -19,6 +20,14 @@ from grader.recording.model import Call, Recording
 from grader.spec.nearest_name import nearest
 
 _ANSWER_S = 1.0
+
+
+def declare_parameter(name: str, default: str = "default") -> str:
+    """The code that declares a parameter."""
+    return worded(
+        python=f"self.declare_parameter('{name}', {default})",
+        cpp=f'this->declare_parameter("{name}", {default})',
+    )
 
 
 @dataclass(frozen=True)
@@ -41,7 +50,7 @@ class NotDeclared(Symptom[Finding]):
 
     def cause(self, seen: str) -> Finding:
         """The cause for what is declared instead."""
-        hint = f"Call self.declare_parameter('{self.name}', default) in the node's constructor."
+        hint = f"Call {declare_parameter(self.name)} in the node's constructor."
         return Finding(seen, hint, Evidence(moments=answered_at(self.recording, self.asked)))
 
 
@@ -87,9 +96,12 @@ def why_not_taken(recording: Recording, names: Iterable[str]) -> Finding | None:
     others = f"; declared {'is' if len(there) == 1 else 'are'} {codes(there)}" if there else ""
     return Finding(
         f"the launch gives {codes(lacking)}, but no node declares {_it(lacking)}{others}",
-        f"Call self.declare_parameter('{lacking[0]}', default) in the node's constructor, and read "
-        f"it with self.get_parameter('{lacking[0]}').value. A parameter that is not declared is "
-        "ignored.",
+        f"Call {declare_parameter(lacking[0])} in the node's constructor, and read it with "
+        + worded(
+            python=f"self.get_parameter('{lacking[0]}').value",
+            cpp=f'this->get_parameter("{lacking[0]}").get_value<...>()',
+        )
+        + ". A parameter that is not declared is ignored.",
         Evidence(moments=answered_at(recording, answered)),
     )
 
@@ -111,8 +123,11 @@ def why_services_silent(recording: Recording, calls: Iterable[Call]) -> Finding 
         return Finding.ours(f"{service} could not be asked: {lost.error}")
     return Finding(
         f"the node has no service {service}",
-        "Do not set start_parameter_services=False: the parameters of a node are read and set "
-        "through its services.",
+        "Do not set "
+        + worded(
+            "start_parameter_services=False", "start_parameter_services(false) in the NodeOptions"
+        )
+        + ": the parameters of a node are read and set through its services.",
         Evidence(moments=(Moment("asked", recording.since_launch_s(lost.requested_ns)),)),
     )
 

@@ -9,29 +9,41 @@ from grader.diagnosis.no_answer import why_raised, why_taken
 from grader.diagnosis.no_endpoint import ACTION_CLIENT, CLIENT, why_not_offered
 from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spun
 from grader.diagnosis.process.process_exit import why_crashed
+from grader.diagnosis.process.standing import ASK_AND_RETURN
 from grader.findings.fields import brief, words
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.first_seen import until_the_end
 from grader.findings.wording import code
+from grader.findings.words import Words
 from grader.recording.interaction import Asked
 from grader.recording.model import Recording
 
-_NO_DEADLOCK = (
-    "A callback must not wait for an answer: the executor that called it has to take the answer "
-    "in. Instead of call() or spin_until_future_complete() use call_async() or send_goal_async(), "
-    "return, and go on in the callback of future.add_done_callback()."
+_WAIT = Words(
+    python="Before the first request wait for the server, client.wait_for_service(timeout_sec=1.0) "
+    "or wait_for_server(timeout_sec=1.0) of an action client: what is sent before is lost. Then "
+    "look whether the line that sends is reached.",
+    cpp="Before the first request wait for the server, client->wait_for_service(1s) or "
+    "wait_for_action_server(1s) of an action client: what is sent before is lost. Then look "
+    "whether the line that sends is reached.",
 )
-_WAIT = (
-    "Before the first request wait for the server, client.wait_for_service(timeout_sec=1.0) or "
-    "wait_for_server(timeout_sec=1.0) of an action client: what is sent before is lost. Then look "
-    "whether the line that sends is reached."
+_ENDED = Words(
+    python="Look at the status that get_result_async() gives, and go on whatever it is.",
+    cpp="Look at result.code in result_callback, and go on whatever it is.",
 )
 _AFTER = {
-    "unanswered": "Give up after some time: spin_until_future_complete() takes timeout_sec, and a "
-    "timer can look at future.done().",
-    "rejected": "Look at goal_handle.accepted first: a rejected goal has no result to wait for.",
-    "aborted": "Look at the status that get_result_async() gives, and go on whatever it is.",
-    "canceled": "Look at the status that get_result_async() gives, and go on whatever it is.",
+    "unanswered": Words(
+        python="Give up after some time: spin_until_future_complete() takes timeout_sec, and a "
+        "timer can look at future.done().",
+        cpp="Give up after some time: spin_until_future_complete() takes a timeout, and a timer "
+        "can look at future.wait_for(0s).",
+    ),
+    "rejected": Words(
+        python="Look at goal_handle.accepted first: a rejected goal has no result to wait for.",
+        cpp="Look first whether goal_response_callback got a goal handle: a rejected goal has "
+        "none, and no result to wait for.",
+    ),
+    "aborted": _ENDED,
+    "canceled": _ENDED,
 }
 """What to try where nothing follows something that ended so."""
 _MOST_ROWS = 50
@@ -102,7 +114,11 @@ def waits_in_a_callback(symptom: NotAsked) -> Finding | None:
     recording, seen = symptom.recording, symptom.seen
     blocked = why_blocked(recording, seen, symptom.nodes, symptom.since_ns)
     if blocked is not None and symptom.asked:
-        return replace(blocked, hint=_NO_DEADLOCK)
+        hint = (
+            "A callback must not wait for an answer: the executor that called it has to take the "
+            f"answer in. {ASK_AND_RETURN}"
+        )
+        return replace(blocked, hint=hint)
     return blocked or why_never_spun(recording, seen, symptom.nodes)
 
 
@@ -113,7 +129,7 @@ def stops_after_a_failure(symptom: NotAsked) -> Finding | None:
     if status not in _AFTER:
         return None
     seen = f"{symptom.seen}; nothing follows the last one, {status}"
-    return Finding(seen, _AFTER[status], evidence(symptom.recording, symptom.asked))
+    return Finding(seen, str(_AFTER[status]), evidence(symptom.recording, symptom.asked))
 
 
 @explanation(NotAsked, general=True)
@@ -125,7 +141,9 @@ def too_few(symptom: NotAsked) -> Finding:
         taken = why_taken(recording, seen, symptom.since_ns, recording.stop_ns, 0.0)
         return taken or Finding(seen, hint, evidence(recording, symptom.asked))
     moment = until_the_end(recording, "still nothing was asked")
-    return Finding(f"{seen}, although the client was there", _WAIT, Evidence(moments=(moment,)))
+    return Finding(
+        f"{seen}, although the client was there", str(_WAIT), Evidence(moments=(moment,))
+    )
 
 
 def evidence(recording: Recording, asked: tuple[Asked, ...]) -> Evidence:

@@ -27,6 +27,7 @@ from grader.diagnosis.process.standing import where_it_stands
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import until_the_end
 from grader.findings.wording import code, counted, listing
+from grader.findings.words import SILENT_EXCEPT
 from grader.measure import declarations
 from grader.measure.declarations import is_compiled
 from grader.recording.model import NS, Kind, Recording
@@ -133,7 +134,7 @@ def no_answer(symptom: NoMessages) -> Finding | None:
         Finding(
             seen,
             "Is publish(msg) reached in the subscription's callback? Look for an `if` or a "
-            "`return` before it. An `except: pass` hides errors. Log a line right before "
+            f"`return` before it. An {SILENT_EXCEPT} hides errors. Log a line right before "
             "publish(msg) to see.",
             Evidence(
                 moments=(Moment(f"sent on {name}", recording.since_launch_s(sent[0].stamp_ns)),)
@@ -176,7 +177,7 @@ def publish_not_reached(symptom: NoMessages) -> Finding:
         Finding(
             _idle(symptom) + although,
             "Is publish(msg) reached in the callback? Look for an `if` or a `return` before it. An "
-            "`except: pass` hides errors. Log a line at the beginning of the callback, and one "
+            f"{SILENT_EXCEPT} hides errors. Log a line at the beginning of the callback, and one "
             "right before publish(msg): what is not logged is not reached.",
             _idle_evidence(symptom),
         ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.words import worded
 from grader.measure import declarations
 from grader.measure.declarations import was_held_up
 from grader.recording.model import Recording
@@ -20,12 +21,18 @@ def why_undeclared(recording: Recording, what: str) -> Finding:
     compiled = compiled and recording.environment.get("compiled_tracer", "lacking") == "lacking"
     launched = any("launch" in item.name.rpartition("/")[2] for item in recording.processes)
     if not declarations.traced(recording) and (compiled or launched):
-        return Finding.ours(f"{seen}: rosgrade sees this in Python programs only")
+        why = worded(
+            python="rosgrade sees this in Python programs only",
+            cpp="rosgrade could not see into this program",
+        )
+        return Finding.ours(f"{seen}: {why}")
+    method = worded("the method of rclpy's Node", "the method of rclcpp::Node")
     return Finding(
-        f"{seen}: it was created without rclpy, or in a program that was started without the "
-        "environment of the first, or after the file descriptors of rosgrade were closed",
-        "Create it with the method of rclpy's Node, in the program that `ros2 run` starts. Keep "
-        "its environment, and close only the file descriptors that you opened.",
+        f"{seen}: it was created without {worded('rclpy', 'rclcpp')}, or in a program that was "
+        "started without the environment of the first, or after the file descriptors of rosgrade "
+        "were closed",
+        f"Create it with {method}, in the program that `ros2 run` starts. Keep its environment, "
+        "and close only the file descriptors that you opened.",
         Evidence(moments=(Moment("launched", 0.0),)),
     )
 
@@ -44,7 +51,7 @@ def why_never_appeared(recording: Recording, what: str) -> Finding:
         seen + (changed if names else ""),
         "A node must stay in the ROS domain that it is given. In the environment and in the code, "
         "do not set ROS_DOMAIN_ID, domain_id, a discovery server or a profile of the middleware. "
-        "Do not replace rclpy's methods.",
+        + worded("Do not replace rclpy's methods.", "Do not define functions of rcl."),
         Evidence(moments=(Moment("launched", 0.0),)),
         # What was created right before the end may not have been seen yet.
         disturbed=not names,

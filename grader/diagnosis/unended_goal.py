@@ -10,18 +10,23 @@ from grader.diagnosis.no_endpoint import ACTION
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.fields import the_goal
 from grader.findings.finding import Evidence, Finding
+from grader.findings.words import Words, worded
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
 from grader.spec.unit import format_duration
 
 # Share of the time from the request to cancel until the end of the goal.
 _AT_THE_END = 0.8
-_TWO_THREADS = (
-    "Spin with a MultiThreadedExecutor, and give the ActionServer a ReentrantCallbackGroup."
+_TWO_THREADS = Words(
+    python="Spin with a MultiThreadedExecutor, and give the ActionServer a ReentrantCallbackGroup.",
+    cpp="handle_accepted must return at once: start a thread in it that executes the goal, "
+    "std::thread{std::bind(&Bot::execute, this, goal_handle)}.detach().",
 )
-_LOOK = (
-    "In the loop of the execute callback: if goal_handle.is_cancel_requested, call "
-    "goal_handle.canceled() and return the result."
+_LOOK = Words(
+    python="In the loop of the execute callback: if goal_handle.is_cancel_requested, call "
+    "goal_handle.canceled() and return the result.",
+    cpp="In the loop of the execute callback: if goal_handle->is_canceling(), call "
+    "goal_handle->canceled(result) and return.",
 )
 
 
@@ -60,7 +65,8 @@ def why_not_canceled(
     if goal.status != "canceled" or end_ns is None:
         return cause_of(NotCanceled(recording, goal, within_s, evidence))
     seen = f"{the_goal(goal)} was not canceled"
-    hint = "Look at goal_handle.is_cancel_requested in every round of the loop."
+    asked = worded("goal_handle.is_cancel_requested", "goal_handle->is_canceling()")
+    hint = f"Look at {asked} in every round of the loop."
     return why_late(
         recording, ACTION, goal.action, asked_ns, end_ns, within_s, seen, hint, evidence
     )
@@ -73,8 +79,11 @@ def cancel_refused(symptom: NotCanceled) -> Finding | None:
         return None
     return Finding(
         f"the server refused to cancel {the_goal(symptom.goal)}",
-        "Give the ActionServer a cancel_callback that returns CancelResponse.ACCEPT. Without one "
-        "rclpy refuses.",
+        worded(
+            python="Give the ActionServer a cancel_callback that returns CancelResponse.ACCEPT. "
+            "Without one rclpy refuses.",
+            cpp="Let handle_cancel of the server return rclcpp_action::CancelResponse::ACCEPT.",
+        ),
         symptom.evidence,
     )
 
@@ -95,7 +104,7 @@ def executor_busy_with_the_goal(symptom: NotCanceled) -> Finding | None:
     goal, recording = symptom.goal, symptom.recording
     seen = f"{symptom.seen}: the server did not handle the request to cancel"
     text = f"{seen}: its executor is busy while the execute callback runs"
-    busy = Finding(text, _TWO_THREADS, symptom.evidence)
+    busy = Finding(text, str(_TWO_THREADS), symptom.evidence)
     if goal.result_ns is not None:
         return busy
     asked_ns, within_s = goal.canceled_ns or 0, symptom.within_s
@@ -107,11 +116,11 @@ def request_ignored(symptom: NotCanceled) -> Finding:
     """The loop of the execute callback never checks whether the goal should be canceled."""
     if symptom.goal.result_ns is not None:
         seen = f"{symptom.seen}, although the server agreed to cancel"
-        return Finding(seen, _LOOK, symptom.evidence)
+        return Finding(seen, str(_LOOK), symptom.evidence)
     asked_ns = symptom.goal.canceled_ns or 0
     never = why_no_end(symptom.recording, symptom.seen, asked_ns, symptom.within_s)
     seen = f"{symptom.seen}: the execute callback goes on"
-    return never or Finding(seen, _LOOK, symptom.evidence)
+    return never or Finding(seen, str(_LOOK), symptom.evidence)
 
 
 def why_no_end(recording: Recording, seen: str, asked_ns: int, within_s: float) -> Finding | None:

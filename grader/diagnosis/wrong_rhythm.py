@@ -14,6 +14,7 @@ from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.process.standing import slow_callback
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import counted, listing
+from grader.findings.words import worded
 from grader.measure import declarations
 from grader.measure.period import Interval, PeriodLimits, PeriodVerdict
 from grader.recording.model import NS, Kind, Recording
@@ -103,9 +104,13 @@ def condition_in_a_faster_timer(symptom: WrongRhythm) -> Finding | None:
             return Finding(
                 f"the process declared a timer of {format_duration(timer_s)}, and publishes in "
                 f"one of {some} calls",
-                f"Give the timer the period itself, self.create_timer({wanted_s:g}, ...), and "
-                "publish in every call. A condition on the time is true only when the timer calls "
-                "next, so it comes late.",
+                "Give the timer the period itself, "
+                + worded(
+                    python=f"self.create_timer({wanted_s:g}, ...)",
+                    cpp=f"this->create_wall_timer({wanted_s:g}s, callback)",
+                )
+                + ", and publish in every call. A condition on the time is true only when the "
+                "timer calls next, so it comes late.",
             )
     return None
 
@@ -117,7 +122,8 @@ def irregular(symptom: WrongRhythm) -> Finding | None:
         return None
     hint = "Publish in every call of the timer's callback, without a condition. "
     if not symptom.timers_s:
-        hint = "Let a timer call the callback: self.create_timer(...). "
+        timer = worded("self.create_timer(...)", "this->create_wall_timer(...)")
+        hint = f"Let a timer call the callback: {timer}. "
     return Finding(
         "", f"{hint}No callback may work or sleep for long: the timer has to wait for it."
     )
@@ -168,8 +174,12 @@ def sleeping_loop(symptom: WrongRhythm) -> Finding | None:
     return Finding(
         f"{beginning}it looks like {format_duration(wanted_s)} of sleeping plus "
         f"{format_duration(median_s - wanted_s)} of work",
-        f"Use a timer: self.create_timer({wanted_s:g}, self.callback) keeps its period however "
-        "long the callback takes.",
+        "Use a timer: "
+        + worded(
+            python=f"self.create_timer({wanted_s:g}, self.callback)",
+            cpp=f"timer_ = this->create_wall_timer({wanted_s:g}s, callback)",
+        )
+        + " keeps its period however long the callback takes.",
     )
 
 

@@ -14,6 +14,7 @@ from grader.diagnosis.process.process_exit import ended_early, why_crashed, why_
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen
 from grader.findings.wording import code, codes, counted
+from grader.findings.words import Words, worded
 from grader.measure import declarations
 from grader.measure.compatibility import refusals
 from grader.measure.transforms import Sent, is_static, sent
@@ -21,9 +22,11 @@ from grader.recording.model import NS, Kind, Qos, Recording
 from grader.spec.nearest_name import nearest
 from grader.spec.unit import format_duration
 
-_STATIC = (
-    "Use StaticTransformBroadcaster, or a publisher on /tf_static with QoSProfile(depth=1, "
-    "durability=DurabilityPolicy.TRANSIENT_LOCAL)."
+_STATIC = Words(
+    python="Use StaticTransformBroadcaster, or a publisher on /tf_static with QoSProfile(depth=1, "
+    "durability=DurabilityPolicy.TRANSIENT_LOCAL).",
+    cpp="Use StaticTransformBroadcaster, or a publisher on /tf_static with "
+    "rclcpp::QoS(1).transient_local().",
 )
 _MOVING = "Use TransformBroadcaster, or a publisher on /tf with the QoS 10."
 # A stamp may be that of the data that a transform is made of, or of the near future.
@@ -59,7 +62,7 @@ class NoTransform(Symptom[Finding], concept="frames"):
     @property
     def hint(self) -> str:
         """What publishes on the topic as tf2 requests it."""
-        return _STATIC if is_static(self.topic) else _MOVING
+        return str(_STATIC) if is_static(self.topic) else _MOVING
 
     def instead(self, one: Sent | None, why: str, hint: str = _NAMES) -> Finding | None:
         """Another transform is there, if it is."""
@@ -199,8 +202,10 @@ def wrong_stamp(symptom: BadTransform) -> Finding | None:
     seen = f"the stamp is {off} the moment of publishing: always the same, or of another clock"
     return Finding(
         seen if stamp_ns else "the stamp is 0: it is not set",
-        "Set header.stamp = self.get_clock().now().to_msg() for each transform, or copy the stamp "
-        "of the message that it is made of: tf2 looks transforms up by their time.",
+        "Set header.stamp = "
+        + worded("self.get_clock().now().to_msg()", "this->now()")
+        + " for each transform, or copy the stamp of the message that it is made of: tf2 looks "
+        "transforms up by their time.",
         moment(symptom.recording, symptom.one, "has a wrong stamp"),
     )
 

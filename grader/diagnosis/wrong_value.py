@@ -13,6 +13,7 @@ from typing import Any
 from grader.diagnosis.explanation import Symptom, explanation
 from grader.findings.value import Difference, same
 from grader.findings.wording import value_text
+from grader.findings.words import Words, worded
 
 # How many times too large -> what that is. People type 57.3 and 3.14: three digits must do.
 _FACTORS = {
@@ -23,8 +24,11 @@ _FACTORS = {
     **{0.1**n: f"is {10**n} times too small: look at the units" for n in (1, 2, 3)},
 }
 _FACTOR_TOLERANCE = 2e-3
-MISREAD = "an integer, a text or a numpy.float32"
-FLOAT_HINT = "A number in a message must be a float: write 1.0 instead of 1, or float(value)."
+MISREAD = Words("an integer, a text or a numpy.float32", "an integer or a text")
+FLOAT_HINT = Words(
+    python="A number in a message must be a float: write 1.0 instead of 1, or float(value).",
+    cpp="Give each variable a value where it is declared, as in `double speed = 0.0;`.",
+)
 # Python 3.11 has the number of digits of a negative integer with a minus.
 _LEAST_NEGATIVE = (1 << 64) - (1 << 8)
 
@@ -64,7 +68,10 @@ def integer_in_a_float_field(symptom: WrongValue) -> str | None:
     bad = next((one for one in symptom.numbers if was_integer(one.observed)), None)
     if bad is None:
         return None
-    return f"{bad.field} is a float field, but {MISREAD} was put into it, which ROS misreads"
+    return worded(
+        python=f"{bad.field} is a float field, but {MISREAD} was put into it, which ROS misreads",
+        cpp=f"{bad.field} has what lay in memory: a variable was never given a value",
+    )
 
 
 @explanation(WrongValue)

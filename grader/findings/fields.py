@@ -18,6 +18,7 @@ from grader.findings.value import (
     expected_leaves,
 )
 from grader.findings.wording import codes, value_text
+from grader.findings.words import worded
 from grader.recording.interaction import Goal
 
 _MOST_FIELDS = 6
@@ -104,11 +105,13 @@ def _is_default(value: Any) -> bool:
 def fields_hint(what: str, value: Mapping[str, Any], wrong: Sequence[str]) -> str:
     """What to try where fields are wrong."""
     if all(_is_default(item) for _, item in _plain(value)):
+        returned = worded(python=", and return it", cpp="")
         return (
-            f"Set the fields of the {what} in the callback, and return it. Now every field has "
-            "the value of a new one: 0, false or ''."
+            f"Set the fields of the {what} in the callback{returned}. Now every field has the "
+            "value of a new one: 0, false or ''."
         )
-    return f"Look where the callback sets {codes(wrong)} of the {what} that it returns."
+    which = worded(python="that it returns", cpp="that it is given")
+    return f"Look where the callback sets {codes(wrong)} of the {what} {which}."
 
 
 def difference_words(found: Sequence[Difference]) -> str:

@@ -1,8 +1,8 @@
 """Words: a sentence that is said in one way to students of Python, and in another to those of C++.
 
-Which of the two is said is decided while a submission is judged; see :func:`speaking`. So a text
-is whole as soon as it is written, and nothing reads or changes it afterwards: names, numbers and
-printed lines stand in it as they are.
+Both are written where it is written at all, and one of them is said as soon as the text is made:
+that of the language of the package that is judged, see :func:`speaking`. A text is never changed
+afterwards, so names, numbers and printed lines stand in it as they are.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _SPOKEN = ContextVar("language", default=PYTHON)
 
 @dataclass(frozen=True)
 class Words:
-    """One sentence in the words of each language; as a text, in those of the one that is spoken."""
+    """A sentence for later: ``str()`` and f-strings say it in the language that is spoken then."""
 
     __pydantic_config__: ClassVar = ConfigDict(
         extra="forbid", json_schema_extra={"x-words": "`{python: text, cpp: text}`"}
@@ -36,6 +36,17 @@ class Words:
         return self.cpp if _SPOKEN.get() == CPP else self.python
 
 
+def worded(python: str, cpp: str) -> str:
+    """A sentence in the language that is spoken now."""
+    return str(Words(python, cpp))
+
+
+def type_in_code(name: str) -> str:
+    """How a program names an interface, such as ``std_msgs/msg/String``."""
+    package, kind, short = name.split("/")
+    return worded(f"from {package}.{kind} import {short}", f"{package}::{kind}::{short}")
+
+
 @contextmanager
 def speaking(language: str) -> Iterator[None]:
     """Say all words in this language meanwhile."""
@@ -44,3 +55,16 @@ def speaking(language: str) -> Iterator[None]:
         yield
     finally:
         _SPOKEN.reset(token)
+
+
+# Terms that stand in many sentences.
+INIT = Words("rclpy.init()", "rclcpp::init(argc, argv)")
+SPIN = Words("rclpy.spin()", "rclcpp::spin()")
+SPIN_NODE = Words("rclpy.spin(node)", "rclcpp::spin(node)")
+SLEEP = Words("time.sleep()", "std::this_thread::sleep_for()")
+MATH = Words("math.", "std::")
+INPUT = Words("input()", "std::cin")
+A_PROFILE = Words("a QoSProfile", "an rclcpp::QoS")
+REENTRANT = Words("ReentrantCallbackGroup", "Reentrant callback group")
+EXCLUSIVE = Words("MutuallyExclusiveCallbackGroup", "MutuallyExclusive callback group")
+SILENT_EXCEPT = Words("`except: pass`", "empty `catch (...)`")

@@ -23,7 +23,7 @@ from grader.diagnosis.not_built import why_lacking, why_not_built
 from grader.findings.finding import Finding, Status
 from grader.findings.wording import percent
 from grader.findings.words import speaking
-from grader.grade.language import finding_in_cpp, is_cpp
+from grader.grade.language import finding_in_cpp
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
 from grader.grade.naming import named
 from grader.grade.origins import with_origins
@@ -31,7 +31,7 @@ from grader.grade.runtime_imports import with_runtime_imports
 from grader.grade.windowed import judged_in
 from grader.measure.parameter_calls import undeclared
 from grader.recording.model import Ending, Recording
-from grader.submission.record import CPP, PYTHON, SubmissionRecord
+from grader.submission.record import CPP, SubmissionRecord
 
 if TYPE_CHECKING:
     # Reading YAML is not needed to judge; a worker of a batch starts without it.
@@ -75,24 +75,24 @@ def grade(
     order = TopologicalSorter({name: (*requires[name], *sooner[name]) for name in bound})
     for name in order.static_order():
         roots = _roots(requires[name], results)
+        spec, language = bound[name].spec, known.spoken(_about(bound[name], loaded))
         findings: tuple[ScenarioFinding, ...]
         if roots:
             findings = (_skipped([results[root] for root in roots]),)
         else:
             is_unnamed = unnamed and _needs_names(bound[name], loaded, unnamed.variables)
             why = unnamed.finding if unnamed and is_unnamed else None
-            findings = tuple(_findings(bound[name], loaded, known, recordings, faults, why))
+            with speaking(language):
+                findings = tuple(_findings(bound[name], loaded, known, recordings, faults, why))
             lacking = _roots(sooner[name], results)
-            lost = _counted(bound[name].spec.counts, [item.finding for item in findings])
+            lost = _counted(spec.counts, [item.finding for item in findings])
             other = any(_has_other_parameters(item, recordings) for item in findings)
             # One mistake costs its own check, and takes no credit from another.
             if lacking and other and lost == (Status.FAILED, 0.0):
                 roots, findings = lacking, (_skipped([results[root] for root in lacking]),)
-        spec = bound[name].spec
-        speaks_cpp = is_cpp(known, _about(bound[name], loaded))
-        with speaking(CPP if speaks_cpp else PYTHON):
+        with speaking(language):
             hints = tuple(map(str, spec.hints))
-        if speaks_cpp:
+        if language == CPP:
             findings = tuple(replace(one, finding=finding_in_cpp(one.finding)) for one in findings)
         status, credit = _counted(spec.counts, [item.finding for item in findings])
         put_right = all(_is_put_right(item, recordings) for item in findings)
@@ -189,7 +189,7 @@ def _findings(
         return
     if bound.check.subject is Subject.SUBMISSION:
         only = bound.parameters.only
-        if only and only != CPP and is_cpp(submission, _about(bound, loaded)):
+        if only not in ("", CPP) and submission.spoken(_about(bound, loaded)) == CPP:
             unread = f"this check reads {only}, and the package is written in C++"
             asked = bound.parameters.asked_for
             yield ScenarioFinding(None, Finding.error(asked, unread, hint=_NOT_YOURS))

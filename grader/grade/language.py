@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -14,7 +13,6 @@ from pathlib import Path
 import yaml
 
 from grader.findings.finding import Finding
-from grader.submission.record import CPP, SubmissionRecord
 
 _FILE = Path(__file__).with_name("cpp_words.yaml")
 _PLACE = re.compile(r"(?<!\$)\{(\w+)\}")
@@ -50,14 +48,6 @@ def in_cpp(text: str) -> str:
         return _PLACE.sub(lambda place: in_cpp(found[f"{place[1]}_{number}"]), cpp[number])
 
     return pattern.sub(translated, text)
-
-
-def is_cpp(submission: SubmissionRecord, names: Collection[str]) -> bool:
-    """Whether packages are written in C++; if they have no programs, the whole submission."""
-    about = [package for name in names if (package := submission.package(name))]
-    spoken = {submission.language(one) for one in about} - {""}
-    spoken = spoken or {submission.language(one) for one in submission.packages} - {""}
-    return spoken == {CPP}
 
 
 def finding_in_cpp(finding: Finding) -> Finding:

@@ -16,6 +16,7 @@ from grader.diagnosis.not_built import why_not_built
 from grader.errors import AssignmentError, UsageError
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes
+from grader.findings.words import worded
 from grader.recording.model import Recording
 from grader.spec.names import Names, Thing, WrongName
 from grader.spec.nearest_name import nearest
@@ -231,9 +232,10 @@ def _unnamed(
     of_form = "of any name" if shape == ANY else f"with a name of the form {code(shape)}"
     hint = f"Name the {noun} as {like} is named, with your own {code(name)}."
     if noun == "package":
-        hint += (
-            " The same name stands in package.xml, setup.py, setup.cfg, resource/ and for the "
-            "folder of the Python module, or in CMakeLists.txt."
+        hint += worded(
+            python=" The same name stands in package.xml, setup.py, setup.cfg, resource/ and for "
+            "the folder of the Python module, or in CMakeLists.txt.",
+            cpp=" The same name stands in package.xml and in project(...) of CMakeLists.txt.",
         )
     asked = f"one {noun}{place} {of_form}, such as {like}"
     if noun == "executable" and of and not offered:

@@ -17,6 +17,7 @@ from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import first_seen, until_the_end
 from grader.findings.value import EXACT
 from grader.findings.wording import code, counted, listing
+from grader.findings.words import worded
 from grader.grade.model import SEVERITY
 from grader.recording.model import Kind, Owner, Recording
 from grader.recording.window import cut
@@ -86,9 +87,10 @@ def _why_not(recording: Recording, phase: Phase) -> Finding:
             asked = (SERVICE, bad[0].service, bad[0].requested_ns, _ANSWER_S)
             return why_unanswered(recording, seen, *asked)
         if bad:
+            success = worded("TransitionCallbackReturn.SUCCESS", "CallbackReturn::SUCCESS")
             hint = (
                 "The callbacks of transitions (on_configure, on_activate, ...) must return "
-                "TransitionCallbackReturn.SUCCESS."
+                f"{success}."
             )
             # What failed later, or ended the process, came of it.
             return Finding(seen, hint, shown)

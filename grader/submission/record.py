@@ -7,6 +7,7 @@ files nor ROS. All paths are relative to the submission, with forward slashes.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -337,6 +338,16 @@ class SubmissionRecord:
         if package.build_type == "ament_python" or "rclpy" in imported:
             return PYTHON
         return CPP if is_compiled else PYTHON if package.sources else ""
+
+    def spoken(self, names: Iterable[str]) -> str:
+        """The language to speak of packages in: C++ if their programs are all in it, or Python.
+
+        If they have no programs, those of the whole submission decide.
+        """
+        about = [package for name in names if (package := self.package(name))]
+        found = {self.language(one) for one in about} - {""}
+        found = found or {self.language(one) for one in self.packages} - {""}
+        return CPP if found == {CPP} else PYTHON
 
     def package(self, name: str) -> PackageRecord | None:
         """The package of that name, or what stands in for it; else None."""

@@ -16,7 +16,7 @@ from grader.diagnosis.explanation import explanations
 from grader.findings.finding import Status
 from grader.findings.words import speaking
 from grader.grade import grade
-from grader.grade.language import in_cpp, is_cpp
+from grader.grade.language import in_cpp
 from grader.submission.record import CPP, PYTHON, PackageRecord, SourceFile
 from tests.checks.builder import package, submission
 from tests.grade.sample import FAIL, Told, make_loaded, make_recording, make_submission
@@ -82,6 +82,9 @@ def _texts(statement: ast.stmt) -> Iterator[str]:
             hidden |= {id(part) for part in node.values}
         if isinstance(node, ast.Call) and ast.unparse(node.func) in ("Field", "re.compile"):
             hidden |= {id(part) for part in ast.walk(node)}
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("Words", "worded"):
+            of_python = [*node.args, *(one.value for one in node.keywords)][0]
+            hidden |= {id(part) for part in ast.walk(of_python)}
     for node in ast.walk(statement):
         if id(node) in hidden:
             continue
@@ -173,11 +176,11 @@ def test_a_package_speaks_the_language_of_its_programs() -> None:
     )
     spoken = {one.name: record.language(one) for one in record.packages}
     assert spoken == {"drive": CPP, "look": PYTHON, "msgs": "", "plan": PYTHON}
-    assert is_cpp(record, ["drive", "msgs"])
-    assert not is_cpp(record, ["drive", "plan"])
+    assert record.spoken(["drive", "msgs"]) == CPP
+    assert record.spoken(["drive", "plan"]) == PYTHON
     # Interfaces have no language of their own: what is said of them is in that of the programs.
-    assert not is_cpp(record, ["msgs"])
-    assert is_cpp(submission(compiled, messages, files=record.files), ["msgs"])
+    assert record.spoken(["msgs"]) == PYTHON
+    assert submission(compiled, messages, files=record.files).spoken(["msgs"]) == CPP
 
 
 def test_findings_and_hints_of_the_author_are_in_the_language_of_the_package() -> None:

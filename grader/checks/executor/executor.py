@@ -13,8 +13,8 @@ from grader.checks.node.node import target_nodes
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.blocked_executor import (
-    HINT,
     at_its_place,
+    blocked_hint,
     left_s,
     why_never_spun,
 )
@@ -211,7 +211,7 @@ def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> 
         return never_spun
     name = process.name if process else None
     stand = (name and where_it_stands(recording, name)) or slow_callback(recording, name)
-    cause = Finding(f"{seen}: something blocks the executor", HINT, evidence)
+    cause = Finding(f"{seen}: something blocks the executor", blocked_hint(), evidence)
     return cause if stand is None else at_its_place(cause, seen, stand)
 
 

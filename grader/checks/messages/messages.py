@@ -225,7 +225,7 @@ def _wrong(
 
 def _hint(found: tuple[Difference, ...], number: int, right: int) -> str:
     if any(was_integer(item.observed) for item in found):
-        return FLOAT_HINT
+        return str(FLOAT_HINT)
     if right:
         return (
             f"{counted(right, 'message')} of {number} {'is' if right == 1 else 'are'} right. Look "

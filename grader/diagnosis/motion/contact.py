@@ -8,6 +8,7 @@ from functools import cached_property
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.process.standing import stuck
 from grader.findings.finding import Evidence, Finding
+from grader.findings.words import SLEEP
 from grader.measure.motion.command import VelocityCommand, commands
 from grader.measure.motion.quantities import speed, turn
 from grader.measure.motion.scan import newest
@@ -90,8 +91,8 @@ def old_command(symptom: Contact) -> Finding | None:
     return Finding(
         f", sent {since_ns / NS:.2f} s before",
         "The robot keeps the last command. Publish a command for every scan, or from a timer of "
-        "10 Hz or more. To stop, publish linear.x = 0.0. A time.sleep() or a loop in a callback "
-        "delays the command.",
+        "10 Hz or more. To stop, publish linear.x = 0.0. "
+        f"A {SLEEP} or a loop in a callback delays the command.",
     )
 
 
@@ -111,7 +112,7 @@ def decided_to_drive(symptom: Contact) -> Finding:
         "",
         "Log the range that you compare. Is it the beam straight ahead (angle 0) of the newest "
         "scan? Is your limit in metres? When the range is below the limit, publish linear.x = 0.0. "
-        "With a time.sleep() in the callback or a slow timer, you decide by an old scan. A scan "
+        f"With a {SLEEP} in the callback or a slow timer, you decide by an old scan. A scan "
         "comes every 0.2 s, and the robot needs time to brake. Let only one place publish.",
     )
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from grader.findings.words import Words
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.steering import (
     MOST_BEHIND,
@@ -31,7 +32,7 @@ class Reading:
     """A way to read yaw, from the true one in rad."""
 
     words: str
-    hint: str
+    hint: str | Words
     of: Callable[[float], float]
 
     def __str__(self) -> str:
@@ -42,9 +43,14 @@ class Reading:
 _READINGS = (
     Reading(
         "always 0",
-        "The order of a quaternion in ROS is x, y, z, w. as_euler('xyz') and "
-        "euler_from_quaternion() return roll, pitch and yaw: yaw is the last of the three. "
-        f"{_FORMULA}. Compute it again in each callback: at the start it may have been 0.",
+        Words(
+            python="The order of a quaternion in ROS is x, y, z, w. as_euler('xyz') and "
+            "euler_from_quaternion() return roll, pitch and yaw: yaw is the last of the three. "
+            f"{_FORMULA}. Compute it again in each callback: at the start it may have been 0.",
+            cpp="The order of a quaternion in ROS is x, y, z, w. getRPY() of tf2::Matrix3x3 gives "
+            "roll, pitch and yaw: yaw is the last of the three. "
+            f"{_FORMULA}. Compute it again in each callback: at the start it may have been 0.",
+        ),
         lambda _: 0.0,
     ),
     Reading(

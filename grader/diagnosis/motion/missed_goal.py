@@ -11,6 +11,7 @@ from grader.diagnosis.motion.off_course import why_off_course
 from grader.diagnosis.process.blocked_executor import at_its_place
 from grader.diagnosis.process.standing import stuck
 from grader.findings.finding import Finding
+from grader.findings.words import MATH
 from grader.measure.motion.approach import WRAP_HINT, Approach, long_turns
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.quantities import metres, point, speed, turn
@@ -131,7 +132,7 @@ def loop_in_a_callback(symptom: GoalMissed) -> Finding | None:
 def yaw_misread(symptom: GoalMissed) -> Finding | None:
     """The yaw is computed wrongly from the quaternion."""
     misread = None if symptom.is_at_rest else misread_yaw(symptom.run, symptom.position_m)
-    return symptom.cause(f": {misread}", misread.hint) if misread else None
+    return symptom.cause(f": {misread}", str(misread.hint)) if misread else None
 
 
 @explanation(GoalMissed, concept="angles")
@@ -176,8 +177,9 @@ def stopped_elsewhere(symptom: GoalMissed) -> Finding | None:
         return None
     return symptom.cause(
         "",
-        "Print the goal that your node reads. Drive until math.hypot(goal's x - x, goal's y - y) "
-        "is below the tolerance, in metres, with x and y from the newest odometry.",
+        "Print the goal that your node reads. Drive until "
+        f"{MATH}hypot(goal's x - x, goal's y - y) is below the tolerance, in metres, with x and y "
+        "from the newest odometry.",
     )
 
 
@@ -192,7 +194,7 @@ def drives_away(symptom: GoalMissed) -> Finding | None:
         "Print the direction of the goal, yaw and the command while it drives. The direction "
         "changes with the position: it is atan2(dy, dx), dy first, with dx = goal's x - x, and "
         "not atan(dy / dx). The error is this direction - yaw, and a positive error turns left. "
-        "linear.x is a gain times math.hypot(dx, dy), which is never negative.",
+        f"linear.x is a gain times {MATH}hypot(dx, dy), which is never negative.",
     )
 
 

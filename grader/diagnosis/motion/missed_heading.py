@@ -57,7 +57,7 @@ def off_course(symptom: HeadingMissed) -> Finding | None:
 def heading_misread(symptom: HeadingMissed) -> Finding | None:
     """The yaw is computed wrongly from the quaternion."""
     misread = misread_yaw(symptom.run, symptom.position_m)
-    return symptom.cause(f": {misread}", misread.hint) if misread else None
+    return symptom.cause(f": {misread}", str(misread.hint)) if misread else None
 
 
 @explanation(HeadingMissed, general=True)

@@ -163,7 +163,7 @@ def only_zeros(symptom: NotMoved) -> Finding | None:
     if others:
         seen += f", but {codes(others)} {'is' if len(others) == 1 else 'are'} not"
     elif misread is not None:
-        return Finding(f"{seen}; {misread.words}", misread.hint, symptom.evidence)
+        return Finding(f"{seen}; {misread.words}", str(misread.hint), symptom.evidence)
     return Finding(
         seen,
         "Which branch of the callback publishes? Log what it compares. The speed ahead is "
@@ -181,7 +181,7 @@ def integer_in_command(symptom: NotMoved) -> Finding | None:
             return Finding(
                 f"{_STILL}: {MISREAD} was put into {code(field)}, a float field, "
                 "which ROS misreads",
-                FLOAT_HINT,
+                str(FLOAT_HINT),
                 symptom.evidence,
             )
     return None

@@ -9,6 +9,7 @@ from grader.diagnosis.process.standing import Stand, slow_callback, where_it_sta
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import until_the_end
 from grader.findings.wording import codes
+from grader.findings.words import SPIN, SPIN_NODE
 from grader.measure import declarations
 from grader.recording.model import NS, Call, Process, Recording
 from grader.spec.unit import format_duration
@@ -18,10 +19,13 @@ _ANSWER_S = 1.0
 # A node whose callbacks return at once answers a call to its parameter services sooner.
 _SLOW_S = 0.5
 
-HINT = (
-    "A callback must return soon, and main() must come to rclpy.spin(node). Look for a loop, a "
-    "sleep or a call that waits."
-)
+
+def blocked_hint() -> str:
+    """What to try where something blocks the executor."""
+    return (
+        f"A callback must return soon, and main() must come to {SPIN_NODE}. Look for a loop, a "
+        "sleep or a call that waits."
+    )
 
 
 def left_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
@@ -60,7 +64,7 @@ def why_blocked(
     cause = Finding(
         f"{seen}: something blocks the executor; from {since_s:.2f} s after launch on the node's "
         "parameter service does not answer either",
-        HINT,
+        blocked_hint(),
         Evidence(moments=(Moment("first call that was not answered", since_s),)),
         concept="executors",
     )
@@ -88,7 +92,7 @@ def why_slow(recording: Recording, seen: str, nodes: Collection[str]) -> Finding
     cause = Finding(
         f"{seen}: the callbacks keep each other waiting, and calls to the node's parameter "
         f"service waited {format_duration(wait_s)} or more",
-        HINT,
+        blocked_hint(),
         Evidence(moments=(moment,)),
         concept="executors",
     )
@@ -118,15 +122,15 @@ def why_never_spun(
             f"{seen}: an executor spins, but {codes(names)} was not added to it, so none of its "
             "callbacks runs",
             "Add the node to the executor that spins, executor.add_node(node), or call "
-            "rclpy.spin(node).",
+            f"{SPIN_NODE}.",
             Evidence(moments=(until_the_end(recording, "no executor had the node"),)),
             concept="executors",
         )
     stand = where_it_stands(recording, process.name)
     cause = Finding(
-        f"{seen}: rclpy.spin() was never called, so no callback runs",
-        "Call rclpy.spin(node) in main(). Nothing before it may wait or loop for ever.",
-        Evidence(moments=(until_the_end(recording, "rclpy.spin() was still not called"),)),
+        f"{seen}: {SPIN} was never called, so no callback runs",
+        f"Call {SPIN_NODE} in main(). Nothing before it may wait or loop for ever.",
+        Evidence(moments=(until_the_end(recording, f"{SPIN} was still not called"),)),
         concept="executors",
     )
     return cause if stand is None else at_its_place(cause, seen, stand)

@@ -21,6 +21,7 @@ from grader.diagnosis.process.raised import (
 )
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code
+from grader.findings.words import INIT, SPIN, SPIN_NODE, worded
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.spec.source import Model, read_source
@@ -193,12 +194,17 @@ def main_returned(symptom: ProcessExit) -> Finding | None:
     if declarations.traced(recording, name) and not declarations.declares(recording, "node", name):
         how = " before a node was created"
     elif declarations.never_spun(recording, name):
-        how = " without rclpy.spin()"
+        how = f" without {SPIN}"
     return Finding(
         f"{symptom.seen} with exit code 0: main() returned{how}",
-        "main() must call rclpy.init() and create the node. rclpy.spin(node) keeps a node alive "
-        "until Ctrl-C. Look for what ends it: spin_once() handles one round only; a daemon thread "
-        "ends with main(); rclpy.shutdown(), sys.exit() and os._exit() end everything.",
+        f"main() must call {INIT} and create the node. {SPIN_NODE} keeps a node alive until "
+        "Ctrl-C. Look for what ends it: "
+        + worded(
+            python="spin_once() handles one round only; a daemon thread ends with main(); "
+            "rclpy.shutdown(), sys.exit() and os._exit() end everything.",
+            cpp="spin_some() handles what is there and returns; a detached thread ends with "
+            "main(); rclcpp::shutdown() and exit() end everything.",
+        ),
         symptom.evidence,
     )
 
@@ -223,8 +229,11 @@ def launch_file_not_installed(symptom: ProcessExit) -> Finding | None:
     return Finding(
         f"{symptom.seen}: the package {code(package)} installed no {code(name)}",
         f"Name the launch file {code(name)}, and install it: "
-        f"('share/{package}/launch', glob('launch/*')) in data_files of setup.py, or "
-        "install(DIRECTORY launch DESTINATION share/${PROJECT_NAME}) in CMakeLists.txt.",
+        + worded(
+            python=f"('share/{package}/launch', glob('launch/*')) in data_files of setup.py, or ",
+            cpp="",
+        )
+        + "install(DIRECTORY launch DESTINATION share/${PROJECT_NAME}) in CMakeLists.txt.",
         symptom.evidence,
     )
 
@@ -284,7 +293,11 @@ def service_without_response(symptom: ProcessExit) -> Finding | None:
     return Finding(
         f"{symptom.seen} with {failure}: a service's callback did not return a response"
         f"{in_brackets(place)}",
-        "End the service's callback with `return response`: return the object that it was given.",
+        worded(
+            python="End the service's callback with `return response`: return the object that it "
+            "was given.",
+            cpp="Fill in the response that the service's callback is given.",
+        ),
         replace(symptom.evidence, places=(place,) if place else ()),
     )
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from grader.diagnosis.process.raised import interrupted_call, submission_path
 from grader.findings.wording import code
+from grader.findings.words import INPUT, SPIN, SPIN_NODE, Words
 from grader.measure.declarations import never_spun
 from grader.measure.standing import Standing, at_the_end, longest_callback
 from grader.recording.model import NS, Recording
@@ -14,6 +15,19 @@ from grader.spec.unit import format_duration
 from grader.submission.record import SourceError
 
 _LONGEST_TEXT = 80
+ASK_AND_RETURN = Words(
+    python="Instead of call() or spin_until_future_complete() use call_async() or "
+    "send_goal_async(), return, and go on in the callback of future.add_done_callback().",
+    cpp="Instead of future.get() or spin_until_future_complete() give async_send_request() or "
+    "async_send_goal() a callback, return, and go on in that.",
+)
+_UNTAKEN = (
+    "It waits for an answer that the executor can take in only when this callback has returned."
+)
+_WAITS_FOR_ITSELF = (
+    "Do not spin or wait for a future in a callback: what it waits for can come only when the "
+    "callback has returned. Return, and go on in the callback "
+)
 # What a line waits for -> what to do about it in a callback.
 _WAITS = (
     (
@@ -23,14 +37,17 @@ _WAITS = (
     ),
     (
         r"\.call\(",
-        "It waits for an answer that the executor can take in only when this callback has "
-        "returned. Instead of call() or spin_until_future_complete() use call_async() or "
-        "send_goal_async(), return, and go on in the callback of future.add_done_callback().",
+        Words(
+            python=f"{_UNTAKEN} {ASK_AND_RETURN.python}",
+            cpp=f"{_UNTAKEN} {ASK_AND_RETURN.cpp}",
+        ),
     ),
     (
         r"\bspin|future|\.done\(|\.result\(",
-        "Do not spin or wait for a future in a callback: what it waits for can come only when the "
-        "callback has returned. Return, and go on in the callback of future.add_done_callback().",
+        Words(
+            python=f"{_WAITS_FOR_ITSELF}of future.add_done_callback().",
+            cpp=f"{_WAITS_FOR_ITSELF}that async_send_request() or async_send_goal() is given.",
+        ),
     ),
     (
         r"lock|acquire\(",
@@ -38,7 +55,6 @@ _WAITS = (
         "callback that holds a lock must not call a method that takes it again.",
     ),
 )
-_INPUT = "A launched node has no keyboard: take the value from a ROS parameter, not from input()."
 _LOOP = (
     "While a callback loops, it gets no new message. Write `if` in place of the loop, and return: "
     "the callback is called again, and sees what is new then."
@@ -46,10 +62,6 @@ _LOOP = (
 _SLEEP = (
     "While a callback sleeps or works, the node calls nothing else. Do one short step and return: "
     "the callback is called again."
-)
-_NOT_YET = (
-    "Put one step of it into a callback, which is called again and again, and let main() go on to "
-    "rclpy.spin(node)."
 )
 
 
@@ -146,17 +158,23 @@ def _at(line: int, text: str) -> str:
 def _words(function: str, line: int, text: str, when: str, in_callback: bool) -> str:
     what = f"{code(function)} does not return"
     if not in_callback:
-        what = f"rclpy.spin() is not reached, because {what}"
+        what = f"{SPIN} is not reached, because {what}"
     return f"{what}: {_at(line, text)}, {when}"
 
 
 def _hint(text: str, loop: str, in_callback: bool) -> str:
     if "input(" in text:
-        return _INPUT
+        return (
+            "A launched node has no keyboard: take the value from a ROS parameter, not from "
+            f"{INPUT}."
+        )
     if not in_callback:
-        return _NOT_YET
+        return (
+            "Put one step of it into a callback, which is called again and again, and let main() "
+            f"go on to {SPIN_NODE}."
+        )
     for pattern, hint in _WAITS:
         if re.search(pattern, text) or re.search(pattern, loop):
-            return hint
+            return str(hint)
     is_loop = loop or text.startswith(("while ", "for "))
     return _LOOP if is_loop else _SLEEP
