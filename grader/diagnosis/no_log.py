@@ -17,7 +17,7 @@ from grader.diagnosis.wrong_value import factor_words
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.wording import code, counted, listing
-from grader.findings.words import SILENT_EXCEPT, worded
+from grader.findings.words import LOG, SILENT_EXCEPT, worded
 from grader.measure.printed import (
     UNFILLED,
     Echo,
@@ -351,8 +351,7 @@ def nothing_logged(symptom: NotLogged) -> Finding:
     )
     if symptom.own:
         seen = symptom.seen
-        log = worded("self.get_logger().info('...')", 'RCLCPP_INFO(get_logger(), "...")')
-        hint = f"Log the message where it is published: {log}."
+        hint = f"Log the message where it is published: {LOG}."
     return Finding(
         seen + (f"; the process wrote {quote(lines[0].text)}" if lines else ""),
         hint,

@@ -21,6 +21,7 @@ from grader.findings.wording import code, codes, counted, listing
 from grader.diagnosis.no_messages import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.process.process_exit import why_ended
+from grader.findings.words import worded
 from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
@@ -35,11 +36,6 @@ _PAUSE_S = 0.1
 _NEXT_S = 0.05
 _GAINED = 0.25
 """Share of its period by which a timer may seem to have gained."""
-_PERIOD_HINT = (
-    f"{SECONDS_HINT} A callback that is given to two timers runs twice as often. While a callback "
-    "works, no other callback of its executor or group begins: several that work longer than a "
-    "period together are late."
-)
 
 
 
@@ -151,9 +147,7 @@ def _judge_period(
             return Finding.to_repeat(
                 expected, f"{observed}, unless it was the machine that held it up"
             )
-        return Finding.failed(
-            expected, observed, _made_twice(recording) or _PERIOD_HINT, evidence
-        )
+        return Finding.failed(expected, observed, _period_hint(recording), evidence)
     if good and len(reports.ended([callback])) >= parameters.at_least:
         return _by_chance(recording, parameters, reports, callback, limits)
     if seconds and not good:
@@ -163,9 +157,7 @@ def _judge_period(
             return Finding.to_repeat(
                 expected, f"{observed}, but the machine took the time from the process"
             )
-        return Finding.failed(
-            expected, observed, _made_twice(recording) or _PERIOD_HINT, evidence
-        )
+        return Finding.failed(expected, observed, _period_hint(recording), evidence)
     cause = why_reports_are_missing(
         recording, parameters.topic, parameters.callbacks, reports, parameters.at_least
     )
@@ -260,6 +252,14 @@ def _worked(recording: Recording, reports: Reports, from_ns: int, to_ns: int) ->
             break
         free_ns = max(free_ns, item.end_ns or recording.stop_ns)
     return to_ns - free_ns <= _PAUSE_S * NS
+
+
+def _period_hint(recording: Recording) -> str:
+    return _made_twice(recording) or (
+        f"{SECONDS_HINT} A callback that is given to two timers runs twice as often. While a "
+        "callback works, no other callback of its executor or group begins: several that work "
+        "longer than a period together are late."
+    )
 
 
 def _made_twice(recording: Recording) -> str:
@@ -373,9 +373,13 @@ def work(recording: Recording, parameters: Work) -> Finding:
         return Finding.failed(
             expected,
             f"{parts[-1]} (median of {counted(len(seconds), 'run')})",
-            f"Report the start, then work with time.sleep({parameters.duration:g}), then report "
-            f"the end. {SECONDS_HINT} If it takes longer, something else waits between the two "
-            "reports, such as for a lock.",
+            "Report the start, then work with "
+            + worded(
+                python=f"time.sleep({parameters.duration:g})",
+                cpp=f"std::this_thread::sleep_for({parameters.duration:g}s)",
+            )
+            + f", then report the end. {SECONDS_HINT} If it takes longer, something else waits "
+            "between the two reports, such as for a lock.",
             Evidence(spans=spans(recording, reports, found)),
         )
     return Finding.passed(expected, listing(parts), Evidence(spans=spans(recording, reports)))

@@ -13,6 +13,7 @@ from grader.checks.need import Need, Recorded
 from grader.findings.wording import code, codes, counted, value_text
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended
+from grader.findings.words import Words, worded
 from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
 from grader.spec.nearest_name import nearest
@@ -24,7 +25,10 @@ _FORMAT_HINT = (
     "Publish a String with the name of the callback, a space and `start` as the first thing in "
     "the callback, and the same with `end` as the last, such as `timer_1 start`."
 )
-SECONDS_HINT = "time.sleep and create_timer take seconds: 0.4 is 400 ms."
+SECONDS_HINT = Words(
+    python="time.sleep and create_timer take seconds: 0.4 is 400 ms.",
+    cpp="sleep_for and create_wall_timer take a time with its unit: 400ms, and not 0.4.",
+)
 
 
 class Reported(Parameters):
@@ -104,8 +108,12 @@ def _incomplete(
             f"{code(name)} reported {counted(begun, 'start')}, but {ended or 'no'} "
             f"{'end' if ended == 1 else 'ends'}",
             "Publish the end as the last thing in the callback; it must return. Look for a loop, "
-            "a long time.sleep (it takes seconds), an exception, and rate.sleep(), which waits for "
-            "ever in a callback of the only thread.",
+            + worded(
+                python="a long time.sleep (it takes seconds)",
+                cpp="a long std::this_thread::sleep_for() (300ms is not 300s)",
+            )
+            + ", an exception, and rate.sleep(), which waits for ever in a callback of the only "
+            "thread.",
             evidence,
         )
     if name in reports.orphans:
@@ -115,9 +123,15 @@ def _incomplete(
         seen = f"; reports came of {codes(others)}" if others else ""
         return Finding(
             f"{code(name)} never ran{seen}",
-            "Is its timer or its subscription created in the constructor, with the period in "
-            "seconds, and does it report under this name? A callback that does not return keeps "
-            "the others of its group from running.",
+            worded(
+                python="Is its timer or its subscription created in the constructor, with the "
+                "period in seconds, and does it report under this name?",
+                cpp="Is its timer or its subscription created in the constructor, with the unit of "
+                "the period, such as 300ms, and does it report under this name? Keep it and its "
+                "callback group in members of the class: what only a local variable holds ends "
+                "with the constructor.",
+            )
+            + " A callback that does not return keeps the others of its group from running.",
             evidence,
         )
     return Finding(

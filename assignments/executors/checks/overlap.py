@@ -10,6 +10,7 @@ from pydantic import Field
 from grader.checks.check import Subject, check
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code, codes, counted, listing
+from grader.findings.words import EXCLUSIVE, REENTRANT, SPIN_NODE, worded
 from grader.measure.callback_runs import Overlap, Run, overlaps
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Duration
@@ -90,10 +91,13 @@ def _exclusion_hint(recording: Recording, names: Sequence[str], overlap: Overlap
             "callback itself, from its first report to its last."
         )
     return (
-        "A SingleThreadedExecutor, which rclpy.spin(node) uses too, runs one callback at a time; "
-        "with a MultiThreadedExecutor only those of one MutuallyExclusiveCallbackGroup do: "
-        "self.create_subscription(..., callback_group=self.group). In a ReentrantCallbackGroup a "
-        "callback may run again while it still runs."
+        f"A SingleThreadedExecutor, which {SPIN_NODE} uses too, runs one callback at a time; "
+        f"with a MultiThreadedExecutor only those of one {EXCLUSIVE} do: "
+        + worded(
+            python="self.create_subscription(..., callback_group=self.group).",
+            cpp="rclcpp::SubscriptionOptions has a callback_group.",
+        )
+        + f" In a {REENTRANT} a callback may run again while it still runs."
     )
 
 
@@ -219,19 +223,26 @@ def _prevented(
 def _concurrency_hint(recording: Recording, callbacks: int) -> str:
     if concurrency.single(recording):
         return (
-            "rclpy.spin(node) and a SingleThreadedExecutor run one callback at a time. Create a "
-            "MultiThreadedExecutor(), give it the node with add_node(node), and call its spin()."
+            f"{SPIN_NODE} and a SingleThreadedExecutor run one callback at a time. Create "
+            + worded("a MultiThreadedExecutor()", "an rclcpp::executors::MultiThreadedExecutor")
+            + ", give it the node with add_node(node), and call its spin()."
         )
     if concurrency.shares_exclusive_group(recording):
         return (
-            "Without callback_group=... every timer and subscription is in the node's default "
-            "group, which is mutually exclusive. Create a ReentrantCallbackGroup() and give it to "
-            "both timers: self.create_timer(1.0, self.callback, callback_group=self.group)."
+            f"Without {worded('callback_group=...', 'a callback group')} every timer and "
+            "subscription is in the node's default group, which is mutually exclusive. Create "
+            + worded(
+                python="a ReentrantCallbackGroup() and give it to both timers: "
+                "self.create_timer(1.0, self.callback, callback_group=self.group).",
+                cpp="a group, this->create_callback_group(rclcpp::CallbackGroupType::Reentrant), "
+                "keep it in a member, and give it to both timers: "
+                "this->create_wall_timer(1.0s, callback, group_).",
+            )
         )
     if concurrency.allows(recording) and concurrency.threads(recording) < callbacks:
         return (
             f"{callbacks} callbacks can run at once only if the executor has {callbacks} threads "
-            f"or more: MultiThreadedExecutor(num_threads={callbacks + 1})."
+            f"or more: {concurrency.executor_with(callbacks + 1)}."
         )
     if concurrency.allows(recording):
         return (
@@ -241,5 +252,5 @@ def _concurrency_hint(recording: Recording, callbacks: int) -> str:
         )
     return (
         "It takes both: a MultiThreadedExecutor with two threads or more, and callbacks that are "
-        "in a ReentrantCallbackGroup or in different groups."
+        f"in a {REENTRANT} or in different groups."
     )

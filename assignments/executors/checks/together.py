@@ -79,7 +79,7 @@ def together(recording: Recording, parameters: Together) -> Finding:
         expected,
         observed + (f"; {declared}" if declared else ""),
         f"{len(names)} callbacks can run at once only if the executor has {len(names)} threads or "
-        f"more, {code(f'MultiThreadedExecutor(num_threads={len(names) + 1})')}, and if no group, "
+        f"more, {code(concurrency.executor_with(len(names) + 1))}, and if no group, "
         "lock or callback that waits keeps them apart.",
         Evidence(
             moments=(Moment("first run", recording.since_launch_s(reports.runs[0].begin_ns)),),

@@ -24,6 +24,7 @@ from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.no_motion import why_cut_short
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.diagnosis.no_messages import why_silent
+from grader.findings.words import SLEEP
 from grader.recording.model import Recording
 from grader.spec.quantity import Frequency, PositiveLength, Ratio
 
@@ -111,7 +112,7 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     misread = misread_yaw(run, parameters.position)
     if misread is not None:
         return Finding.failed(
-            expected, f"the commands do not follow the error: {misread}", misread.hint, evidence
+            expected, f"the commands do not follow the error: {misread}", str(misread.hint), evidence
         )
     return Finding.failed(expected, observed, hint, evidence)
 
@@ -249,8 +250,8 @@ def _words(verdict: LawVerdict, parameters: Proportional, number: int) -> tuple[
     return (
         f"the commands do not follow the error: gain {verdict.gain:.3g} 1/s, R² {verdict.r2:.2f}, "
         f"{counted(verdict.used, 'command')}",
-        f"Publish {formula}, {wrap}, from the newest odometry, at 10 Hz or more: a time.sleep() in "
-        "a callback lets odometry grow old.",
+        f"Publish {formula}, {wrap}, from the newest odometry, at 10 Hz or more: a {SLEEP} in a "
+        "callback lets odometry grow old.",
     )
 
 

@@ -13,6 +13,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from grader.findings.words import Words
+
 from .conversion import (
     Rows,
     angles_between,
@@ -41,17 +43,38 @@ _HALF_HINT = (
     "A quaternion holds half of the angle: vector part = sin(angle / 2) times the unit axis, "
     "w = cos(angle / 2)."
 )
-_AXIS_HINT = "Divide the axis by its length, math.sqrt(x**2 + y**2 + z**2), before you use it."
-_ORDER_HINT = (
-    "ROS writes a quaternion as x, y, z, w; many books and libraries put w first. Name the "
-    "fields: Quaternion(x=..., y=..., z=..., w=...)."
+_AXIS_HINT = Words(
+    python="Divide the axis by its length, math.sqrt(x**2 + y**2 + z**2), before you use it.",
+    cpp="Divide the axis by its length, std::sqrt(x * x + y * y + z * z), before you use it.",
 )
-_RADIANS_HINT = "Angles in ROS are in radians, and so are those of math.sin and math.atan2."
+_ORDER_HINT = Words(
+    python="ROS writes a quaternion as x, y, z, w; many books and libraries put w first. Name the "
+    "fields: Quaternion(x=..., y=..., z=..., w=...).",
+    cpp="ROS writes a quaternion as x, y, z, w; many books and libraries put w first. Name the "
+    "fields: q.x = ...; q.y = ...; q.z = ...; q.w = ...;",
+)
+_RADIANS_HINT = Words(
+    python="Angles in ROS are in radians, and so are those of math.sin and math.atan2.",
+    cpp="Angles in ROS are in radians, and so are those of std::sin and std::atan2.",
+)
 _FIXED_HINT = (
     "Fixed axes stand still while the body turns: first roll about x, then pitch about y, then yaw "
     "about z, so q = q_yaw * q_pitch * q_roll, in this order."
 )
-_HALF_ANGLES_HINT = "A quaternion holds half angles: math.sin(roll / 2)."
+_HALF_ANGLES_HINT = Words(
+    python="A quaternion holds half angles: math.sin(roll / 2).",
+    cpp="A quaternion holds half angles: std::sin(roll / 2).",
+)
+_LENGTH_HINT = Words(
+    python="Divide x, y, z and w by the length of the quaternion, "
+    "math.sqrt(x**2 + y**2 + z**2 + w**2), before you use them.",
+    cpp="Divide x, y, z and w by the length of the quaternion, "
+    "std::sqrt(x * x + y * y + z * z + w * w), before you use them.",
+)
+_QUADRANT_HINT = Words(
+    python="Use math.atan2(a, b) and not math.atan(a / b): only the two signs tell the quadrant.",
+    cpp="Use std::atan2(a, b) and not std::atan(a / b): only the two signs tell the quadrant.",
+)
 _INVERSE_HINT = "The vector part of the quaternion has the wrong sign, so it turns backwards."
 _SIGN_HINT = (
     "q and -q are the same rotation, but all four numbers change their signs together: leave w "
@@ -68,7 +91,7 @@ class Mistake:
     """
 
     words: str
-    hint: str
+    hint: str | Words
     formula: Callable[[Rows], Rows]
 
 
@@ -245,7 +268,7 @@ def _rpy_times(factors: float | Rows) -> Callable[[Rows], Rows]:
 
 
 def _scaled(
-    times: Callable[[float], Callable[[Rows], Rows]], mistakes: Sequence[tuple[str, float, str]]
+    times: Callable[[float], Callable[[Rows], Rows]], mistakes: Sequence[tuple[str, float, str | Words]]
 ) -> tuple[Mistake, ...]:
     """A factor on all angles: what is wrong, to follow "the angles are"; the factor; a hint."""
     return tuple(
@@ -330,9 +353,7 @@ _TO_RPY = (
     ),
     Mistake("the angles are those about axes that turn with the body (intrinsic), not about fixed "
          "ones", _FIXED_HINT, _intrinsic_rpy),
-    Mistake("the quaternion is not scaled to length 1 before", "Divide x, y, z and w by the length "
-         "of the quaternion, math.sqrt(x**2 + y**2 + z**2 + w**2), before you use them.",
-         rpy_of),
+    Mistake("the quaternion is not scaled to length 1 before", _LENGTH_HINT, rpy_of),
     Mistake("the quaternion is read with w first", _ORDER_HINT,
          lambda rows: _right_rpy(rows[:, [1, 2, 3, 0]])),
     # Before the inverse: where w is negative it gives the same angles.
@@ -342,9 +363,7 @@ _TO_RPY = (
          "a wrong sign.", lambda rows: _right_rpy(rows * _CONJUGATE)),
     Mistake("the pitch has the wrong sign", "The pitch is asin(2 (w y - z x)).",
          _times(_PITCH_MIRRORED)),
-    Mistake(
-         "roll and yaw lose their quadrant", "Use math.atan2(a, b) and not math.atan(a / b): only "
-         "the two signs tell the quadrant.", _tangent),
+    Mistake("roll and yaw lose their quadrant", _QUADRANT_HINT, _tangent),
     *_scaled(
         _times,
         (

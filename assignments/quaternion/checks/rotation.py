@@ -22,6 +22,7 @@ from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_answer import why_raised
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended
+from grader.findings.words import MATH, SLEEP, worded
 from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import QuantityOf
@@ -256,15 +257,20 @@ def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> 
     if misread:
         return (
             f"{MISREAD} was put into a float field, which ROS misreads",
-            "A number in a message must be a float: write 1.0 instead of 1, 0.0 instead of 0, and "
-            "float(value) of what is another type, such as numpy.float32.",
+            worded(
+                python="A number in a message must be a float: write 1.0 instead of 1, 0.0 instead "
+                "of 0, and float(value) of what is another type, such as numpy.float32.",
+                cpp="A number in a message is a double: a division of integers cuts off what "
+                "follows the point, so write 1.0 / 2 instead of 1 / 2.",
+            ),
         )
     infinite = [case for case in wrong if not case.answers[0].finite]
     if 2 * len(infinite) >= len(wrong):
         return (
             "the answer is not a number",
-            "Look for a division by zero, such as by the length of a zero axis, and for math.asin "
-            "or numpy.arcsin of more than 1, which rounding can give: limit it to [-1, 1].",
+            "Look for a division by zero, such as by the length of a zero axis, and for "
+            + worded("math.asin or numpy.arcsin", "std::asin or std::acos")
+            + " of more than 1, which rounding can give: limit it to [-1, 1].",
         )
     bad = [(case.row, case.answers[0].row) for case in wrong if case.answers[0].finite]
     if len({case.answers[0].row for case in judged if case.answers}) == 1 and len(bad) > 1:
@@ -306,7 +312,7 @@ def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> 
     if found is not None:
         mistake, share = found
         of = f"all {len(bad)}" if share == 1.0 else f"{round(share * len(bad))} of {len(bad)}"
-        return f"{mistake.words} (that gives {of} of these answers)", mistake.hint
+        return f"{mistake.words} (that gives {of} of these answers)", str(mistake.hint)
     part = wrong_part(parameters.conversion, questions, np.array([row for _, row in bad]))
     return part or _by_kind(parameters, wrong)
 
@@ -342,7 +348,7 @@ def _by_kind(parameters: Answers, wrong: list[Case]) -> tuple[str, str]:
             "",
             "The usual formulas divide 0 by 0 there: where abs(sin_pitch) > 0.9999999, answer "
             "with the pitch asin(2 (w y - z x)), which has a sign, roll 0 and yaw "
-            "2 * math.atan2(z, w).",
+            f"2 * {MATH}atan2(z, w).",
         )
     return "", "Work the first wrong case out by hand and compare term by term."
 
@@ -396,7 +402,7 @@ def _too_few(
         sent = Moment(f"case {first.number} is sent", recording.since_launch_s(first.asked_ns))
         return Finding(
             f"{seen}, because the answers come late",
-            "A callback must return soon: no time.sleep() and no loop that waits.",
+            f"A callback must return soon: no {SLEEP} and no loop that waits.",
             Evidence(moments=(sent,)),
         )
     return Finding.undecided(seen)

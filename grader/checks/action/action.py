@@ -30,6 +30,7 @@ from grader.findings.fields import FieldTolerance, the_goal, words
 from grader.findings.finding import Evidence, Finding
 from grader.findings.value import EXACT
 from grader.findings.wording import code, counted, percent
+from grader.findings.words import ARROW, worded
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
@@ -109,8 +110,12 @@ def why_rejected(recording: Recording, goal: Goal) -> Finding | None:
         return None
     return Finding(
         f"{the_goal(goal)} was rejected",
-        "A goal_callback must return GoalResponse.ACCEPT for a goal that is right; without one "
-        "every goal is accepted.",
+        worded(
+            python="A goal_callback must return GoalResponse.ACCEPT for a goal that is right; "
+            "without one every goal is accepted.",
+            cpp="handle_goal must return rclcpp_action::GoalResponse::ACCEPT_AND_EXECUTE for a "
+            "goal that is right.",
+        ),
         evidence(recording, goal),
     )
 
@@ -149,8 +154,12 @@ def rejects(recording: Recording, parameters: Rejects) -> Finding:
             then = f", then {goal.status}" if goal.status else ""
             return Finding(
                 f"{the_goal(goal)} was accepted{then}",
-                "The ActionServer's goal_callback decides: it looks at the request and returns "
-                "GoalResponse.REJECT. Without one every goal is accepted.",
+                worded(
+                    python="The ActionServer's goal_callback decides: it looks at the request and "
+                    "returns GoalResponse.REJECT. Without one every goal is accepted.",
+                    cpp="The server's handle_goal decides: it looks at the request and returns "
+                    "rclcpp_action::GoalResponse::REJECT.",
+                ),
                 evidence(recording, goal),
             )
     return Finding.passed(parameters.asked_for, "it was rejected", evidence(recording, goals[0]))
@@ -227,7 +236,7 @@ def _why_little_feedback(
     seen += f" and then {goal.status}" if goal.status else ""
     return why_raised(recording, seen, goal.sent_ns) or Finding(
         seen,
-        "Call goal_handle.publish_feedback(feedback) in the loop of the execute callback.",
+        f"Call goal_handle{ARROW}publish_feedback(feedback) in the loop of the execute callback.",
         evidence(recording, goal),
     )
 
@@ -318,8 +327,12 @@ def _why_other_status(recording: Recording, goal: Goal, parameters: Result) -> F
     raised = why_raised(recording, seen, goal.sent_ns) if is_aborted else None
     return raised or Finding(
         seen,
-        f"Call goal_handle.{call}() before the execute callback returns its result."
-        + (" Without it rclpy aborts the goal." if is_aborted else ""),
+        worded(
+            python=f"Call goal_handle.{call}() before the execute callback returns its result."
+            + (" Without it rclpy aborts the goal." if is_aborted else ""),
+            cpp=f"Call goal_handle->{call}(result) before the execute callback returns."
+            + (" Without it the goal never ends." if is_aborted else ""),
+        ),
         evidence(recording, goal),
     )
 

@@ -13,6 +13,7 @@ from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.unended_goal import ended_alone, why_no_end, why_not_canceled
 from grader.findings.fields import the_goal
 from grader.findings.finding import Finding
+from grader.findings.words import worded
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Duration
@@ -100,9 +101,9 @@ def preempts(recording: Recording, parameters: Preempts) -> Finding:
 def _why_goes_on(recording: Recording, old: Goal, new: Goal, within_s: float) -> Finding | None:
     """Why the old goal was not ended by the new one, or None if it was."""
     sent_ns, end_ns, shown = new.sent_ns, old.result_ns, evidence(recording, old)
-    hint = (
-        "Keep the current goal handle, and call its abort() when a new goal comes "
-        "(handle_accepted_callback); look at is_active in every round of the loop."
+    hint = "Keep the current goal handle, and call its abort() when a new goal comes " + worded(
+        python="(handle_accepted_callback); look at is_active in every round of the loop.",
+        cpp="(handle_accepted); look at is_active() in every round of the loop.",
     )
     if end_ns is None:
         seen = f"{the_goal(old)} was still worked on at the end"

@@ -17,6 +17,7 @@ from grader.findings.fields import FieldTolerance, brief, words
 from grader.findings.finding import Evidence, Finding
 from grader.findings.value import EXACT
 from grader.findings.wording import code, counted
+from grader.findings.words import worded
 from grader.recording.interaction import Asked
 from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
@@ -98,8 +99,11 @@ def _why_too_early(before: Asked, after: Asked, shown: Evidence) -> Finding | No
         return None
     return Finding(
         f"the next one ({brief(after.fields)}) came before the result of {brief(before.fields)}",
-        "Send the next one only in the callback that takes the result: of a goal that is the "
-        "future of get_result_async(), not that of send_goal_async().",
+        "Send the next one only in the callback that takes the result: of a goal that is "
+        + worded(
+            python="the future of get_result_async(), not that of send_goal_async().",
+            cpp="result_callback of SendGoalOptions, not goal_response_callback.",
+        ),
         shown,
     )
 
@@ -116,9 +120,8 @@ def _why_not_canceled(
     if canceled_ns is None:
         seen = "the last goal was never asked to cancel"
     is_early = canceled_ns is not None and took_s < span_s[0]
-    hint = (
-        "Start a timer when the goal is accepted, and call goal_handle.cancel_goal_async() in it."
-    )
+    cancel = worded("goal_handle.cancel_goal_async()", "client->async_cancel_goal(goal_handle)")
+    hint = f"Start a timer when the goal is accepted, and call {cancel} in it."
     end_ns = canceled_ns or recording.stop_ns
     taken = None if is_early else why_taken(recording, seen, begin_ns, end_ns, span_s[1])
     return taken or Finding(seen, hint, shown)

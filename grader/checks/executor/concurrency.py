@@ -17,6 +17,7 @@ from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.undeclared import why_undeclared
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code, codes, counted, listing
+from grader.findings.words import EXCLUSIVE, REENTRANT, SPIN_NODE, worded
 from grader.measure.callback_runs import Event, Run, overlaps, paired, spans, timed
 from grader.measure.declarations import (
     declares,
@@ -165,17 +166,18 @@ def _why_not_seen(recording: Recording, seen: str, *, declared: bool = True) -> 
 def _hint(recording: Recording, runs: Sequence[Run], *, together: bool) -> str:
     if together and declares(recording, "made") and _MULTI not in dict(executors(recording)):
         return (
-            f"The {_MULTI} that was made never spins: rclpy.spin(node) uses another one, with one "
+            f"The {_MULTI} that was made never spins: {SPIN_NODE} uses another one, with one "
             "thread. Call executor.add_node(node) and executor.spin()."
         )
     if together and len({run.group for run in runs}) == 1 and runs[0].group.startswith(_EXCLUSIVE):
+        group = worded("callback_group=...", "callback group")
         return (
-            f"They are in one {_EXCLUSIVE}, the node's default group if no callback_group=... is "
-            "given. Give them a ReentrantCallbackGroup, or each a group of its own."
+            f"They are in one {EXCLUSIVE}, the node's default group if no {group} is given. Give "
+            f"them a {REENTRANT}, or each a group of its own."
         )
     return (
-        f"rclpy.spin(node) and a {_SINGLE} run one callback at a time. When a {_MULTI} spins, only "
-        f"callbacks of one {_EXCLUSIVE} wait for each other."
+        f"{SPIN_NODE} and a {_SINGLE} run one callback at a time. When a {_MULTI} spins, only "
+        f"callbacks of one {EXCLUSIVE} wait for each other."
     )
 
 

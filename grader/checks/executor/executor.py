@@ -24,6 +24,7 @@ from grader.diagnosis.undeclared import why_undeclared
 from grader.findings.finding import Evidence, Finding, Moment, Plot, Status
 from grader.findings.first_seen import first_seen, nodes_seen
 from grader.findings.wording import code, codes, counted
+from grader.findings.words import SLEEP, SPIN, SPIN_NODE, Words, worded
 from grader.measure import callback_runs, declarations
 from grader.measure.declarations import was_held_up
 from grader.measure.paused import paused, publishers
@@ -41,11 +42,15 @@ _MOST_HELD_NS = 3 * NS
 # How the tracer names a callback that is None: create_rate() makes a timer that calls nothing.
 _NOTHING = "NoneType"
 _CALLED_NOTHING = "rosgrade let the executor call nothing"
-_HINT = (
-    "A thread or a loop that sleeps adds what its work takes to every period, and goes on where "
-    "the executor has stopped. Create a timer in the constructor, "
+_HINT = Words(
+    python="A thread or a loop that sleeps adds what its work takes to every period, and goes on "
+    "where the executor has stopped. Create a timer in the constructor, "
     "self.timer = self.create_timer(period, self.callback) with the period in seconds, publish in "
-    "its callback, and call rclpy.spin(node) in main()."
+    "its callback, and call rclpy.spin(node) in main().",
+    cpp="A thread or a loop that sleeps adds what its work takes to every period, and goes on "
+    "where the executor has stopped. Create a timer in the constructor, "
+    "timer_ = this->create_wall_timer(period, callback) with the unit of the period, such as "
+    "300ms, publish in its callback, and call rclcpp::spin(node) in main().",
 )
 
 
@@ -187,7 +192,7 @@ def _why_mostly_late(
         late = [call for call in group.judged if _wait_s(recording, call) > allowed_s]
         cause = Finding(
             f"{observed}: callbacks keep the executor busy most of the time",
-            "A callback does its work and returns at once: no time.sleep() in it.",
+            f"A callback does its work and returns at once: no {SLEEP} in it.",
             _evidence(recording, [_Answers(group.node, group.judged, late)]),
         )
         stand = slow_callback(recording)
@@ -232,13 +237,18 @@ def _unasked(recording: Recording, names: list[str], parameters: Responsive) -> 
     ]
     if lacking:
         # Only declarations would be left, and a process can declare anything.
-        busy = was_held_up(recording)
+        busy, library = was_held_up(recording), worded("rclpy", "rclcpp")
         return Finding(
             f"{codes(lacking)} has none of the services "
-            f"{codes(EXECUTOR_SERVICES, 'and')} that rclpy makes for every node: "
+            f"{codes(EXECUTOR_SERVICES, 'and')} that {library} makes for every node: "
             "nothing shows from outside whether its executor spins",
-            "Leave at least one of them on: do not set both start_parameter_services and "
-            "start_type_description_service to False.",
+            "Leave at least one of them on: "
+            + worded(
+                python="do not set both start_parameter_services and "
+                "start_type_description_service to False.",
+                cpp="do not switch off both start_parameter_services and "
+                "start_type_description_service.",
+            ),
             Evidence(moments=nodes_seen(recording)),
             Status.ERROR if busy else Status.FAILED,
             disturbed=busy,
@@ -335,7 +345,7 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
             "such as a thread or a loop"
         )
     evidence = Evidence(moments=first_seen(recording, messages))
-    return Finding(observed, _HINT, evidence)
+    return Finding(observed, str(_HINT), evidence)
 
 
 def _why_uncalled(recording: Recording, topic: str) -> Finding | None:
@@ -357,7 +367,9 @@ def _why_uncalled(recording: Recording, topic: str) -> Finding | None:
         return Finding.undecided(f"{observed}, but the machine held messages up")
     when_s = recording.since_launch_s(found.uncalled_ns[0])
     moment = Moment("published outside of every callback", when_s)
-    return Finding(f"{observed}: a thread or a loop calls publish()", _HINT, Evidence((moment,)))
+    return Finding(
+        f"{observed}: a thread or a loop calls publish()", str(_HINT), Evidence((moment,))
+    )
 
 
 def _why_not_paused(recording: Recording, topic: str) -> Finding | None:
@@ -385,13 +397,13 @@ def _why_not_paused(recording: Recording, topic: str) -> Finding | None:
             return None
         return Finding.ours(
             f"{seen} before it could be judged whether a callback publishes",
-            "Let rclpy.spin(node) run until Ctrl+C ends it.",
+            f"Let {SPIN_NODE} run until Ctrl+C ends it.",
         )
     if not declarations.declares(recording, "spin"):
         return Finding.ours(f"{seen}: rosgrade does not know its kind")
     return Finding(
         seen,
-        "Every callback must return, and rclpy.spin() must wait for the next one. Do not "
+        f"Every callback must return, and {SPIN} must wait for the next one. Do not "
         "replace the executor's methods, and close only the file descriptors that you opened.",
         Evidence(moments=first_seen(recording, recording.on(topic))),
         disturbed=was_held_up(recording),

@@ -24,6 +24,7 @@ from grader.diagnosis.not_generated import (
 )
 from grader.findings.finding import Comparison, Evidence, Finding, Table
 from grader.findings.wording import code, codes, listing
+from grader.findings.words import worded
 from grader.recording.interface import DefinitionError, Section, sections_of
 from grader.spec.name import InterfaceName as Interface
 from grader.submission.record import Definition, PackageRecord, SourceError, SubmissionRecord
@@ -250,7 +251,8 @@ def _missing(package: PackageRecord, used: Iterable[str]) -> Iterator[tuple[str,
         else:
             why = "the generator reads its definitions"
             wanted.append(("build_depend", name, name in building, why))
-            wanted.append(("exec_depend", name, name in running, "its messages are imported"))
+            why = f"its messages are {worded('imported', 'included')}"
+            wanted.append(("exec_depend", name, name in running, why))
     for kind, name, is_there, why in wanted:
         if not is_there:
             yield f"<{kind}>{name}</{kind}>", why

@@ -17,6 +17,7 @@ from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import nodes_seen
 from grader.findings.wording import code, counted, listing
+from grader.findings.words import worded
 from grader.recording.model import Call, Recording
 from grader.spec.name import QualifiedNodeName
 
@@ -81,7 +82,12 @@ def _otherwise(observed: str, last_change: list[Call], shown: Evidence) -> Findi
             observed += f", after the transition {transition(call)} failed"
             hint = (
                 "The callback of a transition (on_configure, on_activate, ...) must return "
-                "TransitionCallbackReturn.SUCCESS, and call super() where it activates publishers."
+                + worded(
+                    python="TransitionCallbackReturn.SUCCESS, and call super() where it activates "
+                    "publishers.",
+                    cpp="CallbackReturn::SUCCESS, and on_activate() must activate its publishers: "
+                    "publisher_->on_activate().",
+                )
             )
     return Finding(observed, hint, shown)
 
@@ -105,8 +111,9 @@ def why_not_managed(recording: Recording, node: str) -> Finding | None:
     missing = why_not_node(recording, node)
     if missing is not None or offered(recording, SERVICE, service):
         return missing
+    base = worded("rclpy.lifecycle.LifecycleNode", "rclcpp_lifecycle::LifecycleNode")
     return Finding(
         f"{code(node)} is no lifecycle node: it has no service {code(service)}",
-        "Inherit from rclpy.lifecycle.LifecycleNode instead of Node.",
+        f"Inherit from {base} instead of Node.",
         Evidence(moments=nodes_seen(recording)),
     )

@@ -18,6 +18,7 @@ from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import until_the_end
 from grader.findings.text import check_asked, says
 from grader.findings.wording import code, counted, percent
+from grader.findings.words import LOG, worded
 from grader.measure.printed import logged_text, quote
 from grader.recording.model import NS, LogLine, Recording
 from grader.spec.name import QualifiedNodeName
@@ -197,7 +198,11 @@ def contains(recording: Recording, parameters: Contains) -> Finding:
         return Finding(
             f"{len(found)} of them, such as {quote(found[-1].text)}",
             "Log once where it happens, not in every call of a callback: "
-            "self.get_logger().info(..., once=True), or throttle_duration_sec=1.0.",
+            + worded(
+                python="self.get_logger().info(..., once=True), or throttle_duration_sec=1.0.",
+                cpp="RCLCPP_INFO_ONCE(get_logger(), ...), or RCLCPP_INFO_THROTTLE(get_logger(), "
+                "*get_clock(), 1000, ...).",
+            ),
             _evidence(recording, found),
         )
     what = f"{len(found)}, such as {quote(found[0].text)}" if found else "none"
@@ -206,7 +211,10 @@ def contains(recording: Recording, parameters: Contains) -> Finding:
 
 def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]) -> Finding:
     level = parameters.level or "INFO"
-    call = f"self.get_logger().{'warning' if level == 'WARN' else level.lower()}('...')"
+    call = worded(
+        python=f"self.get_logger().{'warning' if level == 'WARN' else level.lower()}('...')",
+        cpp=f'RCLCPP_{level}(get_logger(), "...")',
+    )
     records = parameters.of(recording)
     other = [item for item in records if parameters.says(item.text) and item not in found]
     if other:
@@ -226,7 +234,7 @@ def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]
         moment = Moment("printed", recording.since_launch_s(lines[0].time_ns))
         return Finding(
             f"{quote(lines[0].text)} is printed, not logged",
-            f"Write {call} in place of print().",
+            f"Write {call} in place of {worded('print()', 'std::cout or printf()')}.",
             Evidence(moments=(moment,), log=tuple(line.text for line in lines[:_SHOWN])),
         )
     hint = f"Is the line reached that calls {call} with such a text?"
@@ -265,10 +273,11 @@ def level(recording: Recording, parameters: Worst) -> Finding:
         seen = f"{counted(len(records), 'log message')}, none above it"
         return Finding.passed(parameters.asked_for, seen)
     observed = f"{counted(len(severe), 'log message')} above it, the first {severe[0].level}"
+    debug = worded("debug('...')", "RCLCPP_DEBUG")
     return Finding(
         f"{observed}: {quote(severe[0].text)}",
         "Correct what it warns about; what is no problem is logged with "
-        "self.get_logger().info('...') or debug('...').",
+        f"{LOG} or {debug}.",
         _evidence(recording, severe),
     )
 
@@ -343,8 +352,13 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
         return Finding.held_up(seen, recording.stolen_s(begin_ns, end_ns))
     return Finding(
         seen,
-        "Log in a timer of that period, or with throttle_duration_sec=1.0 in a faster callback: "
-        "self.get_logger().info('...', throttle_duration_sec=1.0).",
+        "Log in a timer of that period, or "
+        + worded(
+            python="with throttle_duration_sec=1.0 in a faster callback: "
+            "self.get_logger().info('...', throttle_duration_sec=1.0).",
+            cpp="in a faster callback with RCLCPP_INFO_THROTTLE(get_logger(), *get_clock(), 1000, "
+            '"...").',
+        ),
         _evidence(recording, found),
     )
 

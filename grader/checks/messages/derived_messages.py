@@ -11,6 +11,7 @@ from typing import Any
 
 from grader.findings.condition import difference
 from grader.findings.value import NoSuchItem, Tolerance, leaves, number_at, tolerance_of
+from grader.findings.words import MATH
 from grader.measure.numbering import lost
 from grader.recording.model import NS, Message, Recording
 from grader.spec.expression import Expression
@@ -39,12 +40,13 @@ def mistakes(value: str, message: Mapping[str, Any]) -> Iterator[tuple[str, floa
         turn = 2.0 * math.acos(max(-1.0, min(1.0, w)))
         yield "2 acos(w), which has lost the sign of the yaw", turn
         turn = 2.0 * math.asin(max(-1.0, min(1.0, z)))
-        yield "2 asin(z), which is wrong where w is negative: use math.atan2", turn
+        yield f"2 asin(z), which is wrong where w is negative: use {MATH}atan2", turn
         turn = math.atan(math.tan(right))
-        yield "the yaw in a wrong quadrant: use math.atan2(a, b), not math.atan(a / b)", turn
+        words = f"the yaw in a wrong quadrant: use {MATH}atan2(a, b), not {MATH}atan(a / b)"
+        yield words, turn
     else:
         yield f"`{value}` with the wrong sign", -right
-        yield f"`{value}` without its sign, as from math.hypot() or abs()", abs(right)
+        yield f"`{value}` without its sign, as from {MATH}hypot() or abs()", abs(right)
     for path, number in leaves(message).items():
         if path != value and isinstance(number, int | float):
             yield f"`{path}`", float(number)

@@ -35,6 +35,7 @@ from grader.findings.value import (
     tolerance_of,
 )
 from grader.findings.wording import code, codes, counted
+from grader.findings.words import worded
 from grader.measure.numbering import is_numbered, published
 from grader.recording.model import Kind, Recording
 from grader.spec.expression import Expression
@@ -361,10 +362,13 @@ def _explain_order(parameters: Series, found: Sequence[Any]) -> tuple[str, str]:
     hint = f"Change the value once for every message, by {_text(parameters.step)}."
     steps = [b - a for a, b in pairwise(found)]
     if steps and not any(steps):
+        an_attribute = worded(
+            python="an attribute of the node, such as self.count",
+            cpp="a member of the node, such as count_",
+        )
         return (
             ": the value never changes",
-            "Keep the value in an attribute of the node, such as self.count, and change it in the "
-            "timer's callback.",
+            f"Keep the value in {an_attribute}, and change it in the timer's callback.",
         )
     if steps and all(same(steps[0], item, parameters.tolerance) for item in steps):
         grows = f"it begins with {_text(found[0])} and grows by {_text(steps[0])}"

@@ -20,6 +20,7 @@ from grader.diagnosis.process.process_exit import (
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen, nodes_seen
 from grader.findings.wording import code, codes, counted
+from grader.findings.words import worded
 from grader.measure import declarations
 from grader.recording.event import LONGEST_STRETCH
 from grader.recording.model import NS, Kind, Node, Owner, Process, Recording
@@ -84,10 +85,11 @@ def exists(recording: Recording, parameters: NodeExists) -> Finding:
     publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.publishes)
     others = sorted({item.node for item in publishers} - {parameters.name})
     if parameters.publishes is not None and others:
+        create = worded("self.create_publisher(...)", "this->create_publisher<...>(...)")
         return Finding(
             f"{code(parameters.name)} is there, but {codes(others)} publishes on "
             f"{code(parameters.publishes)}",
-            "Create the publisher with self.create_publisher(...) in the node that is asked for.",
+            f"Create the publisher with {create} in the node that is asked for.",
             Evidence(moments=endpoints_seen(recording, publishers)),
         )
     node = next(item for item in recording.student_nodes if item.name == parameters.name)
@@ -159,7 +161,11 @@ def _why_gone(recording: Recording, name: str | None) -> Finding | None:
     return Finding(
         f"the node {code(gone[0].name)} left the ROS graph {when_s:.2f} s after launch, although "
         "its process still ran",
-        "Call destroy_node() and rclpy.shutdown() only after rclpy.spin() has returned.",
+        worded(
+            python="Call destroy_node() and rclpy.shutdown() only after rclpy.spin() has returned.",
+            cpp="Let the node last, and call rclcpp::shutdown(), only after rclcpp::spin() has "
+            "returned.",
+        ),
         Evidence(moments=(Moment(f"node {gone[0].name} vanished", when_s),)),
     )
 
@@ -225,8 +231,11 @@ def ends(recording: Recording, parameters: Ends) -> Finding:
             number = counted(len(process.survivors), "process", "processes")
             return Finding(
                 f"{code(process.name)} left {number} running behind it: {codes(process.survivors)}",
-                "End child processes before main() returns: process.terminate(), then "
-                "process.wait().",
+                "End child processes before main() returns: "
+                + worded(
+                    python="process.terminate(), then process.wait().",
+                    cpp="kill(pid, SIGTERM), then waitpid(pid, nullptr, 0).",
+                ),
                 Evidence(moments=(_end(recording, process),)),
             )
     if not asked:
@@ -277,9 +286,14 @@ def _why_slow(recording: Recording, process: Process) -> Finding:
     sigint = Moment("SIGINT", recording.since_launch_s(recording.stop_ns))
     return Finding(
         seen,
-        "Ctrl-C raises KeyboardInterrupt: look for a bare `except:` or `except BaseException:` "
-        "in a loop that swallows it, for a signal handler of your own, for a callback that "
-        "sleeps or loops, and for a thread that is not a daemon.",
+        worded(
+            python="Ctrl-C raises KeyboardInterrupt: look for a bare `except:` or "
+            "`except BaseException:` in a loop that swallows it, for a signal handler of your own, "
+            "for a callback that sleeps or loops, and for a thread that is not a daemon.",
+            cpp="Ctrl-C makes rclcpp::ok() false and rclcpp::spin() return: look for a "
+            "`while (true)` in place of `while (rclcpp::ok())`, for a signal handler of your own, "
+            "for a callback that sleeps or loops, and for a thread that is never joined.",
+        ),
         Evidence(moments=(sigint, _end(recording, process)), log=tuple(lines[-10:])),
     )
 

@@ -25,6 +25,7 @@ from grader.diagnosis.not_built import (
 from grader.diagnosis.process.exceptions import import_of
 from grader.findings.finding import Evidence, Finding, Table
 from grader.findings.wording import code, codes
+from grader.findings.words import worded
 from grader.spec.name import BuildTypes, PackageName
 from grader.spec.names import NO_NAMES, Names, Thing, WrongName
 from grader.spec.nearest_name import nearest
@@ -172,7 +173,8 @@ class Dependencies(OfPackage):
 
     def _asked(self) -> str:
         whose = f"the executable {code(self.executable)}" if self.executable else code(self.package)
-        return f"every ROS package that {whose} imports is in package.xml"
+        uses = worded("imports", "includes")
+        return f"every ROS package that {whose} {uses} is in package.xml"
 
 
 @check("package.dependencies", Subject.SUBMISSION, Dependencies, concept="packages")
@@ -195,7 +197,7 @@ def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Find
     faults = [*_missing(package), *_unknown(submission, package)]
     if not faults:
         names = sorted({item.module for item in package.ros_imports} - {package.name})
-        observed = f"{codes(names)} declared" if names else "none imported"
+        observed = f"{codes(names)} declared" if names else f"none {worded('imported', 'included')}"
         return Finding.passed(parameters.asked_for, observed)
     seen, hints, places, rows = zip(*faults, strict=True)
     tags = [write for (_, write), hint in zip(rows, hints, strict=True) if not hint]

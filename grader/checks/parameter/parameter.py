@@ -10,6 +10,7 @@ from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Act, Doubt, ParameterSet, Stimulated
 from grader.diagnosis.no_parameter import (
     answered_at,
+    declare_parameter,
     why_not_asked,
     why_not_declared,
     why_services_silent,
@@ -18,6 +19,7 @@ from grader.findings.fields import wanted_text
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.value import same, same_value
 from grader.findings.wording import code, value_text
+from grader.findings.words import Words, worded
 from grader.measure.parameter_calls import (
     Descriptor,
     Reading,
@@ -32,7 +34,14 @@ from grader.recording.model import Recording
 from grader.spec.name import QualifiedNodeName
 
 _TOLERANCE = 1e-9
-_GIVE = "Give declare_parameter() a ParameterDescriptor"
+_REFUSAL = Words(
+    python="SetParametersResult(successful=False, reason='...')",
+    cpp="a SetParametersResult with successful = false and a reason",
+)
+_GIVE = Words(
+    python="Give declare_parameter() a ParameterDescriptor",
+    cpp="Give declare_parameter() a third argument, a ParameterDescriptor",
+)
 
 
 class OfParameter(Parameters):
@@ -105,8 +114,8 @@ def declared(recording: Recording, parameters: Declared) -> Finding:
         if not same_value(parameters.default, values[0].value):
             return Finding(
                 f"it is {value_text(values[0].value)} at first",
-                "Its default is the second argument: self.declare_parameter("
-                f"'{parameters.name}', {wanted_text(parameters.default)}).",
+                "Its default is the second argument: "
+                f"{declare_parameter(parameters.name, wanted_text(parameters.default))}.",
                 shown,
             )
     value = f", {value_text(values[0].value)}" if values else ""
@@ -126,8 +135,7 @@ def _why_other_descriptor(
     found: Descriptor, parameters: Declared, shown: Evidence
 ) -> Finding | None:
     if parameters.type not in (None, found.type):
-        hint = f"The type is that of the default in self.declare_parameter('{parameters.name}', "
-        hint += "default)."
+        hint = f"The type is that of the default in {declare_parameter(parameters.name)}."
         if (parameters.type, found.type) == ("double", "integer"):
             hint += " 1 is an integer, 1.0 is a double."
         return Finding(f"it is {_article(found.type)}", hint, shown)
@@ -136,14 +144,19 @@ def _why_other_descriptor(
         kind = "IntegerRange" if found.type == "integer" else "FloatingPointRange"
         return Finding(
             f"its range is {_range_words(found.range)}" if found.range else "it has no range",
-            f"{_GIVE} with a {kind}(from_value=..., to_value=..., step=...).",
+            f"{_GIVE} with a {kind}"
+            + worded(
+                "(from_value=..., to_value=..., step=...).", " with from_value, to_value and step."
+            ),
             shown,
         )
     if parameters.read_only not in (None, found.read_only):
         seen = "it is read-only" if found.read_only else "it is not read-only"
-        return Finding(seen, f"{_GIVE}(read_only={parameters.read_only}).", shown)
+        read_only = worded(f"(read_only={parameters.read_only})", " with read_only set")
+        return Finding(seen, f"{_GIVE}{read_only}.", shown)
     if parameters.described and not found.description.strip():
-        return Finding("it has no description", f"{_GIVE}(description='...').", shown)
+        described = worded("(description='...')", " with a description")
+        return Finding("it has no description", f"{_GIVE}{described}.", shown)
     return None
 
 
@@ -227,9 +240,13 @@ def _why_other_answer(recording: Recording, item: Setting, parameters: Set) -> F
     if item.accepted and not parameters.accepted:
         return Finding(
             "it was accepted",
-            "Register a callback with self.add_on_set_parameters_callback() that returns "
-            "SetParametersResult(successful=False, reason='...') for such a value, or give the "
-            "parameter a range.",
+            "Register a callback with "
+            + worded(
+                python="self.add_on_set_parameters_callback() that returns ",
+                cpp="this->add_on_set_parameters_callback(), whose handle is kept in a member, "
+                "that returns ",
+            )
+            + f"{_REFUSAL} for such a value, or give the parameter a range.",
             shown,
         )
     if parameters.accepted and not item.accepted:
@@ -243,7 +260,7 @@ def _why_other_answer(recording: Recording, item: Setting, parameters: Set) -> F
         reason = f"is “{item.reason}”" if item.reason else "is empty"
         return Finding(
             f"it was refused, but the reason {reason}",
-            "Say why in SetParametersResult(successful=False, reason='...').",
+            f"Say why in {_REFUSAL}.",
             shown,
         )
     for reading in readings(recording, parameters.node, parameters.name):

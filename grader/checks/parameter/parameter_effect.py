@@ -20,6 +20,7 @@ from grader.findings.fields import FieldTolerance, difference_table, difference_
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.value import EXACT
 from grader.findings.wording import code, counted, percent, value_text
+from grader.findings.words import Words, worded
 from grader.measure.parameter_calls import settings
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
@@ -27,10 +28,12 @@ from grader.spec.quantity import Duration, Ratio
 from grader.spec.unit import format_duration
 
 _LEAST_PERIODS = 3
-_NEW_TIMER = (
-    "A timer keeps its period. In a callback of add_post_set_parameters_callback(), call "
+_NEW_TIMER = Words(
+    python="A timer keeps its period. In a callback of add_post_set_parameters_callback(), call "
     "self.timer.cancel() and then self.timer = self.create_timer(period, self.callback), or set "
-    "self.timer.timer_period_ns."
+    "self.timer.timer_period_ns.",
+    cpp="A timer keeps its period. In a callback of add_post_set_parameters_callback(), call "
+    "timer_->cancel() and then timer_ = this->create_wall_timer(period, ...).",
 )
 
 
@@ -131,7 +134,7 @@ def _why_too_few(
         return Finding.held_up(f"{seen}, too few to judge", stolen_s)
     hint = "Publish in every call of the callback, whatever the value of the parameter is."
     return why_raised(recording, seen, begin_ns - round(parameters.within * NS)) or Finding(
-        seen, hint if parameters.period is None else _NEW_TIMER, shown
+        seen, hint if parameters.period is None else str(_NEW_TIMER), shown
     )
 
 
@@ -152,8 +155,11 @@ def _why_other_message(
     if any(wrong == unlike(one.value, parameters.fields, parameters.tolerance) for one in before):
         hint = (
             "The message is as it was before: read "
-            f"self.get_parameter('{parameters.name}').value in the callback, or keep the new value "
-            "in add_post_set_parameters_callback()."
+            + worded(
+                python=f"self.get_parameter('{parameters.name}').value",
+                cpp=f'this->get_parameter("{parameters.name}")',
+            )
+            + " in the callback, or keep the new value in add_post_set_parameters_callback()."
         )
     taken = why_taken(recording, seen, set_ns, message.stamp_ns, parameters.within)
     table = difference_table("That message", wrong)

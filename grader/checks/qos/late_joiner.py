@@ -14,6 +14,7 @@ from grader.diagnosis.no_messages import why_few
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.wording import code, counted
+from grader.findings.words import worded
 from grader.measure import declarations
 from grader.measure.compatibility import compatibility_table, refusals
 from grader.measure.numbering import published
@@ -131,10 +132,10 @@ class _Case:
     def hint(self) -> str:
         if self.parameters.last == 0:
             return "A volatile publisher keeps nothing for late joiners: that is the default."
-        return (
-            "Give create_publisher a profile that keeps messages for late joiners: QoSProfile("
-            f"history=HistoryPolicy.KEEP_LAST, depth={self.parameters.last}, "
-            "durability=DurabilityPolicy.TRANSIENT_LOCAL)."
+        return "Give create_publisher a profile that keeps messages for late joiners: " + worded(
+            python=f"QoSProfile(history=HistoryPolicy.KEEP_LAST, depth={self.parameters.last}, "
+            "durability=DurabilityPolicy.TRANSIENT_LOCAL).",
+            cpp=f"rclcpp::QoS({self.parameters.last}).transient_local().",
         )
 
     @property
@@ -260,8 +261,8 @@ def _why_too_few(case: _Case) -> Finding:
         return Finding(
             f"{case.seen}: the publisher's lifespan is {format_duration(min(lifespans))}, and what "
             "is older is thrown away",
-            "Leave `lifespan` out of the QoSProfile: then a message stays until newer ones take "
-            "its place in the queue.",
+            f"Leave `lifespan` out of the {worded('QoSProfile', 'rclcpp::QoS')}: then a message "
+            "stays until newer ones take its place in the queue.",
             case.evidence,
         )
     if join.matched_ns is None and case.publishers:

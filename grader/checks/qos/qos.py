@@ -14,6 +14,7 @@ from grader.diagnosis.undeclared import why_undeclared
 from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.wording import code, counted
+from grader.findings.words import A_PROFILE, Words, worded
 from grader.measure import declarations
 from grader.measure.compatibility import (
     comparisons,
@@ -46,10 +47,6 @@ _WORDS = {
     Kind.SUBSCRIPTION: ("requests", "requested", "publisher that offers"),
 }
 _RULE = "A subscription receives nothing from a publisher that offers less than it requests."
-_HINT = (
-    "Give create_{} a QoSProfile with the policies that are asked for; a number, such as 10, is "
-    "the default: reliable and volatile."
-)
 
 
 class Profile(Parameters):
@@ -182,19 +179,29 @@ def _hint(parameters: Profile, wrong: Collection[str]) -> str:
     if all(_DEFAULTS.get(name) == item for name, item in asked.items()):
         hint = "A number as QoS, such as 10, is the default profile: reliable and volatile."
         if "reliability" in wrong:
-            hint += " qos_profile_sensor_data is best_effort."
+            sensor_data = worded("qos_profile_sensor_data", "rclcpp::SensorDataQoS()")
+            hint += f" {sensor_data} is best_effort."
         if "durability" in wrong:
             hint += " A profile is transient_local only where its durability says so: leave it out."
         return hint
-    values = {
-        name: f"{name.capitalize()}Policy.{item.upper()}"
-        if name in _DEFAULTS
-        else f"Duration(seconds={item:g})"
-        for name, item in asked.items()
-    }
-    arguments = ", ".join(f"{_ARGUMENTS.get(name, name)}={item}" for name, item in values.items())
-    create = f"create_{parameters.kind.value}"
-    return f"Give {create} a profile: QoSProfile(depth=10, {arguments}), from rclpy.qos."
+    policies = [_policy(name, item) for name, item in asked.items()]
+    profile = worded(
+        python=f"QoSProfile(depth=10, {', '.join(one.python for one in policies)}), from rclpy.qos",
+        cpp=f"rclcpp::QoS(10){''.join(one.cpp for one in policies)}",
+    )
+    return f"Give create_{parameters.kind.value} a profile: {profile}."
+
+
+def _policy(name: str, value: Any) -> Words:
+    """A policy as an argument of rclpy's QoSProfile, and as a method of rclcpp::QoS."""
+    key = _ARGUMENTS.get(name, name)
+    if name not in _DEFAULTS:
+        return Words(f"{key}=Duration(seconds={value:g})", f".{key}({value:g}s)")
+    python = f"{key}={name.capitalize()}Policy.{value.upper()}"
+    if name == "liveliness":
+        camel = "".join(map(str.capitalize, value.split("_")))
+        return Words(python, f".liveliness(rclcpp::LivelinessPolicy::{camel})")
+    return Words(python, ".durability_volatile()" if value == "volatile" else f".{value}()")
 
 
 def _words(value: Any) -> str:
@@ -231,11 +238,14 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
         own = recording.student_endpoints(kind, parameters.topic)
         messages = recording.on(parameters.topic)
         seen = endpoints_seen(recording, own) or first_seen(recording, messages)
-        third = "third" if kind is Kind.PUBLISHER else "fourth"
+        third = worded("third" if kind is Kind.PUBLISHER else "fourth", "second")
+        profile = worded(
+            f"QoSProfile(depth={parameters.depth}, ...)", f"rclcpp::QoS({parameters.depth})"
+        )
         return Finding(
             observed,
-            f"The {third} argument of create_{kind.value} is the depth, or a QoSProfile that has "
-            f"it beside the other policies: QoSProfile(depth={parameters.depth}, ...).",
+            f"The {third} argument of create_{kind.value} is the depth, or {A_PROFILE} that has "
+            f"it beside the other policies: {profile}.",
             Evidence(moments=seen),
         )
     if any(queue.depth is None for queue in declared):
@@ -344,7 +354,10 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
         refused = refusals(*pair)
         own = f"the {kind.value} of {code(endpoint.node)}"
         left_open = _left_open(recording, endpoint, pair)
-        hint = _HINT.format(kind.value)
+        hint = (
+            f"Give create_{kind.value} {A_PROFILE} with the policies that are asked for; a number, "
+            "such as 10, is the default: reliable and volatile."
+        )
         if refused and parameters.expect == "match":
             observed = f"{own} does not match such a {other}: {', '.join(refused)}"
             hint = f"{_RULE} {hint}"

@@ -26,6 +26,7 @@ from grader.findings.fields import FieldTolerance, brief, words
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.value import EXACT, value_at
 from grader.findings.wording import code, codes, counted
+from grader.findings.words import EXCLUSIVE, REENTRANT, SLEEP, SPIN_NODE, worded
 from grader.recording.model import NS, Call, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
@@ -122,7 +123,7 @@ def why_slow(recording: Recording, calls: tuple[Call, ...], within_s: float) -> 
     sent_ns, end_ns, server = worst.requested_ns, worst.answered_ns, worst.service
     seen = f"{_which(calls, worst)} to {code(server)} was not answered"
     hint = (
-        "A service callback must return soon: no time.sleep() and no waiting in it, nor in a "
+        f"A service callback must return soon: no {SLEEP} and no waiting in it, nor in a "
         "timer or subscription callback that the same executor runs."
     )
     shown = _evidence(recording, calls)
@@ -254,12 +255,15 @@ def _why_other_order(
     if not side_by_side:
         return Finding(
             f"{seen}, so both were processed at the same time{declared}",
-            "Give the service a MutuallyExclusiveCallbackGroup, or use rclpy.spin(node).",
+            f"Give the service a {EXCLUSIVE}, or use {SPIN_NODE}.",
             _evidence(recording, pair),
         )
     return Finding(
         f"{seen}, so the second call waited until the first was answered{declared}",
-        "Spin with a MultiThreadedExecutor, and give the service a ReentrantCallbackGroup: "
-        "self.create_service(..., callback_group=ReentrantCallbackGroup()).",
+        f"Spin with a MultiThreadedExecutor, and give the service a {REENTRANT}: "
+        + worded(
+            python="self.create_service(..., callback_group=ReentrantCallbackGroup()).",
+            cpp="this->create_service<...>(..., rclcpp::ServicesQoS(), group_).",
+        ),
         _evidence(recording, pair),
     )

@@ -16,6 +16,7 @@ from grader.diagnosis.no_messages import why_not_sent, why_silent
 from grader.diagnosis.process.blocked_executor import left_s
 from grader.findings.finding import Evidence, Finding, Moment, Plot
 from grader.findings.wording import code, counted
+from grader.findings.words import SLEEP
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
@@ -125,7 +126,7 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
     if not is_missing:
         hint = (
             "Publish the answer in the subscription's callback itself, not from a timer. Let the "
-            "callback return soon: no time.sleep(), no wait, no loop over what is there already."
+            f"callback return soon: no {SLEEP}, no wait, no loop over what is there already."
         )
         return Finding(figures, hint, evidence)
     hint = (

@@ -20,6 +20,7 @@ from grader.diagnosis.wrong_rhythm import WrongRhythm, why_paused
 from grader.findings.finding import Evidence, Finding, Moment, Plot
 from grader.findings.first_seen import first_seen
 from grader.findings.wording import code, counted
+from grader.findings.words import SILENT_EXCEPT, SLEEP, worded
 from grader.measure import declarations
 from grader.measure.numbering import is_numbered, lost
 from grader.measure.period import (
@@ -271,8 +272,11 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
         return Finding(
             observed,
             "Publish once in every call of the callback: look for a condition that leaves calls "
-            "out, for a time.sleep(), and for a second timer or publish(). create_timer takes its "
-            "period in seconds: 1 / rate.",
+            f"out, for a {SLEEP}, and for a second timer or publish(). "
+            + worded(
+                python="create_timer takes its period in seconds: 1 / rate.",
+                cpp="create_wall_timer takes its period with a unit: 100ms for 10 Hz.",
+            ),
             evidence,
         )
     stop_if(_why_paused(recording, parameters, messages))
@@ -299,7 +303,7 @@ def _why_paused(
         f"no message for {format_duration((end_ns - begin_ns) / NS)}{until}, from "
         f"{recording.since_launch_s(begin_ns):.2f} s after launch on, after "
         f"{counted(before, 'message')}",
-        "Look for an `if` or a `return` before publish(msg), for an `except: pass` that hides an "
+        f"Look for an `if` or a `return` before publish(msg), for an {SILENT_EXCEPT} that hides an "
         "error, for a timer that is cancelled, and for a callback that does not return.",
     )
 

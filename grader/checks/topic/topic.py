@@ -16,6 +16,7 @@ from grader.diagnosis.no_node import why_no_node
 from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import endpoints_seen, nodes_seen
 from grader.findings.wording import code, codes
+from grader.findings.words import type_in_code
 from grader.recording.model import Kind, Recording
 from grader.spec.name import InterfaceName, TopicName
 from grader.spec.names import Thing
@@ -125,11 +126,10 @@ def type_(recording: Recording, parameters: Type) -> Finding:
     if not wrong:
         return Finding.passed(parameters.asked_for, f"the type is {codes(types)}")
     which = f"another {kind.value} on the topic" if wanted in types else f"the {kind.value}"
-    package, _, short = wanted.split("/")
     return Finding(
         f"{which} has the type {code(wrong[0])}",
         "A publisher and a subscription meet only if their types are the same: "
-        f"`from {package}.msg import {short}`.",
+        f"{code(type_in_code(wanted))}.",
         Evidence(moments=endpoints_seen(recording, endpoints)),
     )
 
