@@ -124,8 +124,10 @@ def other_package_name(symptom: NoPackage) -> Finding:
     build_type = existing_package(symptom.submission, match).build_type if match else ""
     others = "in project(...) of CMakeLists.txt"
     if build_type not in _CMAKE:
-        python = "in setup.py, setup.cfg, resource/ and the folder of the Python module"
-        others = worded(python=python, cpp=others)
+        others = worded(
+            python="in setup.py, setup.cfg, resource/ and the folder of the Python module",
+            cpp=others,
+        )
     seen = f"found package {code(match)}" if match else f"found {codes(symptom.names)} only"
     return Finding(
         seen + "".join(map(breach_of_rep_144, [match] if match else symptom.names)),

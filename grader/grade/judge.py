@@ -23,7 +23,6 @@ from grader.diagnosis.not_built import why_lacking, why_not_built
 from grader.findings.finding import Finding, Status
 from grader.findings.wording import percent
 from grader.findings.words import speaking
-from grader.grade.language import finding_in_cpp
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
 from grader.grade.naming import named
 from grader.grade.origins import with_origins
@@ -64,7 +63,8 @@ def grade(
         recordings: By scenario id; empty where nothing could be launched.
         faults: By scenario id: why there is no recording.
     """
-    loaded, submission, unnamed = named(loaded, submission, recordings)
+    with speaking(submission.spoken(())):
+        loaded, submission, unnamed = named(loaded, submission, recordings)
     bound = {item.spec.id: item for item in loaded.checks}
     known = with_runtime_imports(submission, recordings.values())
     results: dict[str, CheckResult] = {}
@@ -75,25 +75,22 @@ def grade(
     order = TopologicalSorter({name: (*requires[name], *sooner[name]) for name in bound})
     for name in order.static_order():
         roots = _roots(requires[name], results)
-        spec, language = bound[name].spec, known.spoken(_about(bound[name], loaded))
-        findings: tuple[ScenarioFinding, ...]
-        if roots:
-            findings = (_skipped([results[root] for root in roots]),)
-        else:
-            is_unnamed = unnamed and _needs_names(bound[name], loaded, unnamed.variables)
-            why = unnamed.finding if unnamed and is_unnamed else None
-            with speaking(language):
-                findings = tuple(_findings(bound[name], loaded, known, recordings, faults, why))
-            lacking = _roots(sooner[name], results)
-            lost = _counted(spec.counts, [item.finding for item in findings])
-            other = any(_has_other_parameters(item, recordings) for item in findings)
-            # One mistake costs its own check, and takes no credit from another.
-            if lacking and other and lost == (Status.FAILED, 0.0):
-                roots, findings = lacking, (_skipped([results[root] for root in lacking]),)
-        with speaking(language):
+        spec = bound[name].spec
+        is_unnamed = unnamed and _needs_names(bound[name], loaded, unnamed.variables)
+        why = unnamed.finding if unnamed and is_unnamed else None
+        with speaking(known.spoken(_about(bound[name], loaded))):
             hints = tuple(map(str, spec.hints))
-        if language == CPP:
-            findings = tuple(replace(one, finding=finding_in_cpp(one.finding)) for one in findings)
+            findings = tuple(
+                [_skipped([results[root] for root in roots])]
+                if roots
+                else _findings(bound[name], loaded, known, recordings, faults, why)
+            )
+        lacking = _roots(sooner[name], results)
+        lost = _counted(spec.counts, [item.finding for item in findings])
+        other = any(_has_other_parameters(item, recordings) for item in findings)
+        # One mistake costs its own check, and takes no credit from another.
+        if lacking and other and lost == (Status.FAILED, 0.0):
+            roots, findings = lacking, (_skipped([results[root] for root in lacking]),)
         status, credit = _counted(spec.counts, [item.finding for item in findings])
         put_right = all(_is_put_right(item, recordings) for item in findings)
         results[name] = CheckResult(

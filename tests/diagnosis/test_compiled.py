@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
-from grader.grade.language import in_cpp
+from grader.findings.words import speaking
 from grader.measure.declarations import hides_calls, is_compiled
 from grader.recording.model import Declaration, Kind
+from grader.submission.record import CPP
 from tests.checks.builder import (
     BOT,
     declarations,
@@ -54,13 +55,15 @@ def test_a_program_is_compiled_as_its_tracer_says_or_its_package() -> None:
 
 def test_a_variable_that_was_never_set_is_no_integer() -> None:
     run = recording(messages=messages(every(0.3), twist((6.9e-310, 0, 0), (0, 0, 0.5))))
-    found = in_cpp(failing("messages.equal", run, **EQUAL))
+    with speaking(CPP):
+        found = failing("messages.equal", run, **EQUAL)
     assert "a variable was never given a value" in found and "double speed = 0.0" in found
 
 
 def test_a_period_of_300_seconds_is_written_300ms() -> None:
     late = silent(declarations=of_cpp(declarations(timer_s=300.0)))
-    found = in_cpp(failing("messages.count", late, **COUNT))
+    with speaking(CPP):
+        found = failing("messages.count", late, **COUNT)
     assert "a timer of 5 min" in found and "such as 300ms" in found
 
 
@@ -77,8 +80,9 @@ def test_a_placeholder_that_nothing_filled_in(line: str) -> None:
         log=tuple(one for t in times_s for one in output(line, time_s=t + 0.01)),
         declarations=COMPILED,
     )
-    found = failing("log.follows", run, topic="/chatter", fields=["data"], at_least=4)
-    assert "instead of a value" in found and "RCLCPP_INFO(this->get_logger()" in in_cpp(found)
+    with speaking(CPP):
+        found = failing("log.follows", run, topic="/chatter", fields=["data"], at_least=4)
+    assert "instead of a value" in found and "RCLCPP_INFO(this->get_logger()" in found
 
 
 def test_only_the_events_executor_of_rclpy_hides_what_it_calls() -> None:

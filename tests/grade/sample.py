@@ -65,7 +65,7 @@ class Told:
         says = self.says[subject.scenario] if isinstance(self.says, dict) else self.says
         if isinstance(says, Exception):
             raise says
-        return says
+        return says() if callable(says) else says
 
 
 def make_loaded(

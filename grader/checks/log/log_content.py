@@ -276,8 +276,7 @@ def level(recording: Recording, parameters: Worst) -> Finding:
     debug = worded("debug('...')", "RCLCPP_DEBUG")
     return Finding(
         f"{observed}: {quote(severe[0].text)}",
-        "Correct what it warns about; what is no problem is logged with "
-        f"{LOG} or {debug}.",
+        f"Correct what it warns about; what is no problem is logged with {LOG} or {debug}.",
         _evidence(recording, severe),
     )
 

@@ -11,6 +11,7 @@ from grader.checks.package.package import OfPackage
 from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Finding
 from grader.findings.wording import codes
+from grader.findings.words import worded
 from grader.submission.record import SubmissionRecord
 
 
@@ -44,10 +45,12 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding:
     folder, _, name = parameters.path.rpartition("/")
     own = [path for path in submission.files if fnmatchcase(path.rpartition("/")[2], name)]
     seen = f"{codes(own)} is handed in, but not installed; " if own else ""
-    line = (
-        f"('share/{package.name}/{folder}', glob('{parameters.path}'))` in data_files of setup.py"
-    )
-    if package.build_type == "ament_cmake":
-        line = f"install(DIRECTORY {folder} DESTINATION share/${{PROJECT_NAME}})` in CMakeLists.txt"
+    line = f"install(DIRECTORY {folder} DESTINATION share/${{PROJECT_NAME}})` in CMakeLists.txt"
+    if package.build_type != "ament_cmake":
+        line = worded(
+            python=f"('share/{package.name}/{folder}', glob('{parameters.path}'))` in data_files "
+            "of setup.py",
+            cpp=line,
+        )
     hint = f"{'' if own else 'Add the file. '}Write `{line}."
     return Finding(f"{seen}it installs {codes(installed)}", hint)

@@ -21,7 +21,7 @@ from grader.diagnosis.process.raised import (
 )
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code
-from grader.findings.words import INIT, SPIN, SPIN_NODE, worded
+from grader.findings.words import INIT, SPIN, SPIN_NODE, Words, worded
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.spec.source import Model, read_source
@@ -52,7 +52,7 @@ class Table(Model):
     """The whole of ``process_exit.yaml``: signals in words, and hints by signal and by breach."""
 
     signals: dict[str, str]
-    hints: dict[str, str]
+    hints: dict[str, str | Words]
 
 
 TABLE = read_source(Path(__file__).with_suffix(".yaml")).read(Table)
@@ -215,7 +215,7 @@ def limit_exceeded(symptom: ProcessExit) -> Finding | None:
     breach = next((item for item in symptom.recording.breaches if item.ended), None)
     if symptom.killed is not signal.SIGKILL or breach is None:
         return None
-    return Finding(f"{symptom.seen}: {breach}", TABLE.hints[breach.what], symptom.evidence)
+    return Finding(f"{symptom.seen}: {breach}", str(TABLE.hints[breach.what]), symptom.evidence)
 
 
 @explanation(ProcessExit)
@@ -272,10 +272,12 @@ def ended_by_signal(symptom: ProcessExit) -> Finding | None:
         killed.name if killed else "",
         "Run it by hand with `ros2 run` and look at its last lines of output.",
     )
-    return Finding(f"{symptom.seen} with {exit_words(symptom.process.exit_code)}", hint, evidence)
+    return Finding(
+        f"{symptom.seen} with {exit_words(symptom.process.exit_code)}", str(hint), evidence
+    )
 
 
-@explanation(ProcessExit)
+@explanation(ProcessExit, only=PYTHON)
 def service_without_response(symptom: ProcessExit) -> Finding | None:
     """The callback of a service does not return its response."""
     failure = symptom.failure
@@ -293,11 +295,7 @@ def service_without_response(symptom: ProcessExit) -> Finding | None:
     return Finding(
         f"{symptom.seen} with {failure}: a service's callback did not return a response"
         f"{in_brackets(place)}",
-        worded(
-            python="End the service's callback with `return response`: return the object that it "
-            "was given.",
-            cpp="Fill in the response that the service's callback is given.",
-        ),
+        "End the service's callback with `return response`: return the object that it was given.",
         replace(symptom.evidence, places=(place,) if place else ()),
     )
 
@@ -367,7 +365,7 @@ def offence(recording: Recording) -> Finding | None:
     for breach in recording.breaches:
         if not breach.allowed:
             moment = Moment(breach.what, recording.since_launch_s(breach.time_ns))
-            return Finding(str(breach), TABLE.hints[breach.what], Evidence(moments=(moment,)))
+            return Finding(str(breach), str(TABLE.hints[breach.what]), Evidence(moments=(moment,)))
     return None
 
 

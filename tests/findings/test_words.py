@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
+from dataclasses import replace
 
-import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from grader import resources
 from grader.assignment.load import list_assignments, load_assignment
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import NoParameters, Subject
 from grader.diagnosis.explanation import explanations
-from grader.findings.finding import Status
-from grader.findings.words import speaking
+from grader.findings.finding import Finding, Status
+from grader.findings.words import SPIN_NODE, speaking
 from grader.grade import grade
-from grader.grade.language import in_cpp
+from grader.grade.model import CheckResult
 from grader.submission.record import CPP, PYTHON, PackageRecord, SourceFile
-from tests.checks.builder import package, submission
+from tests.checks.builder import endpoint, judge, output, package, recording, submission
 from tests.grade.sample import FAIL, Told, make_loaded, make_recording, make_submission
 
 _OF_PYTHON = re.compile(
@@ -111,9 +115,9 @@ def test_no_word_of_python_is_left_for_students_of_cpp() -> None:
     texts = list(_all_texts())
     assert len(texts) > 500
     left = [
-        f"{where}: {found[0]!r} in {in_cpp(text)!r}"
+        f"{where}: {found[0]!r} in {text!r}"
         for where, text in texts
-        if (found := _OF_PYTHON.search(in_cpp(text)))
+        if (found := _OF_PYTHON.search(text))
     ]
     assert not left, "\n".join(left)
 
@@ -130,40 +134,89 @@ def test_hints_of_the_lessons_have_no_word_of_python_for_students_of_cpp() -> No
     assert not left, "\n".join(left)
 
 
-@pytest.mark.parametrize(
-    ("python", "cpp"),
-    [
-        (
-            "Create a timer with self.create_timer(0.3, self.timer_callback), and publish in it.",
-            "Create a timer with timer_ = this->create_wall_timer(0.3s, callback), and publish in "
-            "it.",
-        ),
-        (
-            "The line in setup.py is 'bot_pub = bot_publisher.bot_publisher:main': the name of the "
-            "executable, the module in your package, the function in the module.",
-            "CMakeLists.txt needs add_executable(bot_pub src/your_file.cpp), "
-            "ament_target_dependencies(bot_pub rclcpp ...) and install(TARGETS bot_pub DESTINATION "
-            "lib/${PROJECT_NAME}).",
-        ),
-        (
-            "Give create_publisher a profile: QoSProfile(depth=10, "
-            "reliability=ReliabilityPolicy.BEST_EFFORT, lifespan=Duration(seconds=1)), from "
-            "rclpy.qos.",
-            "Give create_publisher a profile: rclcpp::QoS(10) with best_effort(), lifespan(1s).",
-        ),
-        ("Call self.get_logger().warning('...').", 'Call RCLCPP_WARN(get_logger(), "...").'),
-        (
-            "Look for time.sleep() or input() in a callback; time.sleep(0.4) waits.",
-            "Look for std::this_thread::sleep_for() or std::cin in a callback; "
-            "std::this_thread::sleep_for(0.4s) waits.",
-        ),
-        ("It is important: rclpy.spin(node)", "It is important: rclcpp::spin(node)"),
-        ("`src/bot.cpp:12` imported", "`src/bot.cpp:12` included"),
-    ],
+_TEXT = st.one_of(
+    st.text(min_size=1, max_size=40),
+    st.sampled_from(
+        [
+            *(
+                "/import",
+                "imported goods",
+                "rclpy.spin(node)",
+                "from x.msg import Y",
+                "time.sleep(1)",
+            ),
+            *("self.create_timer(0.5, self.callback)", "QoSProfile", "${PROJECT_NAME}", "{value}"),
+        ]
+    ),
 )
-def test_terms_of_python_have_their_counterparts(python: str, cpp: str) -> None:
-    assert in_cpp(python) == cpp
-    assert in_cpp(cpp) == cpp
+_NAME = st.sampled_from(["/import", "/imported", "/input", "/attribute", "/math", "/self"])
+
+
+def _grade_in(language: str, hint: str, says: Finding) -> CheckResult:
+    packages = {
+        PYTHON: make_submission(),
+        CPP: make_submission(
+            packages=(PackageRecord("bot_publisher", "src/bot_publisher", "ament_cmake"),),
+            files=("src/bot_publisher/src/bot.cpp",),
+        ),
+    }
+    record = packages[language]
+    loaded = make_loaded([Told("node", says, hint=hint)])
+    return grade(loaded, record, {"listen": make_recording(submission=record)}).result("node")
+
+
+@given(written=_TEXT, printed=_TEXT)
+def test_texts_of_authors_and_students_are_the_same_in_both_languages(
+    written: str, printed: str
+) -> None:
+    for language in (PYTHON, CPP):
+        says = Finding.failed(f"expected {printed}", f"printed {printed}", f"Look at {printed}.")
+        result = _grade_in(language, written, says)
+        assert result.hints == (written,)
+        assert result.decisive.finding == says
+
+
+@given(topic=_NAME, line=_TEXT)
+def test_names_and_printed_lines_stand_in_a_finding_as_they_are(topic: str, line: str) -> None:
+    run = recording(
+        messages={},
+        endpoints=(endpoint(topic),),
+        log=tuple(output(line.replace("\n", " ").replace("\r", " "), time_s=1.0)),
+    )
+    for check, parameters in (
+        ("messages.count", {"topic": topic, "at_least": 1}),
+        ("log.contains", {"text": "never said"}),
+    ):
+        told = {}
+        for language in (PYTHON, CPP):
+            with speaking(language):
+                told[language] = judge(check, run, **parameters)
+        assert told[PYTHON].expected == told[CPP].expected
+        assert told[PYTHON].evidence.log == told[CPP].evidence.log
+        if check == "messages.count":
+            assert f"`{topic}`" in told[CPP].observed
+
+
+def test_no_sentence_is_said_while_a_module_is_imported() -> None:
+    """It would be that of Python for ever."""
+    modules = [f"grader.{name}" for name in _FOLDERS]
+    lessons = [str(file) for file in resources.assignments().glob("*/checks")]
+    program = f"""
+import pkgutil, importlib
+from pathlib import Path
+from grader.findings.words import Words
+def refuse(words):
+    raise AssertionError(words.python)
+Words.__str__ = refuse
+for name in {modules}:
+    found = importlib.import_module(name)
+    for one in pkgutil.walk_packages(found.__path__, name + "."):
+        importlib.import_module(one.name)
+from grader.assignment.own_check import lesson_checks
+for folder in {lessons}:
+    lesson_checks(Path(folder).parent)
+"""
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=resources.root())
 
 
 def test_a_package_speaks_the_language_of_its_programs() -> None:
@@ -188,7 +241,10 @@ def test_findings_and_hints_of_the_author_are_in_the_language_of_the_package() -
     files = ("src/bot_publisher/src/bot.cpp",)
     handed_in = make_submission(packages=(compiled,), files=files)
     words = {"python": "Call rclpy.init() first.", "cpp": "Call rclcpp::init(argc, argv) first."}
-    loaded = make_loaded([Told("node", FAIL, hint=[words, "It imports rclpy."])])
+    check = Told(
+        "node", lambda: replace(FAIL, hint=f"Call {SPIN_NODE}."), hint=[words, "It imports rclpy."]
+    )
+    loaded = make_loaded([check])
     for record, expected in (
         (handed_in, ("Call rclcpp::spin(node).", words["cpp"], "It imports rclpy.")),
         (make_submission(), ("Call rclpy.spin(node).", words["python"], "It imports rclpy.")),
