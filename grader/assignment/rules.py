@@ -309,7 +309,8 @@ def _(need: needs.ParameterSet, user: _User) -> Iterator[_Lack]:
 def _(need: needs.ParametersGiven, user: _User) -> Iterator[_Lack]:
     for scenario in user.scenarios:
         given = {name for launch in scenario.launch for name in launch.parameters}
-        if not given:
+        # A launch file may give more, by a parameter file.
+        if not given and not any(launch.file for launch in scenario.launch):
             yield ("with",), f"the scenario {scenario.id!r} launches nothing with 'parameters'"
         for index, name in enumerate(user.value(need.names)):
             if given and name not in given:

@@ -119,7 +119,7 @@ class ParameterSet(Need):
 class ParametersGiven(Need):
     """Parameters that something is launched with."""
 
-    words = "`parameters` in a `launch` of each scenario, with those of `{names}`"
+    words = "`parameters` in a `launch` of each scenario, with those of `{names}`, or a launch file"
     names: str = "names"
 
 

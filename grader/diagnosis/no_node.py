@@ -16,13 +16,15 @@ from grader.findings.first_seen import nodes_seen, until_the_end
 from grader.findings.wording import code, codes
 from grader.findings.words import INIT, INPUT, SLEEP, Words, worded
 from grader.measure import declarations
-from grader.recording.model import Ending, Process, Recording
+from grader.recording.model import Ending, Node, Process, Recording
 from grader.spec.name import TOPIC
 from grader.spec.nearest_name import nearest
 
 _LOG_LINES = 10
-# The name becomes an argument; one with `_` in front is hidden.
-_NAME = re.compile(rf"(?!.*/_){TOPIC}")
+# Of `ros2 launch` itself, and what the commands of ros2 hide.
+_OF_ROS2 = re.compile(r"/(.*/)?(_.*|launch_ros_\d+)")
+# The name becomes an argument.
+_NAME = re.compile(TOPIC)
 # How the cell calls the wait for a process that it could not start.
 _START = "start of "
 
@@ -90,6 +92,11 @@ def why_not_node(recording: Recording, name: str) -> Finding | None:
     return why_no_node(recording) or cause_of(OtherNode(recording, name))
 
 
+def written_nodes(recording: Recording) -> list[Node]:
+    """The student's nodes, without those that ROS makes by itself."""
+    return [node for node in recording.student_nodes if not _OF_ROS2.fullmatch(node.name)]
+
+
 def meant_node(recording: Recording, name: str) -> str | None:
     """The name of the one node that a student probably means, or None.
 
@@ -98,7 +105,7 @@ def meant_node(recording: Recording, name: str) -> str | None:
     if any(ended_early(recording, process) for process in recording.processes):
         # What is missing is perhaps not misnamed.
         return None
-    there = {one.name for one in recording.student_nodes if _NAME.fullmatch(one.name)}
+    there = {one.name for one in written_nodes(recording) if _NAME.fullmatch(one.name)}
     bases = {one: one.rpartition("/")[2] for one in there}
     base = name.rpartition("/")[2]
     alike = nearest(base, bases.values())

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_answer import why_late, why_unanswered
 from grader.diagnosis.no_endpoint import SERVICE
-from grader.diagnosis.no_node import why_not_node
+from grader.diagnosis.no_node import why_not_node, written_nodes
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.first_seen import nodes_seen
 from grader.findings.wording import code, codes
 from grader.findings.words import worded
 from grader.measure.parameter_calls import calls_to, descriptor, undeclared
@@ -18,8 +20,11 @@ from grader.measure.parameter_calls import names as declared
 from grader.recording.interaction import NO_SERVER
 from grader.recording.model import Call, Recording
 from grader.spec.nearest_name import nearest
+from grader.submission.record import SourceError
 
 _ANSWER_S = 1.0
+_LAUNCH_FILES = (".py", ".xml", ".yaml", ".yml")
+_WILD = {"*": "[^/]+", "**": ".+"}
 
 
 def declare_parameter(name: str, default: str = "default") -> str:
@@ -85,10 +90,10 @@ def other_parameters(symptom: NotDeclared) -> Finding:
 
 
 def why_not_taken(recording: Recording, names: Iterable[str]) -> Finding | None:
-    """Which of some parameters the launch gives and no node declares, or None if there is none."""
+    """Which of some parameters the launch gives and no node takes, or None if there is none."""
     lacking = [name for name in undeclared(recording) if name in names]
     if not lacking:
-        return None
+        return why_for_no_node(recording)
     answered = [call for call in recording.calls if call.service.endswith("/list_parameters")]
     there = sorted(
         {one for node in recording.student_nodes for one in declared(recording, node.name)}
@@ -104,6 +109,42 @@ def why_not_taken(recording: Recording, names: Iterable[str]) -> Finding | None:
         + ". A parameter that is not declared is ignored.",
         Evidence(moments=answered_at(recording, answered)),
     )
+
+
+def why_for_no_node(recording: Recording) -> Finding | None:
+    """Why no node gets the values of a parameter file that a launch file uses, or None."""
+    submission = recording.submission
+    programs = {name for package in submission.packages for name in package.executables}
+    launched = {one.name.rpartition("/")[2] for one in recording.processes} - programs
+    nodes = [one.name for one in written_nodes(recording)]
+    bases = [name.rpartition("/")[2] for name in nodes]
+    if not nodes or not any(name.endswith(_LAUNCH_FILES) for name in launched):
+        return None
+    for file in submission.parameter_files:
+        if any(_addresses(key, node) for key, _ in file.nodes for node in nodes):
+            continue
+        for key, line in file.nodes:
+            base = key.rpartition("/")[2]
+            like = nearest(base, bases)
+            # What is for another program may be right: that does not run here.
+            if like is None and base in programs:
+                continue
+            right = nodes[bases.index(like)] if like else nodes[0]
+            place = SourceError(file.path, line, f"its values are for {key}")
+            return Finding(
+                f"{code(file.path)} gives values to {code(key)}, and there is no such node: found "
+                f"{codes(nodes)}",
+                f"Write {code(right)} in this file, above `ros__parameters:`; {code('/**')} stands "
+                "for any node.",
+                Evidence(nodes_seen(recording), (place,)),
+            )
+    return None
+
+
+def _addresses(key: str, node: str) -> bool:
+    """Whether a name in a parameter file, with its wildcards, is that of a node."""
+    steps = (_WILD.get(step, re.escape(step)) for step in key.strip("/").split("/"))
+    return re.fullmatch("/".join(steps), node.strip("/")) is not None
 
 
 def _it(names: list[str]) -> str:

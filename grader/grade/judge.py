@@ -28,7 +28,6 @@ from grader.grade.naming import named
 from grader.grade.origins import with_origins
 from grader.grade.runtime_imports import with_runtime_imports
 from grader.grade.windowed import judged_in
-from grader.measure.parameter_calls import undeclared
 from grader.recording.model import Ending, Recording
 from grader.submission.record import CPP, SubmissionRecord
 
@@ -143,7 +142,9 @@ def _is_put_right(item: ScenarioFinding, recordings: Mapping[str, Recording]) ->
 def _has_other_parameters(item: ScenarioFinding, recordings: Mapping[str, Recording]) -> bool:
     """Whether a finding is of a failure in a run whose parameters the student's nodes lack."""
     recording = recordings.get(item.scenario or "")
-    return item.finding.status is Status.FAILED and bool(recording and undeclared(recording))
+    if recording is None or item.finding.status is not Status.FAILED:
+        return False
+    return why_not_taken(recording, recording.given_parameters) is not None
 
 
 def _roots(requires: Iterable[str], results: Mapping[str, CheckResult]) -> tuple[str, ...]:

@@ -105,7 +105,8 @@ def process_command(
     asked = launch.package or assignment.packages[0].name
     package = names.own(Thing.PACKAGE, asked)
     if launch.executable is None:
-        program = launch_file_program(ros, package, launch.program)
+        file = names.own_file(f"share/{asked}", launch.program)
+        program = launch_file_program(ros, package, file)
         # It says itself how its nodes and their topics are called.
         names = NO_NAMES
     else:

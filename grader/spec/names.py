@@ -89,6 +89,13 @@ class Names:
             (one.own for one in self.wrong if (one.thing, one.asked) == (thing, asked)), asked
         )
 
+    def own_file(self, folder: str, name: str) -> str:
+        """What the student calls a file that is asked for anywhere below a folder."""
+        found = (one for one in self.wrong if one.thing is Thing.FILE)
+        below = (one for one in found if one.asked.startswith(f"{folder}/"))
+        same = (one.own for one in below if one.asked.rpartition("/")[2] == name)
+        return next(same, name).rpartition("/")[2]
+
     @property
     def rules(self) -> tuple[str, ...]:
         """The rules of ``--ros-args -r`` that put them right."""

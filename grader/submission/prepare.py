@@ -27,6 +27,7 @@ from grader.submission.kept_source import keep_source
 from grader.submission.read.bag import read_bags
 from grader.submission.read.document import read_headings
 from grader.submission.read.package import Package, read_package, record_packages
+from grader.submission.read.parameter_file import read_parameter_files
 from grader.submission.read.source import Allowance
 from grader.submission.record import SubmissionRecord
 from grader.submission.underlay.store import UnderlayStore
@@ -188,6 +189,7 @@ def _prepare(
         leftovers=located.leftovers,
         files=tuple(shown(file.path) for file in located.files[:_MOST_PATHS]),
         headings=read_headings(located.root, located.files),
+        parameter_files=read_parameter_files(located.root, located.files),
     )
     if record.problem is not None:
         return Prepared(record, None)

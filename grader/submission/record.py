@@ -294,6 +294,18 @@ class BagRecord:
 
 
 @dataclass(frozen=True)
+class ParameterFile:
+    """A file with parameters for nodes.
+
+    Attributes:
+        nodes: Full name of a node, or a pattern such as ``/**`` -> line of its parameters.
+    """
+
+    path: str
+    nodes: tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True)
 class SubmissionRecord:
     """Everything known of a submission before it runs.
 
@@ -305,6 +317,7 @@ class SubmissionRecord:
         bags: Recordings of ``ros2 bag record``; None where no check asked for them.
         build: None where nothing was built.
         given: Variable of the assignment -> its value, from the roster or from `--set`.
+        parameter_files: Files in YAML that give parameters to nodes; at most 50.
         names: Wrong names of packages; the others are judged and run in their place.
     """
 
@@ -318,6 +331,7 @@ class SubmissionRecord:
     headings: tuple[tuple[str, tuple[str, ...]], ...] = ()
     bags: tuple[BagRecord, ...] | None = None
     given: tuple[tuple[str, str], ...] = ()
+    parameter_files: tuple[ParameterFile, ...] = ()
     names: Names = NO_NAMES
 
     @property

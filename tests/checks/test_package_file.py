@@ -33,3 +33,24 @@ def test_a_missing_file_of_a_cmake_package_is_to_be_added_and_installed() -> Non
 
 def test_a_record_from_before_there_was_this_check_is_an_error() -> None:
     assert judge("package.file", submission(), **LAUNCH).status is Status.ERROR
+
+
+def test_a_file_of_the_kind_is_used_instead_and_only_its_name_is_wrong() -> None:
+    def names(path: str, *installed: str) -> list[str]:
+        shared = (MANIFEST, *((one, "") for one in installed))
+        subject = submission(package(shared=shared))
+        asked = {"package": NAME, "path": path}
+        assert not judge("package.file", subject, **asked).names
+        return [one.own for one in judge("package.file", subject, **asked, remap=True).names.wrong]
+
+    right = "launch/bot.launch.py"
+    share = f"share/{NAME}"
+    assert names(right, "launch/robot.launch.py", "launch/bot.launch.xml") == [
+        f"{share}/launch/robot.launch.py"
+    ]
+    assert names(right, "bot.launch.py", "launch/robot.launch.py") == [f"{share}/bot.launch.py"]
+    assert names(right, "launch/bots.launch.py", "launch/robot.launch.py") == [
+        f"{share}/launch/bots.launch.py"
+    ]
+    assert names(right, "launch/bot.xml") == []
+    assert names("launch/*.launch.py", "launch/bot.py") == []

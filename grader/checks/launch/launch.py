@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.diagnosis.no_node import why_no_node, why_not_node
+from grader.diagnosis.no_node import why_no_node, why_not_node, written_nodes
 from grader.diagnosis.process.process_exit import why_crashed
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.first_seen import nodes_seen
@@ -17,8 +17,6 @@ from grader.recording.model import Kind, Recording
 from grader.spec.name import QualifiedNodeName, TopicName
 from grader.spec.nearest_name import nearest
 
-# Of `ros2 launch` itself, and what the commands of ros2 hide.
-_OF_ROS2 = re.compile(r"/(.*/)?(_.*|launch_ros_\d+)")
 _OF_EVERY_NODE = ("/rosout", "/parameter_events", "/clock")
 
 
@@ -50,7 +48,7 @@ def graph(recording: Recording, parameters: Graph) -> Finding:
     stop_if(why_no_node(recording))
     for name in parameters.nodes:
         stop_if(why_not_node(recording, name))
-    nodes = [one for one in recording.student_nodes if not _OF_ROS2.fullmatch(one.name)]
+    nodes = written_nodes(recording)
     more = [one for one in nodes if one.name not in parameters.nodes]
     if more:
         return Finding(

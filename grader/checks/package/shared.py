@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from fnmatch import fnmatchcase
+from pathlib import PurePosixPath
 
 from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.package.package import OfPackage
+from grader.checks.wrong_name import Named
 from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Finding
-from grader.findings.wording import codes
+from grader.findings.wording import code, codes
 from grader.findings.words import worded
+from grader.spec.names import Thing
+from grader.spec.nearest_name import nearest
 from grader.submission.record import SubmissionRecord
 
 
-class File(OfPackage):
+class File(OfPackage, Named):
     """Parameters of package.file."""
 
     asks = "the package installs `share/{self.package}/{self.path}`"
@@ -25,6 +30,11 @@ class File(OfPackage):
         description="Path below `share/<package>/`, such as `launch/robot.launch.py`; `*` and `?` "
         "stand for any text and any character, as in `config/*.yaml`.",
     )
+
+    @property
+    def asked_name(self) -> tuple[Thing, str]:
+        """Where it is installed."""
+        return Thing.FILE, f"share/{self.package}/{self.path}"
 
 
 @check("package.file", Subject.SUBMISSION, File, concept="packages")
@@ -43,6 +53,12 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding:
         # Each package installs its package.xml.
         return Finding.ours("what it installs was not recorded: grade again")
     folder, _, name = parameters.path.rpartition("/")
+    meant = _meant(parameters.path, installed) if parameters.remap else None
+    if meant:
+        seen = f"it installs {code(meant)} instead; everything else was judged with that file"
+        hint = f"Call the file {code(name)}, and install it in `share/{package.name}/{folder}`."
+        names = parameters.wrong(f"share/{package.name}/{meant}")
+        return Finding(seen, hint, names=names)
     own = [path for path in submission.files if fnmatchcase(path.rpartition("/")[2], name)]
     seen = f"{codes(own)} is handed in, but not installed; " if own else ""
     line = f"install(DIRECTORY {folder} DESTINATION share/${{PROJECT_NAME}})` in CMakeLists.txt"
@@ -54,3 +70,20 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding:
         )
     hint = f"{'' if own else 'Add the file. '}Write `{line}."
     return Finding(f"{seen}it installs {codes(installed)}", hint)
+
+
+def _meant(path: str, installed: Iterable[str]) -> str | None:
+    """The installed file that is probably meant by a path: of that name elsewhere, or of its kind.
+
+    Of several in its folder it is the one with the nearest name.
+    """
+    asked = PurePosixPath(path)
+    others = [PurePosixPath(one) for one in installed]
+    same = [str(one) for one in others if one.name == asked.name]
+    kind = [
+        str(one)
+        for one in others
+        if (one.parent, one.suffixes) == (asked.parent, asked.suffixes) and asked.suffix
+    ]
+    found = same or kind
+    return found[0] if len(found) == 1 else nearest(path, found)

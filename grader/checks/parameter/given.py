@@ -39,7 +39,8 @@ def given(recording: Recording, parameters: Given) -> Finding:
     """The node declares the parameters that the launch gives it.
 
     Judged by what the student's nodes answer when the probe asks for their parameters. Without an
-    answer of each node it passes: what the node does is judged by other checks. If it fails, others
+    answer of each node it passes: what the node does is judged by other checks. Where a launch file
+    starts the nodes, a parameter file that is for none of them fails, too. If it fails, others
     that fail in the same scenario, without partial credit, are skipped, but for those it requires.
     """
     given, asked = parameters.names or recording.given_parameters, parameters.asked_for
