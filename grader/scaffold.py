@@ -8,7 +8,7 @@ from pathlib import Path
 
 from grader.assignment.load import ASSIGNMENT_FILE
 from grader.assignment.model import Package
-from grader.assignment.mutant import PYTHON
+from grader.assignment.mutant import CPP, PYTHON
 from grader.errors import UsageError
 from grader.report.files import check_folder, write_whole
 from grader.report.html.handout import HANDOUT_FILE
@@ -17,8 +17,8 @@ from grader.starter import package_files, programs, rendered
 from grader.submission.read.rosdistro import PACKAGES
 
 
-def write_assignment(name: str, folder: Path) -> Path:
-    """Write a new assignment with a handout, a reference solution and mutants."""
+def write_assignment(name: str, folder: Path, *, cpp: bool = False) -> Path:
+    """Write a new assignment with a handout, a reference solution and mutants; also in C++."""
     try:
         check_id(name)
     except ValueError as error:
@@ -32,21 +32,24 @@ def write_assignment(name: str, folder: Path) -> Path:
     if target.exists():
         raise UsageError(f"{target} is there already, and is left as it is: take another id")
     check_folder(target)
-    for path, text in assignment_files(name).items():
+    for path, text in assignment_files(name, cpp=cpp).items():
         write_whole(target / path, text)
     return target
 
 
-def assignment_files(name: str) -> dict[str, str]:
+def assignment_files(name: str, *, cpp: bool = False) -> dict[str, str]:
     """Make the files of a new assignment."""
-    package = Package(name=name, depends=("rclpy", "std_msgs"), executables=(name,))
-    (program,) = programs(package)
-    solution = {name: rendered("new/node.py", id=name, program=program)}
-    files = {
-        file: rendered(f"new/{file}", id=name)
-        for file in (ASSIGNMENT_FILE, HANDOUT_FILE, PYTHON.mutants)
-    }
-    description = "Says hello twice a second."
-    for path, content in package_files(package, description, solution, ()).items():
-        files[f"{PYTHON.reference}/{name}/{path}"] = content
+    languages = (PYTHON, CPP) if cpp else (PYTHON,)
+    names = (ASSIGNMENT_FILE, HANDOUT_FILE, *(one.mutants for one in languages))
+    files = {file: rendered(f"new/{file}", id=name, cpp=cpp) for file in names}
+    for one in languages:
+        build_type, client = ("ament_cmake", "rclcpp") if one is CPP else ("ament_python", "rclpy")
+        package = Package(
+            name=name, build_type=build_type, depends=(client, "std_msgs"), executables=(name,)
+        )
+        (program,) = programs(package)
+        code = rendered(f"new/node.{'cpp' if one is CPP else 'py'}", id=name, program=program)
+        made = package_files(package, "Says hello twice a second.", {name: code}, ())
+        for path, content in made.items():
+            files[f"{one.reference}/{name}/{path}"] = content
     return files

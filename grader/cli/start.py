@@ -67,6 +67,9 @@ def new(
     folder: Annotated[
         Path, typer.Argument(metavar="DIR", help="Parent folder; by default the current folder.")
     ] = Path(),
+    cpp: Annotated[
+        bool, typer.Option("--cpp", help="Students may also write C++; adds a reference in C++.")
+    ] = False,
 ) -> None:
     """Write a small new assignment that works.
 
@@ -78,8 +81,10 @@ def new(
 
     # A name alone is its own last part, and leaves the folder as it is.
     place = folder / name
-    written = write_assignment(place.name or name, place.parent)
+    written = write_assignment(place.name or name, place.parent, cpp=cpp)
     say(f"Written: {written}")
     say("\nNext, edit assignment.yaml in this folder, and after each change run:\n")
     say(f"  rosgrade validate {written}")
     say(f"  rosgrade selftest {written}")
+    if cpp:
+        say(f"  rosgrade selftest --cpp {written}")

@@ -66,7 +66,7 @@ def _program(executable: str, program: Program, place: Place) -> Iterator[Row]:
         on = f" on `{topic}`" if len(program.publishes) > 1 else ""
         if part.value:
             fields = listing(f"`{name}` = {_written(value)}" for name, value in leaves(part.value))
-            rest = "" if "rest" in part.value else "; all other fields 0"
+            rest = "" if "rest" in part.value else "; all other fields keep their default"
             yield Row(f"message{on}", f"{fields}{rest}", here, ("sent", "values"))
         if part.count:
             often = "exactly once" if part.count == 1 else f"exactly {part.count} times"
