@@ -153,6 +153,11 @@ def read_variables(source: Source) -> dict[str, Variable]:
         if not {*_PLACE.findall(variable.of or "")} <= {*found}:
             text = f"{variable.of!r} may have only variables in it that stand above {name!r}"
             problems.append(source.problem((KEY, name, "of"), text))
+        for other, one in found.items():
+            alike = (variable.in_, variable.of) == (one.in_, one.of)
+            if alike and variable.match == one.match == ANY:
+                text = f"{other!r} takes any name of the {variable.in_} already: give one a form"
+                problems.append(source.problem((KEY, name, "match"), f"{text}, or another 'of'"))
         found[name] = variable
     if problems:
         raise AssignmentError(source.file, problems)

@@ -77,6 +77,8 @@ def _twice(source: Source, derivation: Derivation) -> Iterator[tuple[Place, str]
 class _Written:
     """The lines of an expanded document: where the author wrote what a part is made of."""
 
+    _PACKAGES: Place = (KEY, "packages")
+
     def __init__(self, source: Source) -> None:
         self.source = source
         self.lines = dict(source.lines)
@@ -128,17 +130,25 @@ class _Written:
         launched = entry.get("launch", made.get("launch"))
         names = [one.get("executable") for one in launched or [] if isinstance(one, dict)]
         topics = {
-            topic: published.type
-            for (_, executable), program in programs.items()
-            if executable in names
+            topic: (published.type, (*self._PACKAGES, package, "executables", name))
+            for (package, name), program in programs.items()
+            if name in names
             for topic, published in program.publishes.items()
         }
         if "world" in entry:
             topics.pop(Topics().command.topic, None)
-        if "record" not in entry and topics:
-            made["record"] = [{"topic": topic, "type": type_} for topic, type_ in topics.items()]
+        place: Place = ("scenarios", index)
         for key, value in made.items():
-            self.stand_for(("scenarios", index, key), value, (KEY, "packages"))
+            self.stand_for((*place, key), value, self._PACKAGES)
+        if "record" not in entry and topics:
+            made["record"] = [
+                {"topic": topic, "type": type_} for topic, (type_, _) in topics.items()
+            ]
+            self.stand_for((*place, "record"), made["record"], self._PACKAGES)
+            for number, (topic, (_, program_place)) in enumerate(topics.items()):
+                record = (*place, "record", number)
+                origin = (*program_place, "publishes", topic)
+                self.stand_for(record, made["record"][number], origin)
         return {**entry, **made}
 
 

@@ -1,0 +1,223 @@
+"""A contract stands for the packages and checks that an author would write, and nothing else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from grader.assignment.contract.expand import expanded, plain
+from grader.assignment.load import load_assignment
+from grader.errors import AssignmentError
+from grader.report.html.handout import make_handout
+from grader.spec.document import write_yaml
+from grader.spec.source import parse_source
+from grader.visible_files import visible_files
+
+GOOD = """\
+rosgrade: 1
+id: lesson
+title: Drive
+contract:
+  packages:
+    bot:
+      build_type: [ament_python, ament_cmake]
+      depends: [rclpy, geometry_msgs]
+      executables:
+        drive:
+          node: driver
+          publishes:
+            /cmd_vel:
+              type: geometry_msgs/msg/Twist
+              reliability: reliable
+              period: 100 ms
+  points: {builds: 1, topic: 1, type: 1, qos: 1, period: 2}
+scenarios:
+  - {id: run, until: {messages: 5}, timeout: 5 s}
+"""
+
+Write = Callable[[str], Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    def write(text: str) -> Path:
+        place = tmp_path / "lesson"
+        place.mkdir(exist_ok=True)
+        (place / "assignment.yaml").write_text(text, encoding="utf-8")
+        return place
+
+    return write
+
+
+def found(place: Path) -> list[str]:
+    """The mistakes in an assignment, without the file."""
+    try:
+        load_assignment(place)
+    except AssignmentError as error:
+        return [f"{one.line}: {one.where}: {one.message}" for one in error.problems]
+    return []
+
+
+def test_it_is_read_as_what_it_stands_for(write: Write) -> None:
+    short = load_assignment(write(GOOD))
+    assert short.source is not None
+    whole = load_assignment(write(write_yaml(plain(short.source))))
+    assert whole.assignment.contract is None
+    for key in ("packages", "scenarios", "checks"):
+        assert getattr(short.assignment, key) == getattr(whole.assignment, key)
+    assert [one.title for one in short.checks] == [one.title for one in whole.checks]
+
+
+def test_it_makes_packages_launches_records_and_checks(write: Write) -> None:
+    made = load_assignment(write(GOOD)).assignment
+    assert made.packages[0].executables == ("drive",)
+    (scenario,) = made.scenarios
+    assert scenario.launch[0].executable == "drive"
+    assert scenario.recorded_types == {"/cmd_vel": "geometry_msgs/msg/Twist"}
+    requires = {one.id: one.requires for one in made.checks}
+    assert requires == {
+        "builds": (),
+        "topic": ("builds",),
+        "type": ("topic",),
+        "qos": ("topic",),
+        "period": ("type", "builds"),
+    }
+
+
+def test_where_the_check_of_a_name_is_left_out_the_next_one_puts_the_name_right(
+    write: Write,
+) -> None:
+    checks = load_assignment(write(GOOD.replace("topic: 1, ", ""))).assignment.checks
+    assert next(one for one in checks if one.id == "type").with_["remap"] is True
+
+
+def test_two_parts_with_one_fact_have_their_names_in_the_ids(write: Write) -> None:
+    second = "        turn:\n          publishes: {/turns: {type: geometry_msgs/msg/Twist}}\n"
+    text = GOOD.replace(
+        "  points: {builds: 1, topic: 1, ", f"{second}  points: {{cmd_vel_topic: 1, "
+    )
+    text = text.replace("type: 1, qos: 1", "turns_topic: 1, turn_alive: 1, qos: 1")
+    text = text.replace("until: {m", "launch: [{executable: drive}, {executable: turn}], until: {m")
+    ids = [one.id for one in load_assignment(write(text)).assignment.checks]
+    assert ids == ["cmd_vel_topic", "qos", "period", "turn_alive", "turns_topic"]
+    named = text.replace("turns: {type", "turns: {ids: {topic: turning}, type")
+    named = named.replace("turns_topic: 1", "turning: 1").replace("cmd_vel_topic: 1", "topic: 1")
+    ids = [one.id for one in load_assignment(write(named)).assignment.checks]
+    assert ids == ["topic", "qos", "period", "turn_alive", "turning"]
+
+
+def test_what_differs_is_written_under_its_id(write: Write) -> None:
+    changed = "  checks: {period: {title: Ten a second, with: {spread: 20 %}, requires: [qos]}}\n"
+    (period,) = load_assignment(
+        write(GOOD.replace("scenarios:\n", f"{changed}scenarios:\n"))
+    ).checks[-1:]
+    assert (period.title, period.spec.requires) == ("Ten a second", ("qos",))
+    assert period.spec.with_ == {"topic": "/cmd_vel", "period": "100 ms", "spread": "20 %"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "geometry_msgs/msg/Twist\n",
+            "geometry_msgs/Twist\n",
+            "13: contract.packages.bot.executables.drive.publishes./cmd_vel: ",
+        ),
+        (
+            "contract:\n",
+            "packages: []\ncontract:\n",
+            "4: packages: the packages stand in the contr",
+        ),
+        ("qos: 1, ", "qoz: 1, ", "17: contract.points.qoz: the contract has no check 'qoz'."),
+        (
+            "          node: driver\n",
+            "          node: driver\n          ids: {exists: there}\n",
+            "12: contract.packages.bot.executables.drive.ids.exists: nothing here makes a check",
+        ),
+        (
+            "scenarios:\n",
+            "  checks: {qos: {points: 3}}\nscenarios:\n",
+            "18: contract.checks.qos.points: a standard check keeps its 'points'",
+        ),
+        (
+            "scenarios:\n",
+            "checks:\n  - {id: qos, uses: node.alive, points: 1}\nscenarios:\n",
+            "19: checks[0].id: 'qos' comes from the contract already: write what differs under",
+        ),
+        (
+            "scenarios:\n",
+            "checks:\n  - {id: mine, uses: node.alife, points: 1}\nscenarios:\n",
+            "19: checks[0].uses: there is no check 'node.alife'.",
+        ),
+        ("depth", "", ""),
+        ("node: driver", "nodes: driver", "11: contract.packages.bot.executables.drive.nodes: "),
+        (
+            "            /cmd_vel:\n",
+            "            /o: {type: a/msg/B, ids: {topic: one, type: one}}\n            /cmd_vel:\n",
+            "13: contract.packages.bot.executables.drive.publishes./o: two checks of the contr",
+        ),
+    ],
+)
+def test_what_contradicts_itself_is_told_at_its_line(
+    write: Write, old: str, new: str, said: str
+) -> None:
+    told = found(write(GOOD.replace(old, new, 1)))
+    assert told[0].startswith(said) if said else not told
+
+
+def test_a_name_that_is_open_twice_is_refused(write: Write) -> None:
+    free = "{match: any, in: executables, example: drive}"
+    text = GOOD.replace("contract:\n", f"variables:\n  a: {free}\n  b: {free}\ncontract:\n")
+    told = found(write(text))
+    assert told == [
+        "6: variables.b.match: 'a' takes any name of the executables already: give one a form, "
+        "or another 'of'"
+    ]
+
+
+@given(total=st.integers(1, 400), without=st.sets(st.sampled_from(["qos", "period"])))
+def test_one_number_is_shared_out_to_the_last_point(total: int, without: set[str]) -> None:
+    text = GOOD
+    for name, line in (("qos", "reliability: reliable"), ("period", "period: 100 ms")):
+        if name in without:
+            text = text.replace(f"              {line}\n", "")
+    points = total / 4
+    text = text.replace("{builds: 1, topic: 1, type: 1, qos: 1, period: 2}", f"{points}")
+    checks = expanded(parse_source(text, Path("a.yaml"))).data["checks"]
+    shares = [one["points"] for one in checks]
+    assert math.isclose(math.fsum(shares), points)
+    assert all(share >= 0.0 for share in shares)
+
+
+def test_the_handout_has_the_table_and_goes_on_with_the_authors_rows(write: Write) -> None:
+    place = write(GOOD)
+    (place / "README.md").write_text("# Drive\n\n<!-- contract -->\n| stops | at walls |\n")
+    text = make_handout(load_assignment(place)).text
+    assert "| executable | `drive` |\n| node | `driver` |\n" in text
+    assert "| publishes | `/cmd_vel`, type `geometry_msgs/msg/Twist`, reliable |\n" in text
+    assert text.endswith("| runs | until Ctrl+C |\n| stops | at walls |\n")
+
+
+def test_a_chosen_name_may_stand_in_a_contract(write: Write) -> None:
+    text = GOOD.replace("    bot:\n", '    "bot{n}":\n').replace(
+        "contract:\n", "variables: {n: {match: 'bot{n}', example: 7}}\ncontract:\n"
+    )
+    loaded = load_assignment(write(text))
+    assert loaded.assignment.packages[0].name == "bot7"
+    assert loaded.entries["builds"]["with"] == {"package": "bot{n}"}
+
+
+def test_students_get_a_contract_without_the_hidden_checks(write: Write) -> None:
+    hidden = "  checks: {period: {visibility: hidden}, qos: {hint: Look}}\nscenarios:\n"
+    loaded = load_assignment(write(GOOD.replace("scenarios:\n", hidden)))
+    text = visible_files(loaded)["assignment.yaml"].decode()
+    copy = write(text)
+    part = load_assignment(copy)
+    assert [one.spec.id for one in part.checks] == ["builds", "topic", "type", "qos"]
+    assert part.withheld.points == 2.0
+    assert make_handout(part).total == make_handout(loaded).total
