@@ -158,7 +158,7 @@ def test_what_differs_is_written_under_its_id(write: Write) -> None:
         ("node: driver", "nodes: driver", "11: contract.packages.bot.executables.drive.nodes: "),
         (
             "            /cmd_vel:\n",
-            "            /o: {type: a/msg/B, ids: {topic: one, type: one}}\n            /cmd_vel:\n",
+            "            /o: {type: a/msg/B, ids: {topic: t, type: t}}\n            /cmd_vel:\n",
             "13: contract.packages.bot.executables.drive.publishes./o: two checks of the contr",
         ),
     ],

@@ -612,6 +612,20 @@ class TestMistakes:
         finding = judge("motion.path_length", run, goal=yaml(goal), most=f"{100 * most} %")
         assert (finding.status, finding.disturbed) == (status, status is Status.ERROR)
 
+    @pytest.mark.parametrize(("lost_s", "status"), [(0.4, Status.ERROR), (0.1, Status.FAILED)])
+    def test_a_way_past_the_goal_is_excused_by_as_much_as_the_machine_took(self, lost_s, status):
+        # At 0.2 m/s it goes 0.1 m past the goal: 0.06 m more than it may, which are 0.3 s.
+        run = drive(on_odometry(lambda pose: (0.2 if pose.x_m < 0.69 else 0.0, 0.0)), seconds=20)
+        arrives_s = next(run.since_launch_s(step.time_ns) for step in run.truth if step.x_m > 0.55)
+        stall = taken(arrives_s, arrives_s + 0.5, waited_s=lost_s)
+        late = simulated(run.truth, run.scene, messages=run.messages, disturbance=stall)
+        finding = judge("motion.overshoot", late, goal=yaml((0.6, 0.0, 0.0)), most="4 cm")
+        assert (finding.status, finding.disturbed) == (status, status is Status.ERROR)
+        early = taken(0, 1.0, waited_s=lost_s)
+        early = simulated(run.truth, run.scene, messages=run.messages, disturbance=early)
+        finding = judge("motion.overshoot", early, goal=yaml((0.6, 0.0, 0.0)), most="4 cm")
+        assert finding.status is Status.FAILED
+
 
 def test_drive_plain_silence_says_why():
     run = drive(lambda _: None, seconds=2)

@@ -28,6 +28,8 @@ from grader.spec.quantity import Angle, Duration, PositiveLength, Ratio
 from grader.spec.unit import format_duration
 
 _MOST_POINTS = 400
+# What is kept back a little before the robot arrives is missing when it should slow down.
+_BRAKING_NS = NS // 2
 
 
 class Reaches(GoalParameters):
@@ -210,6 +212,12 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     seen, plot = f"{metres(past_m[far])} past the goal", _plot(run, past_m, parameters.most)
     if past_m[far] <= parameters.most:
         return Finding.passed(parameters.asked_for, seen, Evidence(plots=(plot,)))
+    arrived = run.truth[parameters.arrival(run)]
+    lost_s = stolen_s(recording, arrived.time_ns - _BRAKING_NS, far)
+    fastest_m_s = max(abs(step.linear_m_s) for step in run.truth)
+    # The robot keeps its last command for as long as the machine keeps the next one back.
+    if lost_s * fastest_m_s >= past_m[far] - parameters.most:
+        return Finding.held_up(seen, lost_s)
     return why_off_course(recording) or Finding(
         seen,
         "Compute linear.x as a gain times the distance: then the robot slows down before the goal. "
