@@ -43,9 +43,12 @@ def assignment_files(name: str, *, cpp: bool = False) -> dict[str, str]:
     names = (ASSIGNMENT_FILE, HANDOUT_FILE, *(one.mutants for one in languages))
     files = {file: rendered(f"new/{file}", id=name, cpp=cpp) for file in names}
     for one in languages:
-        build_type, client = ("ament_cmake", "rclcpp") if one is CPP else ("ament_python", "rclpy")
+        client = "rclcpp" if one is CPP else "rclpy"
         package = Package(
-            name=name, build_type=build_type, depends=(client, "std_msgs"), executables=(name,)
+            name=name,
+            build_types=("ament_cmake",) if one is CPP else ("ament_python",),
+            depends=(client, "std_msgs"),
+            executables=(name,),
         )
         (program,) = programs(package)
         code = rendered(f"new/node.{'cpp' if one is CPP else 'py'}", id=name, program=program)

@@ -109,7 +109,7 @@ BuildType = Literal["ament_python", "ament_cmake"]
 BuildTypes = Annotated[
     tuple[BuildType, ...],
     Field(min_length=1),
-    BeforeValidator(lambda given: tuple(given) if isinstance(given, list) else (given,)),
+    BeforeValidator(lambda given: tuple(given) if isinstance(given, list | tuple) else (given,)),
     WithJsonSchema(
         {
             "anyOf": [
