@@ -10,6 +10,7 @@ from typing import Any
 from grader.assignment.contract.derive import Derivation
 from grader.assignment.contract.expand import expanded
 from grader.assignment.contract.model import Contract
+from grader.assignment.contract.table import with_table
 from grader.assignment.load import ASSIGNMENT_FILE, LoadedAssignment
 from grader.assignment.model import Assignment, Visibility
 from grader.assignment.mutant import LANGUAGES
@@ -18,6 +19,7 @@ from grader.assignment.repeat import runs_of
 from grader.assignment.selection import visible_part
 from grader.assignment.variable import filled
 from grader.batch.reference_run import REFERENCE_FILE, only_scenarios
+from grader.report.html.handout import HANDOUT_FILE
 from grader.spec.document import write_yaml
 
 _CUT = "# Made by rosgrade: this copy lacks the hidden checks, which run at grading.\n"
@@ -41,6 +43,10 @@ def visible_files(loaded: LoadedAssignment) -> dict[str, bytes]:
     only hidden checks and their scenarios name is left out: worlds, own checks, messages.
     """
     files = grading_files(loaded)
+    if HANDOUT_FILE in files:
+        text = files[HANDOUT_FILE].decode("utf-8", "surrogateescape")
+        whole = with_table(text, loaded.assignment.contract)
+        files[HANDOUT_FILE] = whole.encode("utf-8", "surrogateescape")
     part = visible_part(loaded)
     if part is loaded:
         return files

@@ -214,9 +214,12 @@ def test_a_chosen_name_may_stand_in_a_contract(write: Write) -> None:
 
 def test_students_get_a_contract_without_the_hidden_checks(write: Write) -> None:
     hidden = "  checks: {period: {visibility: hidden}, qos: {hint: Look}}\nscenarios:\n"
-    loaded = load_assignment(write(GOOD.replace("scenarios:\n", hidden)))
-    text = visible_files(loaded)["assignment.yaml"].decode()
-    copy = write(text)
+    place = write(GOOD.replace("scenarios:\n", hidden))
+    (place / "README.md").write_text("# Drive\n\n<!-- contract -->\n")
+    loaded = load_assignment(place)
+    files = visible_files(loaded)
+    assert "| node | `driver` |" in files["README.md"].decode()
+    copy = write(files["assignment.yaml"].decode())
     part = load_assignment(copy)
     assert [one.spec.id for one in part.checks] == ["builds", "topic", "type", "qos"]
     assert part.withheld.points == 2.0
