@@ -86,6 +86,14 @@ class OnTopic(Symptom[Finding]):
         return self.recording.stolen_s(self.begin_ns, self.recording.stop_ns)
 
     @property
+    def asked(self) -> tuple[str, ...]:
+        """Topics that the probe publishes on and that this one answers, as the assignment says."""
+        answers = self.recording.answers
+        return tuple(
+            name for name in self.recording.sent if answers.get(name, self.topic) == self.topic
+        )
+
+    @property
     def watched_s(self) -> float:
         """How long the topic was observed."""
         return (self.recording.stop_ns - self.begin_ns) / NS
@@ -94,14 +102,6 @@ class OnTopic(Symptom[Finding]):
 @dataclass(frozen=True)
 class NoMessages(OnTopic):
     """No message came on a topic."""
-
-    @property
-    def asked(self) -> tuple[str, ...]:
-        """Topics that the probe publishes on and that this one answers, as the assignment says."""
-        answers = self.recording.answers
-        return tuple(
-            name for name in self.recording.sent if answers.get(name, self.topic) == self.topic
-        )
 
 
 @dataclass(frozen=True)

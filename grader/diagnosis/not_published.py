@@ -109,13 +109,14 @@ def never_spun(symptom: OnTopic) -> Finding | None:
     return why_never_spun(symptom.recording, symptom.seen, symptom.nodes)
 
 
-@explanation(NoMessages, concept="executors")
-def blocked_executor(symptom: NoMessages) -> Finding | None:
+@explanation(NoMessages, FewMessages, concept="executors")
+def blocked_executor(symptom: OnTopic) -> Finding | None:
     """A callback does not return, and blocks the executor."""
-    sent = symptom.recording.sent
-    begin_ns = [sent[name][0].stamp_ns for name in symptom.asked if sent[name]]
-    since_ns = min(begin_ns, default=symptom.recording.launched_ns)
-    return why_blocked(symptom.recording, symptom.seen, symptom.nodes, since_ns)
+    recording = symptom.recording
+    asked_ns = [sent[0].stamp_ns for name in symptom.asked if (sent := recording.sent[name])]
+    last_ns = [one.stamp_ns for one in recording.on(symptom.topic)[-1:]]
+    since_ns = min(last_ns or asked_ns, default=recording.launched_ns)
+    return why_blocked(recording, symptom.seen, symptom.nodes, since_ns)
 
 
 @explanation(NoMessages)

@@ -8,13 +8,14 @@ import pytest
 
 from grader.findings.finding import Status
 from grader.recording.model import Declaration, Kind, Recording
-from grader.submission.record import SourceFile, SourceFunction
+from grader.submission.record import BuildRecord, SourceFile, SourceFunction
 from tests.checks.builder import (
     INSTALLED,
     SOURCE,
     after,
     at,
     call,
+    calls,
     declarations,
     declared,
     died,
@@ -35,6 +36,7 @@ from tests.checks.builder import (
 
 STRING = "std_msgs/msg/String"
 WITHIN = {"topic": "/cmd_vel", "at_least": 1}
+MORE = {"topic": "/cmd_vel", "at_least": 3}
 HANGS = tuple(call(0.5 * n, None) for n in range(2, 8))
 
 
@@ -76,6 +78,25 @@ def test_a_callback_that_never_returns_is_named_with_its_line() -> None:
     assert "from 1.20 s after launch on" in finding.observed
     assert "Write `if` in place of the loop" in finding.hint
     assert [(one.file, one.line) for one in finding.evidence.places] == [(SOURCE, 18)]
+
+
+UNKEPT = (
+    f"{SOURCE}:25:75: warning: ignoring return value of ‘std::future<...> std::async(launch, ...) "
+    "[with _Fn = Bot::tick()::<lambda()>]’, declared with attribute ‘nodiscard’ [-Wunused-result]\n"
+)
+
+
+@pytest.mark.parametrize("came", [{}, messages([0.9])])
+def test_a_future_of_async_that_is_not_kept_is_told_where_a_callback_blocks(came: Any) -> None:
+    build = BuildRecord(succeeded=True, duration_s=9.0, log=UNKEPT)
+    built = submission(package(build_type="ament_cmake"), build=build)
+    found = judge("messages.count", blocked(submission=built, messages=came), **MORE)
+    assert "`std::async` returns waits in its destructor" in found.observed
+    assert "Keep the future in a member" in found.hint
+    assert [(one.file, one.line) for one in found.evidence.places] == [(SOURCE, 25)]
+    # A node that answers at once is not blocked by it.
+    quick = blocked(submission=built, messages=came, calls=calls())
+    assert "async" not in failing("messages.count", quick, **MORE)
 
 
 @pytest.mark.parametrize(

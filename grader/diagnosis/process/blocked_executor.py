@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import replace
 
-from grader.diagnosis.process.standing import Stand, slow_callback, where_it_stands
+from grader.diagnosis.process.standing import (
+    Stand,
+    slow_callback,
+    unkept_future,
+    where_it_stands,
+)
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import until_the_end
 from grader.findings.wording import codes
@@ -60,6 +65,7 @@ def why_blocked(
         return None
     process = declarations.process_of(recording, min(nodes))
     stand = where_it_stands(recording, process.name) if process is not None else None
+    stand = stand or unkept_future(recording)
     since_s = recording.since_launch_s(call.requested_ns)
     cause = Finding(
         f"{seen}: something blocks the executor; from {since_s:.2f} s after launch on the node's "

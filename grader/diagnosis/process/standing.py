@@ -55,6 +55,10 @@ _WAITS = (
         "callback that holds a lock must not call a method that takes it again.",
     ),
 )
+# What g++ says of a future that is not kept.
+_UNKEPT = re.compile(
+    r"^(?P<file>[^\s:]+):(?P<line>\d{1,7}):.*ignoring return.*\basync\(", re.MULTILINE
+)
 _LOOP = (
     "While a callback loops, it gets no new message. Write `if` in place of the loop, and return: "
     "the callback is called again, and sees what is new then."
@@ -62,6 +66,10 @@ _LOOP = (
 _SLEEP = (
     "While a callback sleeps or works, the node calls nothing else. Do one short step and return: "
     "the callback is called again."
+)
+_KEEP = (
+    "Keep the future in a member, `future_ = std::async(std::launch::async, ...)`: then the "
+    "callback returns at once."
 )
 
 
@@ -123,10 +131,21 @@ def slow_callback(recording: Recording, process: str | None = None) -> Stand | N
     found = longest_callback(recording, process)
     place = _place(recording, found) if found is not None else None
     if found is None or place is None:
-        return None
+        return unkept_future(recording)
     took = format_duration(round((found.seen_ns - found.began_ns) / NS, 1))
     words = f"{code(found.function)} takes {took} or more: {_at(place.line or 0, _text(found))}"
     return _stand(found, place, words)
+
+
+def unkept_future(recording: Recording) -> Stand | None:
+    """Where a callback in C++ waits in the destructor of a future, as its compiler warned."""
+    build = recording.submission.build
+    found = _UNKEPT.search(build.log) if build is not None else None
+    if found is None:
+        return None
+    words = "the future that `std::async` returns waits in its destructor until the work is done"
+    place = SourceError(found["file"], int(found["line"]), "this future is not kept")
+    return Stand(place, f"{words}: {_at(int(found['line']), '')}", _KEEP, in_callback=True)
 
 
 def _stand(found: Standing, place: SourceError, words: str) -> Stand:
