@@ -305,8 +305,8 @@ def copy_result(loaded: LoadedAssignment, ledger: Ledger, key: str, twin: Entry)
 def with_teams(rows: Iterable[Entry], before: Mapping[str, Entry], ledger: Ledger) -> list[Entry]:
     """Rows with the teams that share a submission.
 
-    A team has the review of the first who handed in, or of whoever has one already: a row with a
-    review never gets another one.
+    A team has one review: that of a member who was reviewed before, or of the first to hand in. A
+    member who has a review keeps it.
     """
     rows, store = list(rows), ReviewStore(ledger.out)
     shared: dict[str, list[str]] = {}

@@ -90,7 +90,7 @@ def write_report(
 
 
 def claim(folder: Path, *, keep: bool) -> None:
-    """Mark a folder as one for reports, so that one that is interrupted is in nobody's way.
+    """Mark a folder as a place for reports, where the next run may write if this one is cut off.
 
     Raises:
         UsageError: Something of somebody else's is in the place of a folder that would be replaced.

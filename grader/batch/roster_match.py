@@ -32,8 +32,8 @@ class _Names:
     def _find_prefix(self, stems: Sequence[str]) -> str:
         """GitHub Classroom's ``<assignment>-``, where both that and logins may hold hyphens.
 
-        It is what most of the names share; where they share several, logins of the roster must
-        stand behind only one of them, more than once.
+        It is the beginning that most of the names share. If they share several, it is the only one
+        that logins of the roster follow, in two names at least.
         """
         hyphens = ((stem, at) for stem in stems for at, sign in enumerate(stem) if sign == "-")
         shared = Counter(stem[: at + 1] for stem, at in hyphens)

@@ -167,7 +167,7 @@ class Watching:
                 ):
                     if changes:
                         self._news.put(None)
-                    # A folder that is removed and made again is another one, which nobody watches.
+                    # If the folder was removed and made again, the new one is not watched yet.
                     if _identity(root) != watched:
                         break
 

@@ -20,10 +20,10 @@ _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _PROC = "/proc"
 _SHARED = b"/dev/zero (deleted)"
 _WINDOW = 3
-"""Looks within which a parent has got what the child had that is missing at the last of them.
+"""How many readings it takes until the CPU time of an ended child is surely in its parent's.
 
-Processes are read one after the other: it may have been read at any time since its child was seen
-last. One that is missing once may have ended after its parent was read; twice it is certain.
+Processes are read one after the other, so a child that is missing in one reading may have ended
+after its parent was read. If it is missing in two, the parent was read after its end.
 """
 
 

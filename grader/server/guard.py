@@ -1,4 +1,4 @@
-"""Who may ask the server: only a browser that was given the page's address, and no other page.
+"""Who may ask the server: only a browser that opened the page's address, and no other page.
 
 A port of the loopback can be reached by every user of the machine and by every page that a browser
 shows. So each request needs the token of the address, the right name of the host, and, to change

@@ -253,8 +253,8 @@ class BuildRecord:
         culprit: The student's file and line that the log names first, or None.
         log: The end of colcon's output, student's paths mapped back, at most 64 KiB.
         tests: Runs of the tests that the assignment asks for, of packages that were built.
-        waited: Of one that timed out: whether it waited, instead of computing; None where nobody
-            looked.
+        waited: Whether a build that timed out waited for something; False if it computed, None if
+            that was not measured.
     """
 
     succeeded: bool

@@ -205,14 +205,14 @@ def end(out: Path, key: str, check: str, status: str = "error", points: float = 
 def test_a_click_grades_without_a_check_that_could_not_be_judged(out: Path, client: Client) -> None:
     end(out, "ana", "print")
     text = client.get(page("ana")).text
-    assert "5 of 6 points so far, 1 open" in text and "Give 1 point, grade without" in text
+    assert "5 of 6 points so far, 1 open" in text and "Give 1 point and grade without this" in text
     assert "--retry" in text
     assert change(client, "ana", do="settle").status == 200
     row = next(row for row in read_class(out) if row.id == "ana")
     assert row.result is not None and row.result.graded and not row.result.open
     assert (row.result.score, row.result.known_score) == (5.0, 6.0)
     assert headline(row.result) == "2 of 3 checks passed; 1 check could not be judged."
-    assert "grade without" not in client.get(page("ana")).text
+    assert "and grade without" not in client.get(page("ana")).text
     # It is judged in the end: these points were only in place of it.
     judged = row.result.model_copy(
         update={
