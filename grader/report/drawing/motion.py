@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import groupby
+from typing import NamedTuple
 
 from markupsafe import Markup
 
@@ -45,14 +46,18 @@ def draw_motion(recording: Recording, name: str) -> svg.Figure | None:
     times_s = [recording.since_launch_s(step.time_ns) for step in truth]
     forward_m_s = [0.0 if math.isnan(one.command_m_s) else one.command_m_s for one in truth]
     turn_rad_s = [0.0 if math.isnan(one.command_rad_s) else one.command_rad_s for one in truth]
-    forward = (forward_m_s, [one.linear_m_s for one in truth], scene.max_linear_m_s)
-    turn = (turn_rad_s, [one.angular_rad_s for one in truth], scene.max_angular_rad_s)
+    ahead_m_s = [one.linear_m_s for one in truth]
+    turned_rad_s = [one.angular_rad_s for one in truth]
+    speeds = (
+        _Speed("speed ahead (m/s)", forward_m_s, ahead_m_s, scene.max_linear_m_s),
+        _Speed("turn (rad/s)", turn_rad_s, turned_rad_s, scene.max_angular_rad_s),
+    )
 
     def draw(width: float) -> tuple[float, list[Markup]]:
         x = Scale(0.0, max(times_s[-1], 0.1), LEFT, width - RIGHT)
         content, bottom = _strip(found, x), float(STRIP)
-        for title, speed in (("speed ahead (m/s)", forward), ("turn (rad/s)", turn)):
-            content += _panel(title, *speed, x.all_clipped(times_s), x.end, bottom + BETWEEN)
+        for speed in speeds:
+            content += _panel(speed, x.all_clipped(times_s), x.end, bottom + BETWEEN)
             bottom += BETWEEN + PANEL
         return bottom + TIME_AXIS, [*content, *time_axis(x, bottom, width)]
 
@@ -99,16 +104,18 @@ def _strip(found: Sequence[Bar], x: Scale) -> list[Markup]:
     return drawn
 
 
-def _panel(
-    title: str,
-    commands: Sequence[float],
-    true: Sequence[float],
-    most: float,
-    at: Sequence[float],
-    end: float,
-    top: float,
-) -> list[Markup]:
-    """One of the two speeds; ``most`` is the limit of the robot, ``at`` are pixels of times."""
+class _Speed(NamedTuple):
+    """One of the two speeds; ``most`` is the limit of the robot."""
+
+    title: str
+    commands: Sequence[float]
+    true: Sequence[float]
+    most: float
+
+
+def _panel(speed: _Speed, at: Sequence[float], end: float, top: float) -> list[Markup]:
+    """Draw a speed; ``at`` are pixels of times."""
+    title, commands, true, most = speed
     finite = [value for value in (*commands, *true) if abs(value) < MOST]
     low, high = min(0.0, *finite), max(0.0, *finite)
     reached = ((1.0, high), (-1.0, -low))
