@@ -34,7 +34,7 @@ from grader.report.model.facts import Clock
 from grader.run.admission import Admission
 from grader.run.cell.domain import lock_domain
 from grader.run.host.load import cpu_count
-from grader.run.runner import Runner
+from grader.run.runner import Runner, RunRequest
 from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose
 from grader.submission.build.build_cache import BUILDS
@@ -175,15 +175,15 @@ def _cell(samples: Samples, folder: Path, _: int) -> None:
                 until = scenario.until.model_validate({"elapsed": f"{seconds} s"})
                 update = {"until": until, "timeout": 2 * seconds}
                 before_s = runner.cpu_s
-                runner.run(
+                request = RunRequest(
                     loaded.assignment,
                     scenario.model_copy(update=update),
                     prepared.record,
                     prepared.install,
-                    folder / "cell.mcap",
                     seed=1,
                     worlds=loaded.folder,
                 )
+                runner.run(request, folder / "cell.mcap")
                 taken_s.append(runner.cpu_s - before_s)
         # The first run also pays for what the prefork server imports.
         samples[f"cell with a robot {what}: share of a core"].append((taken_s[2] - taken_s[1]) / 10)

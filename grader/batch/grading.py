@@ -28,7 +28,7 @@ from grader.report.files import write_whole
 from grader.report.html.replay import Replay
 from grader.run.admission import Admission
 from grader.run.host.load import cpu_count
-from grader.run.runner import Runner, scenario_seed
+from grader.run.runner import Runner, RunRequest, scenario_seed
 from grader.sandbox.python_tree import check_installed
 from grader.spec.names import Names
 from grader.submission.build.bounded import OutputLimits
@@ -281,23 +281,22 @@ class Grading:
         scenario = next(item for item in assignment.scenarios if item.id == name)
         file = folder / f"{name}.mcap"
         try:
-            self._runner.run(
+            request = RunRequest(
                 assignment,
                 scenario,
                 prepared.record,
                 prepared.install,
-                file,
                 seed=scenario_seed(assignment.id, name, prepared.record.sha256, self._seed),
                 worlds=self._loaded.folder,
                 underlays=prepared.underlays,
                 type_support=support.prefixes(),
-                alone=alone,
                 names=names[name],
                 pauses=any(
                     bound.parameters.pauses and scenario in loaded.scenarios_of(bound)
                     for bound in loaded.checks
                 ),
             )
+            self._runner.run(request, file, alone=alone)
             return read_recording(file)
         except UsageError as error:
             raise GraderFault(f"the new recording cannot be read: {error}") from error

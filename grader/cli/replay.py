@@ -46,6 +46,8 @@ def replay(
     from grader.grade.naming import named
     from grader.recording.mcap_reader import read_recording
     from grader.run.replay import replay as replay_recording
+    from grader.run.replay import replay_scenario
+    from grader.run.runner import RunRequest
     from grader.submission.intake.locate import check_path
     from grader.submission.prepare import prepare
 
@@ -68,13 +70,13 @@ def replay(
     if prepared.install is None or reason is not None:
         problem = reason.observed if reason else prepared.record.problem
         raise UsageError(f"{submission}: {problem}")
-    status = replay_recording(
-        recording,
-        recorded,
+    request = RunRequest(
         loaded.assignment,
+        replay_scenario(recording, recorded, loaded.assignment),
         prepared.record,
-        replace(installation, underlays=prepared.underlays or installation.underlays),
         prepared.install,
-        type_support,
+        recorded.seed,
+        underlays=prepared.underlays,
+        type_support=tuple(type_support),
     )
-    raise typer.Exit(status)
+    raise typer.Exit(replay_recording(request, installation))

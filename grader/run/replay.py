@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,10 +18,9 @@ from grader.recording.mcap_reader import read_inputs, read_recording
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import NS, Ending, Kind, Owner, Qos, Recording
 from grader.ros import RosInstallation
-from grader.run.runner import Runner
+from grader.run.runner import Runner, RunRequest
 from grader.safe_text import clean, one_line
 from grader.scratch import Scratch
-from grader.submission.record import SubmissionRecord
 
 if TYPE_CHECKING:
     from grader.assignment.model import Assignment, Scenario
@@ -102,42 +102,28 @@ def replay_scenario(file: Path, recording: Recording, assignment: Assignment) ->
     )
 
 
-def replay(
-    file: Path,
-    recording: Recording,
-    assignment: Assignment,
-    submission: SubmissionRecord,
-    ros: RosInstallation,
-    install: Path,
-    type_support: Sequence[Path] = (),
-) -> int:
+def replay(request: RunRequest, ros: RosInstallation) -> int:
     """Replay a recording, and print everything that happens.
+
+    Args:
+        request: For a scenario of :func:`replay_scenario`.
 
     Returns:
         0 when it was played to its end, 1 when the node ended or never listened, 130 when it
         was interrupted; nothing of it runs any more.
     """
-    scenario = replay_scenario(file, recording, assignment)
     shown, known = [], {*ros.packages}
-    known |= {path.name for prefix in type_support for path in prefix.glob("share/*")}
-    for topic in scenario.record:
+    known |= {path.name for prefix in request.type_support for path in prefix.glob("share/*")}
+    for topic in request.scenario.record:
         if topic.type.partition("/")[0] in known:
             shown.append(topic)
         else:
             _say("rosgrade", f"{topic.topic} is not shown: no {topic.type} here")
-    scenario = scenario.model_copy(update={"record": tuple(shown)})
+    scenario = request.scenario.model_copy(update={"record": tuple(shown)})
     with Scratch("replay") as folder, Runner(ros, progress=_Screen(), verbose=True) as runner:
         again = folder / "run.mcap"
         try:
-            runner.run(
-                assignment,
-                scenario,
-                submission,
-                install,
-                again,
-                seed=recording.seed,
-                type_support=tuple(type_support),
-            )
+            runner.run(replace(request, scenario=scenario), again)
         except KeyboardInterrupt:
             return 130
         return _tell(read_recording(again))

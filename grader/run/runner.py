@@ -219,6 +219,30 @@ def given_parameters(scenario: Scenario) -> list[str]:
     return list(dict.fromkeys(name for one in scenario.launch for name in one.parameters))
 
 
+@dataclass(frozen=True)
+class RunRequest:
+    """One scenario to run with a submission that is built.
+
+    Attributes:
+        install: The submission's install space (merged layout).
+        worlds: Folder that world files are relative to.
+        underlays: Of the submission; by default those of the runner's ROS.
+        names: Wrong names to put right.
+        pauses: Whether the executors pause after the observation.
+    """
+
+    assignment: Assignment
+    scenario: Scenario
+    submission: SubmissionRecord
+    install: Path
+    seed: int
+    worlds: Path = Path()
+    underlays: tuple[Path, ...] = ()
+    type_support: tuple[Path, ...] = ()
+    names: Names = NO_NAMES
+    pauses: bool = False
+
+
 @dataclass
 class Runner:
     """Runs scenarios in cells.
@@ -251,59 +275,25 @@ class Runner:
             if not (self._aborted or self._ready):
                 self._ready.append(self._new_cell(()))
 
-    def run(
-        self,
-        assignment: Assignment,
-        scenario: Scenario,
-        submission: SubmissionRecord,
-        install: Path,
-        recording: Path,
-        *,
-        seed: int,
-        worlds: Path = Path(),
-        underlays: tuple[Path, ...] = (),
-        type_support: tuple[Path, ...] = (),
-        alone: bool = False,
-        names: Names = NO_NAMES,
-        pauses: bool = False,
-    ) -> None:
+    def run(self, request: RunRequest, recording: Path, *, alone: bool = False) -> None:
         """Run one scenario and write its recording.
-
-        Args:
-            install: The submission's install space (merged layout).
-            worlds: Folder that world files are relative to.
-            names: Wrong names to put right.
-            pauses: Whether the executors pause after the observation.
 
         Raises:
             GraderFault: The cell failed, through no fault of the student's.
         """
-        ros = replace(self.ros, underlays=underlays or self.ros.underlays)
         with self.admission.cell(alone=alone) as ticket:
-            cell = self._take_cell(scenario)
+            cell = self._take_cell(request.scenario)
             try:
-                order = self._order(
-                    ros,
-                    assignment,
-                    scenario,
-                    submission,
-                    install,
-                    type_support,
-                    cell.folder,
-                    seed,
-                    worlds,
-                    names,
-                )
-                order = replace(order, pauses=pauses)
+                order = self._order(request, cell.folder)
                 recording.parent.mkdir(parents=True, exist_ok=True)
                 launched_ns = time.time_ns()
                 try:
                     for event in cell.run(order):
                         if event["event"] in _STARTED_EVENTS:
                             ticket.started()
-                        self.progress(scenario.id, event)
+                        self.progress(order.scenario, event)
                 except MiddlewareHung:
-                    hung = hung_recording(order, submission, launched_ns)
+                    hung = hung_recording(order, request.submission, launched_ns)
                     write_recording(recording, hung, (), {})
                 else:
                     shutil.move(cell.recording, recording)
@@ -370,26 +360,17 @@ class Runner:
             self._server = PreforkServer(self.ros, self.sandbox)
         return CellProcess(self._server, imports)
 
-    def _order(
-        self,
-        ros: RosInstallation,
-        assignment: Assignment,
-        scenario: Scenario,
-        submission: SubmissionRecord,
-        install: Path,
-        type_support: tuple[Path, ...],
-        folder: Path,
-        seed: int,
-        worlds: Path,
-        names: Names,
-    ) -> CellOrder:
+    def _order(self, request: RunRequest, folder: Path) -> CellOrder:
         from grader.assignment.random_values import draw_values
 
+        assignment, scenario, submission = request.assignment, request.scenario, request.submission
+        ros = replace(self.ros, underlays=request.underlays or self.ros.underlays)
+        install, type_support, seed = request.install, request.type_support, request.seed
         scratch = folder / SCRATCH
         scratch.mkdir()
         values = draw_values(scenario, seed)
         commands = tuple(
-            process_command(ros, launch, assignment, install, values, names)
+            process_command(ros, launch, assignment, install, values, request.names)
             for launch in scenario.launch
         )
         compiled = has_compiled_programs(install)
@@ -405,12 +386,12 @@ class Runner:
             compiled_tracer=str(tracer) if tracer else None,
             prefixes=tuple(map(str, (*type_support, install, *ros.underlays, *ros.prefixes))),
             topics=_topics(scenario),
-            stimuli=_stimuli(scenario, commands, worlds, definitions, seed, values),
+            stimuli=_stimuli(scenario, commands, request.worlds, definitions, seed, values),
             until=_until(scenario.until),
             limits=RunLimits(scenario.discovery, scenario.timeout, scenario.shutdown),
             scratch=str(scratch),
             submission=to_json(submission).decode(),
-            simulator=_simulator(scenario, worlds, values, seed),
+            simulator=_simulator(scenario, request.worlds, values, seed),
             values=values,
             facts={
                 "assignment": assignment.id,
@@ -425,9 +406,10 @@ class Runner:
                 "compiled_tracer": "preloaded" if tracer else "lacking" if compiled else "none",
                 "parameters": " ".join(given_parameters(scenario)),
             },
-            names=names,
+            names=request.names,
             type_support=tuple(map(str, type_support)),
             tells_output=self.verbose,
+            pauses=request.pauses,
         )
         if self.sandbox is None or ros.source == "sourced":
             # A sandbox shows the system's libraries, which Python finds where ROS is sourced.

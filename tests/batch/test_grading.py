@@ -33,7 +33,7 @@ from grader.recording.event import Disturbance
 from grader.recording.mcap_writer import write_recording
 from grader.recording.model import Ending, Endpoint, Kind, Node, Owner, Qos, Recording
 from grader.report.model.facts import Clock
-from grader.run.runner import Runner
+from grader.run.runner import Runner, RunRequest
 from grader.spec.names import Names, Thing, WrongName
 from grader.submission.build.colcon import BuildLimits
 from grader.submission.prepare import Prepared
@@ -107,17 +107,15 @@ class ScriptedRunner(Runner):
         self.names: list[object] = []
         self.scenarios: list[Any] = []
 
-    def run(self, *arguments: object, alone: bool = False, **more: object) -> None:
+    def run(self, request: RunRequest, recording: Path, *, alone: bool = False) -> None:
         outcome = next(self._outcomes)
-        self.scenarios.append(arguments[1])
+        self.scenarios.append(request.scenario)
         self.alone.append(alone)
-        self.names.append(more["names"])
+        self.names.append(request.names)
         if isinstance(outcome, Exception):
             raise outcome
-        file = arguments[4]
-        assert isinstance(file, Path)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        write_recording(file, outcome, (), {})
+        recording.parent.mkdir(parents=True, exist_ok=True)
+        write_recording(recording, outcome, (), {})
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from grader.assignment.model import Assignment
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording
 from grader.run.process.descendants import command_line
-from grader.run.runner import Runner
+from grader.run.runner import Runner, RunRequest
 from grader.spec.names import NO_NAMES, Names
 from grader.submission.record import SubmissionRecord
 
@@ -87,17 +87,17 @@ def run_node(runner: Runner, tmp_path: Path) -> RunNode:
         course = assignment(**scenario)
         runner.progress = progress or (lambda _scenario, _event: None)
         file = folder / "run.mcap"
-        runner.run(
+        request = RunRequest(
             course,
             course.scenarios[0],
             SUBMISSION,
             install(folder, source),
-            file,
             seed=1,
             worlds=worlds,
             pauses=pauses,
             names=names,
         )
+        runner.run(request, file)
         return read_recording(file)
 
     return run

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from grader import ros
 from grader.recording.mcap_reader import read_recording
-from grader.run.replay import replay
+from grader.run.replay import replay, replay_scenario
+from grader.run.runner import RunRequest
 from tests.run.conftest import SUBMISSION, assignment
 
 if __name__ == "__main__":
@@ -16,4 +17,7 @@ if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)
     file, install = map(Path, sys.argv[1:])
     recording = read_recording(file)
-    sys.exit(replay(file, recording, assignment(), SUBMISSION, ros.find(), install))
+    course = assignment()
+    scenario = replay_scenario(file, recording, course)
+    request = RunRequest(course, scenario, SUBMISSION, install, recording.seed)
+    sys.exit(replay(request, ros.find()))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from grader import ros
 from grader.recording.mcap_reader import read_recording
-from grader.run.runner import Runner
+from grader.run.runner import Runner, RunRequest
 from tests.run import nodes
 from tests.run.conftest import SUBMISSION, assignment, install
 
@@ -28,7 +28,8 @@ def main(folder: Path, value: str, forever: bool) -> None:
     source = nodes.timed(value=float(value))
     file = folder / "run.mcap"
     with runner:
-        runner.run(course, course.scenarios[0], SUBMISSION, install(folder, source), file, seed=1)
+        place = install(folder, source)
+        runner.run(RunRequest(course, course.scenarios[0], SUBMISSION, place, 1), file)
     recording = read_recording(file)
     print(*sorted({str(m.value["linear"]["x"]) for m in recording.on("/cmd_vel")}))
 

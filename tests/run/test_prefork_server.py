@@ -16,7 +16,7 @@ from grader.recording.mcap_reader import read_recording
 from grader.run.cell.cell_process import CellProcess
 from grader.run.cell.prefork_server import PreforkServer
 from grader.run.process.descendants import descendants
-from grader.run.runner import Runner
+from grader.run.runner import Runner, RunRequest
 from grader.sandbox import bubblewrap
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
@@ -68,9 +68,9 @@ def test_a_run_whose_prefork_server_is_killed_is_a_fault_and_the_next_one_is_not
     with Runner(ros.find(), progress=kill) as runner:
         file = tmp_path / "run.mcap"
         with pytest.raises(GraderFault, match=r"'run' ended with status -9 \(it was killed, or"):
-            runner.run(course, scenario, SUBMISSION, space, file, seed=1)
+            runner.run(RunRequest(course, scenario, SUBMISSION, space, 1), file)
         runner.progress = lambda _scenario, _event: None
-        runner.run(course, scenario, SUBMISSION, space, file, seed=1)
+        runner.run(RunRequest(course, scenario, SUBMISSION, space, 1), file)
         assert len(read_recording(file).on("/cmd_vel")) >= 3
 
 
@@ -130,7 +130,7 @@ def test_the_installation_of_a_package_meanwhile_spoils_no_run(
         with Runner(ros.find(), sandbox=sandbox) as runner:
             for name in ("before", "after"):
                 file = tmp_path / f"{name}.mcap"
-                runner.run(course, course.scenarios[0], SUBMISSION, space, file, seed=1)
+                runner.run(RunRequest(course, course.scenarios[0], SUBMISSION, space, 1), file)
                 assert len(read_recording(file).on("/cmd_vel")) >= 3
                 # As ldconfig does it at the end of every installation.
                 new = Path(etc, "ld.so.cache~")

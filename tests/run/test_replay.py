@@ -16,7 +16,7 @@ from grader.errors import UsageError
 from grader.recording.mcap_reader import read_inputs, read_recording
 from grader.recording.model import NS
 from grader.run.replay import replay_scenario
-from grader.run.runner import Runner
+from grader.run.runner import Runner, RunRequest
 from grader.scratch import PREFIX
 from tests.recording.written import write_robot_run
 from tests.run.conftest import SUBMISSION, assignment, install, running
@@ -63,7 +63,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     runner = Runner(ros.find())
     file, place = folder / "run.mcap", install(folder, ECHO)
     try:
-        runner.run(course, course.scenarios[0], SUBMISSION, place, file, seed=1)
+        runner.run(RunRequest(course, course.scenarios[0], SUBMISSION, place, 1), file)
     finally:
         runner.close()
     return file, place
