@@ -16,7 +16,7 @@ from grader import resources, ros
 from grader.assignment.binding import BoundCheck
 from grader.assignment.model import Assignment
 from grader.assignment.stimuli.message import Find, part_of
-from grader.assignment.variable import Values, fill_text
+from grader.assignment.variable import Values, fill_interface, fill_text
 from grader.checks.check import NamedFields
 from grader.errors import GraderFault, Problem
 from grader.findings.value import NoSuchField, expected_leaves, tolerance_of, unreachable, value_at
@@ -105,9 +105,9 @@ def write_interfaces(folder: Path, values: Values, target: Path) -> None:
     """Write the packages of an assignment with values in the places of variables."""
     for file in sorted((folder / FOLDER).rglob("*")):
         if file.is_file():
-            copy = target / fill_text(str(file.relative_to(folder / FOLDER)), values)
+            copy = target / fill_interface(str(file.relative_to(folder / FOLDER)), values)
             copy.parent.mkdir(parents=True, exist_ok=True)
-            copy.write_text(fill_text(file.read_text("utf-8"), values), "utf-8")
+            copy.write_text(fill_interface(file.read_text("utf-8"), values), "utf-8")
 
 
 def interface_problems(

@@ -18,7 +18,7 @@ _PLACE = re.compile(r"(?<!\$)\{([a-z][a-z0-9_]*)\}")
 _NUMBER = re.compile(r"0|[1-9][0-9]*")
 
 Values = Mapping[str, str]
-"""What stands for each variable, by its name."""
+"""What stands for each variable by its name, for an interface, or for a ``package/`` of them."""
 
 
 class Variable(Model):
@@ -88,15 +88,18 @@ class Variable(Model):
         return "[0-9]+" if isinstance(self.example, int) else "[A-Za-z0-9_]+"
 
 
-def fill(value: Any, values: Values) -> Any:
+def fill(value: Any, values: Values, key: str = "") -> Any:
     """A part of a document with the values in their places."""
     if isinstance(value, dict):
-        return {fill_text(key, values): fill(item, values) for key, item in value.items()}
+        return {fill_text(key, values): fill(item, values, key) for key, item in value.items()}
     if isinstance(value, list):
         return [fill(item, values) for item in value]
     if not isinstance(value, str):
         return value
     text = fill_text(value, values)
+    if key == "type":
+        package, slash, rest = text.partition("/")
+        return values.get(text, values.get(f"{package}{slash}", f"{package}{slash}") + rest)
     return int(text) if _PLACE.fullmatch(value) and _NUMBER.fullmatch(text) else text
 
 
@@ -105,11 +108,24 @@ def fill_text(text: str, values: Values) -> str:
     return _PLACE.sub(lambda place: values.get(place[1], place[0]), text)
 
 
+def fill_interface(text: str, values: Values) -> str:
+    """A text of a package of interfaces, or a path in it, with the values in their places."""
+    names = [(key, own) for key, own in values.items() if "/" in key]
+    words = {
+        step: mine
+        for key, own in names
+        for step, mine in zip(key.split("/"), own.split("/"), strict=True)
+        if step
+    }
+    return re.sub(r"\w+", lambda word: words.get(word[0], word[0]), fill_text(text, values))
+
+
 def filled(source: Source, values: Values) -> Source:
     """A document with the values in their places."""
     if not values:
         return source
-    data = {**fill(source.data, values), KEY: source.data[KEY]}
+    kept = {KEY: source.data[KEY]} if KEY in source.data else {}
+    data = {**fill(source.data, values), **kept}
     lines = {
         tuple(fill_text(step, values) if isinstance(step, str) else step for step in place): line
         for place, line in source.lines.items()

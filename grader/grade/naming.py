@@ -9,15 +9,19 @@ from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
+from grader.checks.interface.interface import Found as InterfaceFound
+from grader.checks.interface.interface import OfInterface
 from grader.checks.package.package import PackageFound
 from grader.diagnosis.no_endpoint import ACTION, PUBLISHER, SERVICE, SUBSCRIPTION, NoEndpoint
 from grader.diagnosis.no_executable import why_no_executable
 from grader.diagnosis.not_built import why_not_built
+from grader.diagnosis.not_generated import find_definition
 from grader.errors import AssignmentError, UsageError
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes
 from grader.findings.words import worded
 from grader.recording.model import Recording
+from grader.spec.name import INTERFACE
 from grader.spec.names import Names, Thing, WrongName
 from grader.spec.nearest_name import nearest
 from grader.submission.read.cmake import read_commands
@@ -102,7 +106,50 @@ def named(
         UsageError: The roster has no value for a variable.
     """
     loaded, unnamed = _with_chosen(loaded, submission, recordings)
-    return loaded, _with_stand_ins(loaded, submission), unnamed
+    submission = _with_stand_ins(loaded, submission)
+    interfaces = Names.of(_other_interfaces(loaded, submission))
+    submission = replace(submission, names=submission.names | interfaces)
+    return _with_own_types(loaded, submission), submission, unnamed
+
+
+def _other_interfaces(
+    loaded: LoadedAssignment, submission: SubmissionRecord
+) -> Iterator[WrongName]:
+    """Interfaces under other names: the only other one of the kind, or that of the nearest name."""
+    checks = [one.parameters for one in loaded.checks if isinstance(one.parameters, OfInterface)]
+    asked = {parameters.interface for parameters in checks}
+    for parameters in checks:
+        name = parameters.parts
+        package = submission.package(name.package)
+        if not isinstance(parameters, InterfaceFound) or not parameters.remap or package is None:
+            continue
+        if not isinstance(find_definition(submission, name), Finding):
+            continue
+        paths = [PurePosixPath(one.file) for one in package.definitions]
+        folder = PurePosixPath(package.file(name.kind))
+        names = [one.stem for one in paths if (one.parent, one.suffix) == (folder, f".{name.kind}")]
+        others = [one for one in names if str(replace(name, name=one)) not in asked]
+        meant = others[0] if len(others) == 1 else nearest(name.name, others)
+        if meant and re.fullmatch(INTERFACE, own := f"{package.name}/{name.kind}/{meant}"):
+            yield WrongName(Thing.INTERFACE, own, parameters.interface)
+
+
+def _with_own_types(loaded: LoadedAssignment, submission: SubmissionRecord) -> LoadedAssignment:
+    """The assignment with the student's names of interfaces: the probe cannot rename them."""
+    own = {}
+    for one in submission.names.wrong:
+        if one.thing is Thing.INTERFACE:
+            own[one.asked] = one.own
+        elif (package := submission.package(one.asked)) and package.definitions:
+            own[f"{one.asked}/"] = f"{one.own}/"
+    if not own:
+        return loaded
+    from grader.assignment.selection import with_values
+
+    try:
+        return with_values(loaded, {**loaded.values, **own})
+    except AssignmentError:
+        return loaded
 
 
 def _with_chosen(

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from grader.assignment.interfaces import write_interfaces
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.selection import select
 from grader.errors import UsageError
@@ -17,7 +18,7 @@ from grader.grade import Grade, grade
 from grader.grade.naming import named
 from grader.recording.interaction import Service
 from grader.recording.model import Recording
-from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
+from grader.submission.record import BuildRecord, Definition, PackageRecord, SubmissionRecord
 from tests.checks.builder import recording
 
 TOGGLE = "std_srvs/srv/SetBool"
@@ -300,3 +301,74 @@ def test_a_setup_cfg_that_names_another_package_costs_the_points_of_the_executab
     assert [str(one) for one in finding.names.wrong] == [
         "lib/my_package/bot_pub:=lib/bot_publisher/bot_pub"
     ]
+
+
+OTHER_INTERFACE = """\
+rosgrade: 1
+id: other_interface
+title: Publish
+packages:
+  - {name: bot, executables: [bot]}
+  - {name: bot_msgs, build_type: ament_cmake}
+scenarios:
+  - id: main
+    launch: [{package: bot, executable: bot}]
+    record: [{topic: /status, type: bot_msgs/msg/Status}]
+    timeout: 5 s
+checks:
+  - {id: package, uses: package.found, with: {package: bot_msgs, remap: true}, points: 1}
+  - id: found
+    uses: interface.found
+    with: {interface: bot_msgs/msg/Status, remap: true}
+    points: 1
+  - id: fields
+    uses: interface.fields
+    with: {interface: bot_msgs/msg/Status, definition: uint8 on}
+    points: 1
+    requires: [found]
+  - id: type
+    uses: topic.type
+    with: {topic: /status, type: bot_msgs/msg/Status}
+    points: 1
+"""
+
+
+@pytest.mark.parametrize(
+    ("package", "interface", "lost"),
+    [
+        ("bot_msgs", "State", {"found"}),
+        ("bot_msg", "Status", {"package"}),
+        ("bot_msg", "State", {"package", "found"}),
+    ],
+)
+def test_an_interface_under_another_name_is_used_instead_and_costs_its_own_check(
+    tmp_path: Path, package: str, interface: str, lost: set[str]
+) -> None:
+    folder = tmp_path / "other_interface"
+    own = folder / "interfaces" / "bot_msgs"
+    (own / "msg").mkdir(parents=True)
+    (own / "msg" / "Status.msg").write_text("uint8 on\n", encoding="utf-8")
+    (own / "package.xml").write_text("<name>bot_msgs</name>", encoding="utf-8")
+    (own / "CMakeLists.txt").write_text("project(bot_msgs)\n# msg/Status.msg", encoding="utf-8")
+    (folder / "assignment.yaml").write_text(OTHER_INTERFACE, encoding="utf-8")
+    loaded = load_assignment(folder)
+    definition = Definition(f"{package}/msg/{interface}.msg", "uint8 on\n")
+    record = dataclasses.replace(
+        submission("bot"),
+        packages=(
+            PackageRecord("bot", "bot"),
+            PackageRecord(package, package, "ament_cmake", definitions=(definition,)),
+        ),
+    )
+    found, record, _ = named(loaded, record)
+    type_ = f"{package}/msg/{interface}"
+    assert found.assignment.scenarios[0].record[0].type == type_
+    run = dataclasses.replace(recording(), scenario="main", submission=record, names=record.names)
+    graded = grade(loaded, record, {"main": run})
+    assert {one.id for one in graded.results if one.put_right} == lost
+    assert graded.result("fields").status is Status.PASSED
+    assert type_ in graded.result("type").decisive.finding.expected
+    write_interfaces(folder, found.values, tmp_path / "made")
+    made = tmp_path / "made" / package
+    assert (made / "msg" / f"{interface}.msg").read_text() == "uint8 on\n"
+    assert (made / "CMakeLists.txt").read_text() == f"project({package})\n# msg/{interface}.msg"

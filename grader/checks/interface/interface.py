@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 
 from pydantic import Field as Parameter
 from pydantic import model_validator
@@ -13,6 +14,7 @@ from grader.checks.interface.definition_differences import (
     constant_differences,
     field_differences,
 )
+from grader.checks.wrong_name import Named
 from grader.diagnosis.not_built import existing_package, why_no_manifest
 from grader.diagnosis.not_generated import (
     GENERATORS,
@@ -27,6 +29,7 @@ from grader.findings.wording import code, codes, listing
 from grader.findings.words import worded
 from grader.recording.interface import DefinitionError, Section, sections_of
 from grader.spec.name import InterfaceName as Interface
+from grader.spec.names import Thing
 from grader.submission.record import Definition, PackageRecord, SourceError, SubmissionRecord
 
 _BUILD_KINDS = frozenset({"buildtool_depend", "build_depend", "depend"})
@@ -45,11 +48,21 @@ class OfInterface(Parameters):
         """The name, taken apart."""
         return InterfaceName.of(self.interface)
 
+    def own(self, submission: SubmissionRecord) -> InterfaceName:
+        """The name that the student gave it."""
+        own = submission.names.own(Thing.INTERFACE, self.interface)
+        return replace(self.parts, name=own.rpartition("/")[2])
 
-class Found(OfInterface):
+
+class Found(OfInterface, Named):
     """Parameters of interface.found."""
 
     asks = "a definition in `{self.parts.file}` of `{self.parts.package}`"
+
+    @property
+    def asked_name(self) -> tuple[Thing, str]:
+        """The interface."""
+        return Thing.INTERFACE, self.interface
 
 
 @check("interface.found", Subject.SUBMISSION, Found, concept="interfaces")
@@ -60,13 +73,19 @@ def found(submission: SubmissionRecord, parameters: Found) -> Finding:
     `action/<Name>.action`) beside package.xml. A file in another place also counts if the build
     generated the interface from it.
     """
-    definition = _definition(submission, parameters)
-    return Finding.passed(parameters.asked_for, f"found {code(definition.file)}")
+    definition = find_definition(submission, parameters.parts)
+    if not isinstance(definition, Finding):
+        return Finding.passed(parameters.asked_for, f"found {code(definition.file)}")
+    own = submission.names.own(*parameters.asked_name)
+    if own == parameters.interface:
+        return definition
+    seen = f"{definition.observed}; everything else was judged with {code(own)}"
+    return replace(definition, observed=seen, names=parameters.wrong(own))
 
 
 def _definition(submission: SubmissionRecord, parameters: OfInterface) -> Definition:
     """The student's definition; ends the check if there is none."""
-    definition = find_definition(submission, parameters.parts)
+    definition = find_definition(submission, parameters.own(submission))
     if isinstance(definition, Finding):
         stop_if(definition)
         raise AssertionError
@@ -86,7 +105,7 @@ def generated(submission: SubmissionRecord, parameters: Generated) -> Finding:
     Judged by what `colcon build` installed, not by how CMakeLists.txt is written.
     """
     definition = _definition(submission, parameters)
-    stop_if(why_not_generated(submission, parameters.parts, definition))
+    stop_if(why_not_generated(submission, parameters.own(submission), definition))
     return Finding.passed(parameters.asked_for, "generated and installed")
 
 
