@@ -35,7 +35,6 @@ from grader.findings.wording import code
 from grader.recording.interaction import NO_SERVER, Goal
 from grader.recording.model import Call, Recording
 from grader.spec.name import InterfaceName
-from grader.spec.names import Thing
 
 _MOST_ROWS, _MOST_MOMENTS = 50, 8
 
@@ -51,11 +50,6 @@ class Offered(Named):
     type: InterfaceName | None = Field(
         None, description="Its interface, as `ros2 interface list` shows it; by default any."
     )
-
-    @property
-    def asked_name(self) -> tuple[Thing, str]:
-        """The service or action, in the field of that name."""
-        return Thing(self.word.noun), getattr(self, self.word.noun)
 
     def _asked(self) -> str:
         article = "an" if self.word is ACTION else "a"

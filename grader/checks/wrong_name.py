@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import ClassVar
 
 from pydantic import Field
 
@@ -29,10 +30,14 @@ class Renamable(Parameters):
 class Named(Renamable):
     """Part of the parameters of every check that asks for one thing by its name."""
 
+    thing: ClassVar[Thing]
+    called: ClassVar[str]
+    """Its name in full, made of the parameters."""
+
     @property
     def asked_name(self) -> tuple[Thing, str]:
         """The thing and its name."""
-        raise NotImplementedError
+        return self.thing, self.called.format(self=self)
 
     def wrong(self, own: str) -> Names:
         """That thing under another name."""

@@ -18,7 +18,7 @@ from grader.findings.words import INIT, INPUT, SLEEP, Words, worded
 from grader.measure import declarations
 from grader.recording.model import Ending, Node, Process, Recording
 from grader.spec.name import TOPIC
-from grader.spec.nearest_name import nearest
+from grader.spec.nearest_name import meant, nearest
 
 _LOG_LINES = 10
 # Of `ros2 launch` itself, and what the commands of ros2 hide.
@@ -107,9 +107,8 @@ def meant_node(recording: Recording, name: str) -> str | None:
         return None
     there = {one.name for one in written_nodes(recording) if _NAME.fullmatch(one.name)}
     bases = {one: one.rpartition("/")[2] for one in there}
-    base = name.rpartition("/")[2]
-    alike = nearest(base, bases.values())
-    found = [one for one in there if len(there) == 1 or bases[one] == alike]
+    alike = meant(name.rpartition("/")[2], bases.values())
+    found = [one for one in there if bases[one] == alike]
     return found[0] if len(found) == 1 else None
 
 

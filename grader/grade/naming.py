@@ -23,7 +23,7 @@ from grader.findings.words import worded
 from grader.recording.model import Recording
 from grader.spec.name import INTERFACE
 from grader.spec.names import Names, Thing, WrongName
-from grader.spec.nearest_name import nearest
+from grader.spec.nearest_name import meant, nearest
 from grader.submission.read.cmake import read_commands
 from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
 
@@ -129,8 +129,8 @@ def _other_interfaces(
         folder = PurePosixPath(package.file(name.kind))
         names = [one.stem for one in paths if (one.parent, one.suffix) == (folder, f".{name.kind}")]
         others = [one for one in names if str(replace(name, name=one)) not in asked]
-        meant = others[0] if len(others) == 1 else nearest(name.name, others)
-        if meant and re.fullmatch(INTERFACE, own := f"{package.name}/{name.kind}/{meant}"):
+        other = meant(name.name, others)
+        if other and re.fullmatch(INTERFACE, own := f"{package.name}/{name.kind}/{other}"):
             yield WrongName(Thing.INTERFACE, own, parameters.interface)
 
 

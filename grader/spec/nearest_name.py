@@ -12,6 +12,12 @@ def nearest(name: str, candidates: Iterable[str], *, cutoff: float = 0.6) -> str
     return matches[0] if matches else None
 
 
+def meant(name: str, candidates: Iterable[str]) -> str | None:
+    """What is probably meant by a name that is not there: the only candidate, or the nearest."""
+    found = set(candidates)
+    return found.pop() if len(found) == 1 else nearest(name, found)
+
+
 def did_you_mean(name: str, candidates: Iterable[str]) -> str:
     """Make the sentence to append to an error, or nothing when no name is near."""
     match = nearest(name, candidates)

@@ -70,3 +70,11 @@ def test_packages_of_a_record_of_before_still_stand_in_for_others():
     assert record_of(to_json(found)) == found
     before["stand_ins"] = []
     assert record_of(json.dumps(before, separators=(",", ":")).encode()) == record
+
+
+def test_a_file_is_called_otherwise_wherever_it_is_below_its_folder():
+    wrong = WrongName(Thing.FILE, "share/week3/launch/go.launch.py", "share/bot/launch/b.launch.py")
+    names = Names.of([wrong])
+    assert names.own_file("share/bot", "b.launch.py") == "go.launch.py"
+    assert names.own_file("share/bot", "c.launch.py") == "c.launch.py"
+    assert names.own_file("share/bots", "b.launch.py") == "b.launch.py"

@@ -34,6 +34,7 @@ from grader.findings.words import ARROW, worded
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
+from grader.spec.names import Thing
 from grader.spec.quantity import Duration, Frequency, Ratio
 from grader.spec.unit import format_duration
 
@@ -44,7 +45,7 @@ _ANSWER_S = 1.0
 class ActionExists(Offered):
     """Parameters of action.exists."""
 
-    word = ACTION
+    word, thing, called = ACTION, Thing.ACTION, "{self.action}"
 
     action: TopicName = Field(description="Fully qualified action name.")
 

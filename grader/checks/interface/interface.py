@@ -58,11 +58,7 @@ class Found(OfInterface, Named):
     """Parameters of interface.found."""
 
     asks = "a definition in `{self.parts.file}` of `{self.parts.package}`"
-
-    @property
-    def asked_name(self) -> tuple[Thing, str]:
-        """The interface."""
-        return Thing.INTERFACE, self.interface
+    thing, called = Thing.INTERFACE, "{self.interface}"
 
 
 @check("interface.found", Subject.SUBMISSION, Found, concept="interfaces")

@@ -58,6 +58,7 @@ class NodeExists(Named):
     """Parameters of node.exists."""
 
     asks = "a node `{self.name}`"
+    thing, called = Thing.NODE, "{self.name}"
 
     name: QualifiedNodeName = Field(
         description="Name of the node: `bot` is `/bot`; with a namespace `/robot/bot`."
@@ -65,11 +66,6 @@ class NodeExists(Named):
     publishes: TopicName | None = Field(
         None, description="Topic on which only this node of the student publishes."
     )
-
-    @property
-    def asked_name(self) -> tuple[Thing, str]:
-        """The node."""
-        return Thing.NODE, self.name
 
 
 @check("node.exists", Subject.RECORDING, NodeExists, concept="names")

@@ -46,14 +46,11 @@ class OfPackage(Parameters):
 class PackageFound(OfPackage, Named):
     """Parameters of package.found."""
 
+    thing, called = Thing.PACKAGE, "{self.package}"
+
     build_type: BuildTypes = Field(
         (), description="Expected build type, or several; by default any."
     )
-
-    @property
-    def asked_name(self) -> tuple[Thing, str]:
-        """The package."""
-        return Thing.PACKAGE, self.package
 
     def _asked(self) -> str:
         types = f" with the build type {' or '.join(self.build_type)}" if self.build_type else ""
@@ -114,13 +111,9 @@ class Executable(OfPackage, Named):
 
     needs = (Submitted(executable="executable"),)
     asks = "the executable `{self.executable}`, for `ros2 run {self.package} {self.executable}`"
+    thing, called = Thing.FILE, "lib/{self.package}/{self.executable}"
 
     executable: str = Field(min_length=1, description="Name in the command `ros2 run`.")
-
-    @property
-    def asked_name(self) -> tuple[Thing, str]:
-        """Where it is installed."""
-        return Thing.FILE, f"lib/{self.package}/{self.executable}"
 
 
 @check("package.executable", Subject.SUBMISSION, Executable, concept="packages")

@@ -16,7 +16,7 @@ from grader.findings.finding import Finding
 from grader.findings.wording import code, codes
 from grader.findings.words import worded
 from grader.spec.names import Thing
-from grader.spec.nearest_name import nearest
+from grader.spec.nearest_name import meant
 from grader.submission.record import SubmissionRecord
 
 
@@ -24,17 +24,13 @@ class File(OfPackage, Named):
     """Parameters of package.file."""
 
     asks = "the package installs `share/{self.package}/{self.path}`"
+    thing, called = Thing.FILE, "share/{self.package}/{self.path}"
 
     path: str = Field(
         min_length=1,
         description="Path below `share/<package>/`, such as `launch/robot.launch.py`; `*` and `?` "
         "stand for any text and any character, as in `config/*.yaml`.",
     )
-
-    @property
-    def asked_name(self) -> tuple[Thing, str]:
-        """Where it is installed."""
-        return Thing.FILE, f"share/{self.package}/{self.path}"
 
 
 @check("package.file", Subject.SUBMISSION, File, concept="packages")
@@ -53,11 +49,11 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding:
         # Each package installs its package.xml.
         return Finding.ours("what it installs was not recorded: grade again")
     folder, _, name = parameters.path.rpartition("/")
-    meant = _meant(parameters.path, installed) if parameters.remap else None
-    if meant:
-        seen = f"it installs {code(meant)} instead; everything else was judged with that file"
+    other = _meant(parameters.path, installed) if parameters.remap else None
+    if other:
+        seen = f"it installs {code(other)} instead; everything else was judged with that file"
         hint = f"Call the file {code(name)}, and install it in `share/{package.name}/{folder}`."
-        names = parameters.wrong(f"share/{package.name}/{meant}")
+        names = parameters.wrong(f"share/{package.name}/{other}")
         return Finding(seen, hint, names=names)
     own = [path for path in submission.files if fnmatchcase(path.rpartition("/")[2], name)]
     seen = f"{codes(own)} is handed in, but not installed; " if own else ""
@@ -85,5 +81,4 @@ def _meant(path: str, installed: Iterable[str]) -> str | None:
         for one in others
         if (one.parent, one.suffixes) == (asked.parent, asked.suffixes) and asked.suffix
     ]
-    found = same or kind
-    return found[0] if len(found) == 1 else nearest(path, found)
+    return meant(path, same or kind)

@@ -29,6 +29,7 @@ from grader.findings.wording import code, codes, counted
 from grader.findings.words import EXCLUSIVE, REENTRANT, SLEEP, SPIN_NODE, worded
 from grader.recording.model import NS, Call, Recording
 from grader.spec.name import TopicName
+from grader.spec.names import Thing
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
 
@@ -40,7 +41,7 @@ _TOGETHER, _APART = 0.5, 0.75
 class ServiceExists(Offered):
     """Parameters of service.exists."""
 
-    word = SERVICE
+    word, thing, called = SERVICE, Thing.SERVICE, "{self.service}"
 
     service: TopicName = Field(description="Fully qualified service name.")
 

@@ -28,12 +28,9 @@ PROBE = "rosgrade_probe"
 class Topic(Named):
     """Part of the parameters of the checks of one topic."""
 
-    topic: TopicName = Field(description="Fully qualified topic name.")
+    thing, called = Thing.TOPIC, "{self.topic}"
 
-    @property
-    def asked_name(self) -> tuple[Thing, str]:
-        """The topic."""
-        return Thing.TOPIC, self.topic
+    topic: TopicName = Field(description="Fully qualified topic name.")
 
 
 class Published(Topic):
