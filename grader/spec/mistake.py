@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import fields, is_dataclass
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -37,13 +38,16 @@ def mistakes(
         key = str(found["loc"][-1]) if found["loc"] else ""
         if found["type"] == "missing":
             missing.append((place, key))
-        elif found["type"] == "extra_forbidden":
+        elif found["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
             allowed = _keys(model, found["loc"][:-1])
             meant.add((place[:-1], nearest(key, allowed)))
             advice = nearest_or_all(key, sorted(allowed), "Allowed here")
             unknown.append((place, f"unknown key {key!r}.{advice}"))
         elif not _is_echo(dict(found)):
             others.setdefault(place, []).append(_text(found["type"], dict(found)))
+    # What is wrong inside a value is told, so its form is meant: not another one of a union.
+    told = [*(place for place, _ in unknown), *((*place, key) for place, key in missing), *others]
+    meant_forms = {place[:end] for place in told for end in range(len(place))}
     return [
         *unknown,
         *(
@@ -51,7 +55,11 @@ def mistakes(
             for place, key in missing
             if (place, key) not in meant
         ),
-        *((place, "; or ".join(dict.fromkeys(texts))) for place, texts in others.items()),
+        *(
+            (place, "; or ".join(dict.fromkeys(texts)))
+            for place, texts in others.items()
+            if place not in meant_forms
+        ),
     ]
 
 
@@ -96,7 +104,8 @@ def _quotes(kind: str, value: object) -> str:
 
 _EXPECTED = {
     **dict.fromkeys(
-        ("model_type", "model_attributes_type", "dict_type", "mapping_type"), "keys and values"
+        ("model_type", "model_attributes_type", "dataclass_type", "dict_type", "mapping_type"),
+        "keys and values",
     ),
     **dict.fromkeys(("list_type", "tuple_type", "set_type"), "a list"),
     "string_type": "text",
@@ -127,24 +136,33 @@ def _shown(value: object) -> str:
 
 def _keys(model: type[BaseModel], loc: Place) -> set[str]:
     """Keys that are allowed at a location, as far as the annotations tell."""
-    current = [model]
+    current: list[type[Any]] = [model]
     for step in loc:
         if isinstance(step, int):
             continue
         inner = [
             found
             for one in current
-            for name, field in one.model_fields.items()
-            if step == (field.alias or name)
-            for found in _models_in(field.annotation)
+            for name, annotation in _fields(one).items()
+            if step == name
+            for found in _models_in(annotation)
         ]
         # Anything else than a field is the tag of a union, or a key of a mapping of models.
         tagged = [one for one in current if step == one.__name__]
         current = inner or tagged or current
-    return {field.alias or name for one in current for name, field in one.model_fields.items()}
+    return {name for one in current for name in _fields(one)}
 
 
-def _models_in(annotation: Any) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _fields(model: type[Any]) -> dict[str, Any]:
+    """The keys of a model or a dataclass, and what is written there."""
+    if is_dataclass(model):
+        return {one.name: one.type for one in fields(model)}
+    return {one.alias or name: one.annotation for name, one in model.model_fields.items()}
+
+
+def _models_in(annotation: Any) -> list[type[Any]]:
+    if isinstance(annotation, type) and (
+        issubclass(annotation, BaseModel) or is_dataclass(annotation)
+    ):
         return [annotation]
     return [found for part in get_args(annotation) for found in _models_in(part)]

@@ -100,6 +100,20 @@ def test_a_mistyped_key_is_one_mistake_not_two() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("hint", "mistake"),
+    [
+        ("{python: x}", "hint: the key 'cpp' is missing"),
+        ("{pyton: x, cpp: y}", "hint.pyton: unknown key 'pyton'. Did you mean 'python'?"),
+        ("[x, {python: 1, cpp: y}]", "hint[1].python: expected text, not 1: write it in quotes"),
+    ],
+)
+def test_a_mistake_in_the_hint_of_a_language_is_one_mistake(hint: str, mistake: str) -> None:
+    assert entry(f"{{id: a, uses: b, points: 1, hint: {hint}}}") == [
+        f"assignment.yaml:13: checks[0].{mistake}"
+    ]
+
+
 def test_a_key_unlike_any_other_lists_what_is_allowed() -> None:
     (mistake,) = mistakes("messages: 3\ncolour: red", Until)
     assert mistake == (
