@@ -38,7 +38,8 @@ class Word:
 
     Attributes:
         does: What a node does that has one, before its name.
-        create: The code that makes one; ``{type}`` and ``{name}`` stand for its own.
+        create: The code that makes one; ``{type}``, ``{full}`` (the type with its package) and
+            ``{name}`` stand for its own.
     """
 
     noun: str
@@ -51,7 +52,7 @@ PUBLISHER = Word(
     "publishes on",
     Words(
         python="self.create_publisher({type}, '{name}', 10)",
-        cpp='this->create_publisher<...::{type}>("{name}", 10)',
+        cpp='this->create_publisher<{full}>("{name}", 10)',
     ),
 )
 SUBSCRIPTION = Word(
@@ -59,7 +60,7 @@ SUBSCRIPTION = Word(
     "subscribes to",
     Words(
         python="self.create_subscription({type}, '{name}', self.callback, 10)",
-        cpp='this->create_subscription<...::{type}>("{name}", 10, callback)',
+        cpp='this->create_subscription<{full}>("{name}", 10, callback)',
     ),
 )
 SERVICE = Word(
@@ -67,7 +68,7 @@ SERVICE = Word(
     "offers the service",
     Words(
         python="self.create_service({type}, '{name}', self.callback)",
-        cpp='this->create_service<...::{type}>("{name}", callback)',
+        cpp='this->create_service<{full}>("{name}", callback)',
     ),
 )
 ACTION = Word(
@@ -75,7 +76,7 @@ ACTION = Word(
     "offers the action",
     Words(
         python="ActionServer(self, {type}, '{name}', self.execute_callback)",
-        cpp='rclcpp_action::create_server<...::{type}>(this, "{name}", handle_goal, '
+        cpp='rclcpp_action::create_server<{full}>(this, "{name}", handle_goal, '
         "handle_cancel, handle_accepted)",
     ),
 )
@@ -84,7 +85,7 @@ CLIENT = Word(
     "has a client of",
     Words(
         python="self.create_client({type}, '{name}')",
-        cpp='this->create_client<...::{type}>("{name}")',
+        cpp='this->create_client<{full}>("{name}")',
     ),
 )
 ACTION_CLIENT = Word(
@@ -92,7 +93,7 @@ ACTION_CLIENT = Word(
     "has an action client of",
     Words(
         python="ActionClient(self, {type}, '{name}')",
-        cpp='rclcpp_action::create_client<...::{type}>(this, "{name}")',
+        cpp='rclcpp_action::create_client<{full}>(this, "{name}")',
     ),
 )
 _WORDS = (PUBLISHER, SUBSCRIPTION, SERVICE, ACTION, CLIENT, ACTION_CLIENT)
@@ -138,8 +139,9 @@ class NoEndpoint(Symptom[Finding], concept="names"):
     @property
     def create(self) -> str:
         """The code that creates it."""
-        type_ = self.types[0].rpartition("/")[2] if self.types else "Type"
-        return code(str(self.word.create).format(type=type_, name=self.name.lstrip("/")))
+        names = self.types[0].split("/") if self.types else ["Type"]
+        full, name = "::".join(names), self.name.lstrip("/")
+        return code(str(self.word.create).format(type=names[-1], full=full, name=name))
 
 
 def offered(recording: Recording, word: Word, name: str) -> tuple[Service, ...]:

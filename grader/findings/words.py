@@ -70,3 +70,8 @@ A_PROFILE = Words("a QoSProfile", "an rclcpp::QoS")
 REENTRANT = Words("ReentrantCallbackGroup", "Reentrant callback group")
 EXCLUSIVE = Words("MutuallyExclusiveCallbackGroup", "MutuallyExclusive callback group")
 SILENT_EXCEPT = Words("`except: pass`", "empty `catch (...)`")
+
+
+def group_class(declared: str) -> str:
+    """The class of a callback group; the tracers of both languages declare that of Python."""
+    return str(next((one for one in (EXCLUSIVE, REENTRANT) if one.python == declared), declared))

@@ -8,7 +8,9 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -195,6 +197,29 @@ def test_names_and_printed_lines_stand_in_a_finding_as_they_are(topic: str, line
         assert told[PYTHON].evidence.log == told[CPP].evidence.log
         if check == "messages.count":
             assert f"`{topic}`" in told[CPP].observed
+
+
+@pytest.mark.parametrize(
+    ("check", "parameters", "hint"),
+    [
+        (
+            "service.exists",
+            {"service": "/speed", "type": "std_srvs/srv/SetBool"},
+            'this->create_service<std_srvs::srv::SetBool>("speed", callback)',
+        ),
+        (
+            "qos.offered",
+            {"topic": "/cmd_vel", "durability": "transient_local", "deadline": "300 ms"},
+            "rclcpp::QoS(10).transient_local().deadline(0.3s).",
+        ),
+    ],
+)
+def test_a_hint_in_cpp_is_code_that_compiles(
+    check: str, parameters: dict[str, Any], hint: str
+) -> None:
+    run = recording(endpoints=(endpoint("/cmd_vel"),))
+    with speaking(CPP):
+        assert hint in judge(check, run, **parameters).hint
 
 
 def test_no_sentence_is_said_while_a_module_is_imported() -> None:

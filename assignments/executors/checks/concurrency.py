@@ -7,14 +7,12 @@ from typing import Any
 
 from grader.findings.finding import Finding
 from grader.findings.wording import code, codes, listing
-from grader.findings.words import EXCLUSIVE, REENTRANT, worded
+from grader.findings.words import group_class, worded
 from grader.measure.callback_runs import Run, timed
 from grader.measure.declarations import executors
 from grader.recording.model import Recording
 
 _EXCLUSIVE = "MutuallyExclusiveCallbackGroup"
-# The tracers of both languages declare a group by its class in Python.
-_CALLED = {group.python: group for group in (EXCLUSIVE, REENTRANT)}
 # The clock of a report and that of the tracer may differ by so much.
 _SLACK_NS = 1_000_000
 
@@ -128,7 +126,7 @@ def _groups_of_runs(recording: Recording, kind: str) -> list[tuple[str, Any]]:
 
 
 def _group_words(groups: list[tuple[str, Any]]) -> str:
-    kinds = [str(_CALLED.get(kind, kind)) for kind, _ in dict.fromkeys(groups)]
+    kinds = [group_class(kind) for kind, _ in dict.fromkeys(groups)]
     if len(kinds) == 1:
         return f"one {code(kinds[0])}"
     return codes(kinds) if len(set(kinds)) > 1 else f"{len(kinds)} {code(kinds[0] + 's')}"

@@ -17,7 +17,7 @@ from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.undeclared import why_undeclared
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code, codes, counted, listing
-from grader.findings.words import EXCLUSIVE, REENTRANT, SPIN_NODE, worded
+from grader.findings.words import EXCLUSIVE, REENTRANT, SPIN_NODE, group_class, worded
 from grader.measure.callback_runs import Event, Run, overlaps, paired, spans, timed
 from grader.measure.declarations import (
     declares,
@@ -220,7 +220,9 @@ def kind(recording: Recording, parameters: ExecutorKind) -> Finding:
     pairs = sorted({(run.callback, groups.index(run.group)) for run in runs})
     exclusive = [group.startswith(_EXCLUSIVE) for group in groups]
     parts = [f"a {name} with {counted(threads, 'thread')} spins" for name, threads in spun]
-    parts += [f"{code(name)} is in {groups[of].split()[0]} {of + 1}" for name, of in pairs]
+    parts += [
+        f"{code(name)} is in {group_class(groups[of].split()[0])} {of + 1}" for name, of in pairs
+    ]
     right = [name == wanted and threads >= least for name, threads in spun]
     grouped = {
         "same": len(groups) == 1 and all(exclusive),
