@@ -97,9 +97,9 @@ def fill(value: Any, values: Values, key: str = "") -> Any:
     if not isinstance(value, str):
         return value
     text = fill_text(value, values)
-    if key == "type":
+    if key == "type" and "/" in text:
         package, slash, rest = text.partition("/")
-        return values.get(text, values.get(f"{package}{slash}", f"{package}{slash}") + rest)
+        return values.get(text, values.get(package + slash, package + slash) + rest)
     return int(text) if _PLACE.fullmatch(value) and _NUMBER.fullmatch(text) else text
 
 

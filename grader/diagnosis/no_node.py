@@ -16,6 +16,7 @@ from grader.findings.first_seen import nodes_seen, until_the_end
 from grader.findings.wording import code, codes
 from grader.findings.words import INIT, INPUT, SLEEP, Words, worded
 from grader.measure import declarations
+from grader.recording.interaction import EXECUTOR_SERVICES
 from grader.recording.model import Ending, Node, Process, Recording
 from grader.spec.name import TOPIC
 from grader.spec.nearest_name import meant, nearest
@@ -105,7 +106,13 @@ def meant_node(recording: Recording, name: str) -> str | None:
     if any(ended_early(recording, process) for process in recording.processes):
         # What is missing is perhaps not misnamed.
         return None
-    there = {one.name for one in written_nodes(recording) if _NAME.fullmatch(one.name)}
+    # The probe asks every node for these, and for the rest only one that is called as it must.
+    asked = {
+        call.service.rpartition("/")[0]
+        for call in recording.calls
+        if not call.service.endswith(tuple(EXECUTOR_SERVICES))
+    }
+    there = {one.name for one in written_nodes(recording) if _NAME.fullmatch(one.name)} - asked
     bases = {one: one.rpartition("/")[2] for one in there}
     alike = meant(name.rpartition("/")[2], bases.values())
     found = [one for one in there if bases[one] == alike]

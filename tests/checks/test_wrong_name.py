@@ -69,6 +69,14 @@ def test_the_node_that_was_meant_is_the_only_or_the_nearest_one(nodes, meant):
     assert found == ([f"{meant}:=/bot"] if meant else [])
 
 
+def test_a_node_to_which_the_assignment_speaks_by_its_name_is_not_misnamed():
+    called = (asked(name="/driver/get_parameters"), asked(name="/lamp/list_parameters"))
+    run = recording(nodes=(node("/driver"),), calls=called)
+    assert names("node.exists", run, name="limiter") == []
+    run = recording(nodes=(node("/driver"), node("/lamp")), calls=called)
+    assert names("node.exists", run, name="limiter") == ["/lamp:=/limiter"]
+
+
 def test_a_node_that_is_missing_because_a_process_ended_is_not_misnamed():
     run = recording(nodes=(node("/bots"),), processes=(died(-6, 1.6),), ending=Ending.EXITED)
     assert names("node.exists", run, name="bot") == []
