@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from grader.assignment.contract.table import MARKER, with_table
+from grader.assignment.load import ASSIGNMENT_FILE, load_assignment
 from grader.report.concepts import with_pictures
 
 # In every page as the theme makes it, and what it becomes.
@@ -36,6 +38,14 @@ def _expanded(item: Any, docs: Path) -> Any:
 
 def _as_list(item: Any) -> list[Any]:
     return item if isinstance(item, list) else [item]
+
+
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+    """Put the table that a contract makes into the handout beside it."""
+    folder = Path(page.file.abs_src_path).parent
+    if MARKER not in markdown or not (folder / ASSIGNMENT_FILE).is_file():
+        return markdown
+    return with_table(markdown, load_assignment(folder).assignment.contract)
 
 
 def on_page_content(html: str, **_: Any) -> str:

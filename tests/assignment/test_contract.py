@@ -120,6 +120,24 @@ def test_what_differs_is_written_under_its_id(write: Write) -> None:
     assert period.spec.with_ == {"topic": "/cmd_vel", "period": "100 ms", "spread": "20 %"}
 
 
+def test_a_parameter_of_a_standard_check_is_taken_out_by_null(write: Write) -> None:
+    changed = "  checks: {topic: {with: {remap: null}}}\nscenarios:\n"
+    checks = load_assignment(write(GOOD.replace("scenarios:\n", changed))).assignment.checks
+    (topic,) = (one for one in checks if one.id == "topic")
+    assert topic.with_ == {"topic": "/cmd_vel"}
+
+
+def test_a_row_of_the_handout_tells_all_of_a_parameter(write: Write) -> None:
+    said = "{type: double, default: 0.2, range: [0, 1], read_only: true, described: true}"
+    parameters = f"parameters: {{speed: {said}}}\n          publishes:"
+    place = write(GOOD.replace("publishes:", parameters))
+    (place / "README.md").write_text("<!-- contract -->\n")
+    assert (
+        "| parameter | `speed`, double, default `0.2`, from 0 to 1, read-only, with a description |"
+        in make_handout(load_assignment(place)).text
+    )
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

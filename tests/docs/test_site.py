@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from grader import resources
-from grader.assignment.load import list_assignments
+from grader.assignment.contract.table import rows
+from grader.assignment.load import list_assignments, load_assignment
 
 ROOT = resources.root()
 LINK = re.compile(r"\]\(([^)#\s]+)[^)]*\)")
@@ -29,6 +30,30 @@ class Loaded(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         if tag != "a":
             self.addresses += [value for name, value in attrs if name in ("src", "href") and value]
+
+
+class Tables(HTMLParser):
+    """The rows of all tables of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.rows: list[list[str]] = []
+        self.inside = False
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag == "tr":
+            self.rows.append([])
+        if tag == "td":
+            self.rows[-1].append("")
+        self.inside = tag == "td" or (self.inside and tag == "code")
+
+    def handle_endtag(self, tag: str) -> None:
+        self.inside = self.inside and tag != "td"
+
+    def handle_data(self, data: str) -> None:
+        if self.inside:
+            self.rows[-1][-1] += data
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +83,17 @@ def test_every_page_of_docs_is_in_the_site(site: Path) -> None:
         is_index = page.name in ("index.md", "README.md")
         place = page.parent if is_index else page.with_suffix("")
         assert (site / place / "index.html").is_file(), page
+
+
+def test_a_handout_shows_the_table_that_its_contract_makes(site: Path) -> None:
+    examples = sorted((ROOT / "docs" / "examples").glob("*/assignment.yaml"))
+    assert examples
+    for file in examples:
+        contract = load_assignment(file.parent).assignment.contract
+        assert contract, file
+        page = (site / "examples" / file.parent.name / "index.html").read_text(encoding="utf-8")
+        shown = [" | ".join(row) for row in Tables(page).rows]
+        assert not [row for row in rows(contract) if str(row).replace("`", "") not in shown], file
 
 
 def test_pages_load_nothing_from_other_hosts(site: Path) -> None:

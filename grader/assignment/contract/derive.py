@@ -82,7 +82,8 @@ class Derivation:
         }
         other = self.contract.checks.get(one.id, {})
         if isinstance(other.get("with"), dict):
-            other = {**other, "with": {**asked, **other["with"]}}
+            changed = {**asked, **other["with"]}
+            other = {**other, "with": {key: one for key, one in changed.items() if one is not None}}
         return {name: value for name, value in {**entry, **other}.items() if value not in ([], {})}
 
     def problems(self) -> Iterator[tuple[Place, str]]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from grader.assignment.contract.model import Connection, Contract, Program
+from grader.assignment.contract.model import Connection, Contract, Declared, Program
 from grader.assignment.contract.standard import ANY, leaves, period_of
 from grader.findings.wording import codes, listing
 from grader.spec.document import Place
@@ -82,11 +82,8 @@ def _program(executable: str, program: Program, place: Place) -> Iterator[Row]:
         for name, server in getattr(program, key).items():
             yield Row(label, f"`{name}`, type `{server.type}`", (*place, key, name), (fact,))
     for name, parameter in program.parameters.items():
-        kind = f", {parameter.type}" if parameter.type else ""
-        default = "" if parameter.default is None else f", default {_written(parameter.default)}"
-        yield Row(
-            "parameter", f"`{name}`{kind}{default}", (*place, "parameters", name), ("parameter",)
-        )
+        text = ", ".join((f"`{name}`", *_declared(parameter)))
+        yield Row("parameter", text, (*place, "parameters", name), ("parameter",))
     if program.leaves_alone not in ((), "robot"):
         yield Row("does not publish on", codes(program.leaves_alone), place, ("untouched",))
     ends = f", and ends within {program.ends} of it" if program.ends else ""
@@ -95,6 +92,19 @@ def _program(executable: str, program: Program, place: Place) -> Iterator[Row]:
     if program.responsive:
         answers = f"within {program.responsive.get('within', 'a second')}"
         yield Row("answers services", answers, place, ("responsive",))
+
+
+def _declared(part: Declared) -> Iterator[str]:
+    if part.type:
+        yield part.type
+    if part.default is not None:
+        yield f"default `{_written(part.default)}`"
+    if part.range:
+        yield f"from {_written(part.range[0])} to {_written(part.range[1])}"
+    if part.read_only:
+        yield "read-only"
+    if part.described:
+        yield "with a description"
 
 
 def _connection(topic: str, part: Connection) -> str:
