@@ -115,7 +115,7 @@ class Grade:
         """Wrong names to put right, by the scenario that needs it.
 
         A name that is wrong in one scenario is wrong wherever one of its programs is launched. What
-        lies in a namespace follows the node; only what is wrong then is put right for itself.
+        lies in the namespace of a node follows it; what is wrong even then is put right by itself.
         """
         programs = {
             scenario.id: {(launch.package, launch.program) for launch in scenario.launch}
@@ -129,20 +129,20 @@ class Grade:
         }
         asked = {result.asked_name for result in self.results}
         wrong = [
-            (one, programs.get(item.scenario or ""))
+            (one, programs.get(item.scenario or ""), result.put_right)
             for result in self.results
             for item in result.findings
             for one in item.finding.names.wrong
             if (one.thing, one.own) not in asked
         ]
-        nodes = [one for one, _ in wrong if one.thing is Thing.NODE]
+        untried = [one for one, _, is_put_right in wrong if not is_put_right]
         return {
             name: Names.of(
                 one
-                for one, others in wrong
+                for one, others, _ in wrong
                 if others is None or not others.isdisjoint(launched)
                 if not (one.rules and name in of_files)
-                if not any(node.explains(one) for node in nodes)
+                if not any(other.explains(one) for other in untried)
             )
             for name, launched in programs.items()
         }

@@ -459,6 +459,9 @@ def test_what_lies_in_the_namespace_of_a_misnamed_node_is_put_right_with_it():
     ]
     result = judge(*checks, recordings={"listen": make_recording()})
     assert result.names == {"listen": node | other}
+    # It has an absolute name.
+    again = judge(*checks, recordings={"listen": make_recording(names=node)})
+    assert again.names == {"listen": node | other | topic}
 
 
 def test_what_another_check_asks_for_is_not_misnamed():
