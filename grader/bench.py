@@ -38,7 +38,7 @@ from grader.run.runner import Runner, RunRequest
 from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose
 from grader.submission.build.build_cache import BUILDS
-from grader.submission.prepare import Prepared, prepare
+from grader.submission.prepare import Preparation, Prepared, prepare
 
 CLASSES = {"timed_publisher": 100, "bot_controller": 40, "p_controller": 40}
 """Assignment, without and with a robot -> size of its class."""
@@ -118,9 +118,8 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
         print(notice, file=sys.stderr)
     for name, count in CLASSES.items():
         loaded = load_assignment(name)
-        prepared = prepare(
-            reference_of(name), ros.find(), cache=folder / "batch-cache", sandbox=sandbox
-        )
+        how = Preparation(ros.find(), folder / "batch-cache", sandbox=sandbox)
+        prepared = prepare(reference_of(name), how)
         with Runner(ros.find(), Admission(), sandbox=sandbox) as runner:
             grading = Grading(loaded, runner, folder / "batch-cache")
             work = partial(_grade_into, grading, prepared, folder / name)
@@ -164,9 +163,8 @@ def _cell(samples: Samples, folder: Path, _: int) -> None:
     sandbox, _notice = choose(Choice.AUTO, folder / "cell-cache")
     for what, (name, scenario_id) in CELLS.items():
         loaded = load_assignment(name)
-        prepared = prepare(
-            reference_of(name), ros.find(), cache=folder / "cell-cache", sandbox=sandbox
-        )
+        how = Preparation(ros.find(), folder / "cell-cache", sandbox=sandbox)
+        prepared = prepare(reference_of(name), how)
         (scenario,) = (one for one in loaded.assignment.scenarios if one.id == scenario_id)
         assert prepared.install is not None
         with Runner(ros.find(), sandbox=sandbox) as runner:

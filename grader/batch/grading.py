@@ -34,7 +34,7 @@ from grader.spec.names import Names
 from grader.submission.build.bounded import OutputLimits
 from grader.submission.build.colcon import BuildLimits
 from grader.submission.build.own_tests import LIBRARY
-from grader.submission.prepare import Prepared, prepare
+from grader.submission.prepare import Preparation, Prepared, prepare
 from grader.submission.record import SubmissionRecord
 
 RECORDINGS_FOLDER = "recordings"
@@ -122,10 +122,9 @@ class Grading:
             loaded, record, _ = named(self._loaded, replace(record, given=outside))
             return frozenset(one.name for name in _tested(loaded) if (one := record.package(name)))
 
-        prepared = prepare(
-            path,
+        how = Preparation(
             ros,
-            cache=self._cache,
+            self._cache,
             limits=self._build_limits,
             on_progress=on_build,
             sandbox=sandbox,
@@ -136,6 +135,7 @@ class Grading:
             with_bags=self._with_bags,
             place=self._build_place,
         )
+        prepared = prepare(path, how)
         if name is not None:
             prepared = prepared.named(name)
         prepared = replace(prepared, record=replace(prepared.record, given=outside))

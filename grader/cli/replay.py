@@ -49,7 +49,7 @@ def replay(
     from grader.run.replay import replay_scenario
     from grader.run.runner import RunRequest
     from grader.submission.intake.locate import check_path
-    from grader.submission.prepare import prepare
+    from grader.submission.prepare import Preparation, prepare
 
     recorded = read_recording(recording)
     found = find(recording)
@@ -62,7 +62,8 @@ def replay(
     installation = ros.find()
     with progress.shown():
         installation = TypeSupport(loaded, installation, cache_folder()).student(progress.say)
-        prepared = prepare(submission, installation, cache=cache_folder(), on_progress=progress.say)
+        how = Preparation(installation, cache_folder(), on_progress=progress.say)
+        prepared = prepare(submission, how)
         record = replace(prepared.record, given=recorded.submission.given)
         loaded, _, _ = named(loaded, record, {recorded.scenario: recorded})
         type_support = TypeSupport(loaded, ros.find(), cache_folder()).prefixes(progress.say)

@@ -7,7 +7,7 @@ import os
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -60,27 +60,11 @@ class Prepared:
         return replace(self, record=replace(self.record, id=name))
 
 
-def prepare(
-    path: Path | str,
-    ros: RosInstallation,
-    *,
-    cache: Path,
-    limits: BuildLimits | None = None,
-    on_progress: Callable[[str], None] = lambda _: None,
-    sandbox: Sandbox | None = None,
-    stop: threading.Event | None = None,
-    on_output: Callable[[str], None] = lambda _: None,
-    tested: Callable[[SubmissionRecord], frozenset[str]] = lambda _: frozenset(),
-    source_folder: Path | None = None,
-    with_bags: bool = False,
-    place: Callable[[bool], AbstractContextManager[object]] = nullcontext,
-) -> Prepared:
-    """Find the packages of a submission, read them, build them.
+@dataclass(frozen=True)
+class Preparation:
+    """How a submission is read and built.
 
-    Nothing that a student can do wrong raises: it is in the record's ``problem``, in a package's
-    ``manifest_error``, or in ``build``.
-
-    Args:
+    Attributes:
         ros: With what underlays the assignment names.
         sandbox: What it is built in, or None.
         on_output: Called with each line of the build's log as it comes; an earlier build's log
@@ -90,31 +74,52 @@ def prepare(
         with_bags: Whether its bags are read.
         place: Entered for the time of the build, and with True for one that is repeated because of
             the machine: nothing else of rosgrade's is to run beside that.
+    """
+
+    ros: RosInstallation
+    cache: Path
+    limits: BuildLimits = field(default_factory=BuildLimits)
+    on_progress: Callable[[str], None] = lambda _: None
+    sandbox: Sandbox | None = None
+    stop: threading.Event | None = None
+    on_output: Callable[[str], None] = lambda _: None
+    tested: Callable[[SubmissionRecord], frozenset[str]] = lambda _: frozenset()
+    source_folder: Path | None = None
+    with_bags: bool = False
+    place: Callable[[bool], AbstractContextManager[object]] = nullcontext
+
+
+def prepare(path: Path | str, how: Preparation) -> Prepared:
+    """Find the packages of a submission, read them, build them.
+
+    Nothing that a student can do wrong raises: it is in the record's ``problem``, in a package's
+    ``manifest_error``, or in ``build``.
 
     Raises:
         UsageError: Nothing is at ``path``, or it is a URL.
         GraderFault: It cannot be graded here, for no fault of the student.
     """
     source = check_path(path)
-    on_progress("reading the submission")
-    store = UnderlayStore(cache, replace(ros, underlays=()), on_progress, stop=stop)
+    how.on_progress("reading the submission")
+    installed = replace(how.ros, underlays=())
+    store = UnderlayStore(how.cache, installed, how.on_progress, stop=how.stop)
     builder = Builder(
-        ros=ros,
-        cache=BuildCache(cache),
-        limits=limits or BuildLimits(),
-        sandbox=sandbox,
-        stop=stop,
-        on_progress=on_progress,
-        on_output=on_output,
+        ros=how.ros,
+        cache=BuildCache(how.cache),
+        limits=how.limits,
+        sandbox=how.sandbox,
+        stop=how.stop,
+        on_progress=how.on_progress,
+        on_output=how.on_output,
     )
 
     def attempt(is_second: bool) -> Prepared:
-        with place(is_second), opened(source) as located:
-            if source_folder is not None:
-                keep_source(located.root, source_folder)
-            bags = read_bags(located, ros, sandbox) if with_bags else None
+        with how.place(is_second), opened(source) as located:
+            if how.source_folder is not None:
+                keep_source(located.root, how.source_folder)
+            bags = read_bags(located, how.ros, how.sandbox) if how.with_bags else None
             builds = replace(builder, is_second=is_second)
-            prepared = _prepare(located, builds, store, tested)
+            prepared = _prepare(located, builds, store, how.tested)
             return replace(prepared, record=replace(prepared.record, bags=bags))
 
     try:

@@ -13,7 +13,7 @@ from grader.sandbox.limits import BUILD, MIB
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
 from grader.submission.build.colcon import BuildLimits
-from grader.submission.prepare import Prepared, prepare
+from grader.submission.prepare import Preparation, Prepared, prepare
 from tests.checks.builder import judge
 from tests.submission.samples import MANIFEST, Tree
 
@@ -57,9 +57,9 @@ def built(
     tree.write({f"{FOLDER}/{name}": text for name, text in {**files, **(changes or {})}.items()})
     cache = tree.root.parent / "cache"
     if not memory_mib:
-        return prepare(tree.root, ros, cache=cache)
+        return prepare(tree.root, Preparation(ros, cache))
     limits = BuildLimits(room=replace(BUILD, memory_bytes=memory_mib * MIB))
-    return prepare(tree.root, ros, cache=cache, limits=limits, sandbox=Sandbox(cache))
+    return prepare(tree.root, Preparation(ros, cache, limits=limits, sandbox=Sandbox(cache)))
 
 
 def judged(found: Prepared, check: str = "package.builds") -> Finding:

@@ -12,7 +12,7 @@ from grader.ros import find as find_ros
 from grader.sandbox.limits import BUILD, MIB
 from grader.sandbox.sandbox import Sandbox
 from grader.submission.intake.locate import opened
-from grader.submission.prepare import prepare
+from grader.submission.prepare import Preparation, prepare
 from grader.submission.read import bag as bag_reader
 from grader.submission.read.bag import read_bags
 from grader.submission.read.document import headings
@@ -106,7 +106,7 @@ def test_a_bag_is_read_only_where_a_check_asks_for_it(tmp_path: Path) -> None:
     write_bag(tmp_path / "submission", "MCAP")
     for asked in (True, False):
         record = prepare(
-            tmp_path / "submission", find_ros(), cache=tmp_path / "cache", with_bags=asked
+            tmp_path / "submission", Preparation(find_ros(), tmp_path / "cache", with_bags=asked)
         ).record
         assert (record.bags is not None) is asked
 

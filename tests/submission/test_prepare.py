@@ -9,12 +9,12 @@ import pytest
 
 from grader.errors import UsageError
 from grader.ros import RosInstallation
-from grader.submission.prepare import Prepared, fingerprint, prepare
+from grader.submission.prepare import Preparation, Prepared, fingerprint, prepare
 from tests.submission.samples import NODE, Tree, tar_bytes, tar_member, zip_bytes
 
 
 def prepared(path: Path, ros: RosInstallation) -> Prepared:
-    return prepare(path, ros, cache=path.parent / "cache")
+    return prepare(path, Preparation(ros, path.parent / "cache"))
 
 
 def problem(path: Path, ros: RosInstallation) -> str:

@@ -11,7 +11,7 @@ import pytest
 from grader.ros import RosInstallation
 from grader.submission.build.standalone_build import lay, standalone
 from grader.submission.intake.locate import only, opened
-from grader.submission.prepare import Prepared, prepare
+from grader.submission.prepare import Preparation, Prepared, prepare
 from grader.submission.read.package import read_package
 from grader.submission.record import Definition
 from tests.submission.samples import CMAKE_OF_MSGS as CMAKE
@@ -133,7 +133,7 @@ def test_an_install_space_is_laid_where_it_belongs(tmp_path: Path) -> None:
 
 
 def built(tree: Tree, ros: RosInstallation) -> Prepared:
-    return prepare(tree.root, ros, cache=tree.root.parent / "cache")
+    return prepare(tree.root, Preparation(ros, tree.root.parent / "cache"))
 
 
 def kept(tree: Tree) -> set[str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader import ros as ros_module
-from grader.submission.prepare import prepare
+from grader.submission.prepare import Preparation, prepare
 from tests.submission.samples import MANIFEST, Tree
 
 pytestmark = [pytest.mark.ros, pytest.mark.compiles, pytest.mark.slow, pytest.mark.timeout(900)]
@@ -75,6 +75,6 @@ def test_every_way_to_use_a_package_of_ros_in_cmake_builds(tree: Tree, tmp_path:
             }
         )
     tree.write({"src/below/below/CMakeLists.txt": WAYS["by_ament"]})
-    build = prepare(tree.root, ros_module.find(), cache=tmp_path / "cache").record.build
+    build = prepare(tree.root, Preparation(ros_module.find(), tmp_path / "cache")).record.build
     assert build is not None
     assert (build.failed_packages, "Warning" in build.log) == ((), False), build.log
