@@ -112,32 +112,38 @@ def why_not_taken(recording: Recording, names: Iterable[str]) -> Finding | None:
 
 
 def why_for_no_node(recording: Recording) -> Finding | None:
-    """Why no node gets the values of a parameter file that a launch file uses, or None."""
+    """Why a parameter file gives nothing to a node of a launch file that has values from no other.
+
+    None where each node has some, and where all files are for nodes that do not run.
+    """
     submission = recording.submission
     programs = {name for package in submission.packages for name in package.executables}
     launched = {one.name.rpartition("/")[2] for one in recording.processes} - programs
     nodes = [one.name for one in written_nodes(recording)]
-    bases = [name.rpartition("/")[2] for name in nodes]
-    if not nodes or not any(name.endswith(_LAUNCH_FILES) for name in launched):
+    entries = [(file.path, *entry) for file in submission.parameter_files for entry in file.nodes]
+    lacking = {
+        node.rpartition("/")[2]: node
+        for node in nodes
+        if not any(_addresses(key, node) for _, key, _ in entries)
+    }
+    if not lacking or not any(name.endswith(_LAUNCH_FILES) for name in launched):
         return None
-    for file in submission.parameter_files:
-        if any(_addresses(key, node) for key, _ in file.nodes for node in nodes):
+    for path, key, line in entries:
+        base = key.rpartition("/")[2]
+        like = nearest(base, lacking)
+        # What is for another program may be right: that does not run here.
+        is_unlike = like is None and (base in programs or len(entries) > 1)
+        if is_unlike or any(_addresses(key, node) for node in nodes):
             continue
-        for key, line in file.nodes:
-            base = key.rpartition("/")[2]
-            like = nearest(base, bases)
-            # What is for another program may be right: that does not run here.
-            if like is None and base in programs:
-                continue
-            right = nodes[bases.index(like)] if like else nodes[0]
-            place = SourceError(file.path, line, f"its values are for {key}")
-            return Finding(
-                f"{code(file.path)} gives values to {code(key)}, and there is no such node: found "
-                f"{codes(nodes)}",
-                f"Write {code(right)} in this file, above `ros__parameters:`; {code('/**')} stands "
-                "for any node.",
-                Evidence(nodes_seen(recording), (place,)),
-            )
+        right = lacking[like] if like else next(iter(lacking.values()))
+        place = SourceError(path, line, f"its values are for {key}")
+        return Finding(
+            f"{code(path)} gives values to {code(key)}, and there is no such node: found "
+            f"{codes(nodes)}",
+            f"Write {code(right)} in this file, above `ros__parameters:`; {code('/**')} stands "
+            "for any node.",
+            Evidence(nodes_seen(recording), (place,)),
+        )
     return None
 
 

@@ -70,6 +70,9 @@ def test_a_file_for_another_node_is_named_with_the_name_that_is_right(text, node
         of("/**/driver"),
         of("monitor"),
         of("monitor") + of("/lab/driver"),
+        # Of two robots only one runs.
+        of("/lab/driver") + of("/other/driver"),
+        of("amcl") + of("planner_server"),
     ],
 )
 def test_a_file_that_is_for_the_node_or_for_a_program_that_does_not_run_is_right(text):
