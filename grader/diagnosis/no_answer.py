@@ -9,7 +9,13 @@ from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_endpoint import Word, offered
 from grader.diagnosis.process.blocked_executor import at_its_place, blocked_hint, why_never_spun
 from grader.diagnosis.process.process_exit import ended_early, exited, why_it_exited
-from grader.diagnosis.process.raised import in_brackets, own_frames, parse_failures, raised_at
+from grader.diagnosis.process.raised import (
+    READ_MESSAGE,
+    in_brackets,
+    own_frames,
+    parse_failures,
+    raised_at,
+)
 from grader.diagnosis.process.standing import Stand, where_it_stands
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.words import worded
@@ -229,12 +235,7 @@ def why_raised(
         place = raised_at(raised, recording)
         return Finding(
             f"{what}: an exception was raised meanwhile, {raised}{in_brackets(place)}",
-            "Correct the line that is named here."
-            if place
-            else worded(
-                python="Read the traceback from its last line.",
-                cpp="Read the message of the exception: what() prints it.",
-            ),
+            "Correct the line that is named here." if place else str(READ_MESSAGE),
             Evidence(
                 moments=(Moment("the exception", recording.since_launch_s(lines[-1].time_ns)),),
                 places=(place,) if place else (),

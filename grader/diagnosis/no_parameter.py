@@ -35,6 +35,14 @@ def declare_parameter(name: str, default: str = "default") -> str:
     )
 
 
+def get_parameter(name: str) -> str:
+    """The code that reads a parameter."""
+    return worded(
+        python=f"self.get_parameter('{name}').value",
+        cpp=f'this->get_parameter("{name}").get_value<...>()',
+    )
+
+
 @dataclass(frozen=True)
 class NotDeclared(Symptom[Finding]):
     """A parameter is not declared."""
@@ -102,11 +110,7 @@ def why_not_taken(recording: Recording, names: Iterable[str]) -> Finding | None:
     return Finding(
         f"the launch gives {codes(lacking)}, but no node declares {_it(lacking)}{others}",
         f"Call {declare_parameter(lacking[0])} in the node's constructor, and read it with "
-        + worded(
-            python=f"self.get_parameter('{lacking[0]}').value",
-            cpp=f'this->get_parameter("{lacking[0]}").get_value<...>()',
-        )
-        + ". A parameter that is not declared is ignored.",
+        f"{get_parameter(lacking[0])}. A parameter that is not declared is ignored.",
         Evidence(moments=answered_at(recording, answered)),
     )
 

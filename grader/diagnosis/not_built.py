@@ -10,7 +10,7 @@ from grader.diagnosis.build_error import EMPTY_HINT, BuildError
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.findings.finding import Evidence, Finding, Status
 from grader.findings.wording import code, codes
-from grader.findings.words import Words, worded
+from grader.findings.words import worded
 from grader.spec.name import package_name
 from grader.spec.names import Thing
 from grader.spec.nearest_name import nearest
@@ -36,26 +36,6 @@ _CHATTER = re.compile(r"Starting +>>>|(Finished|Failed|Aborted) +<<<|Summary:|\s
 # What CMake tells of its work, and how far make is.
 _STEPS = re.compile(r"-- |\[ *\d+%\] (?!Building)")
 _CMAKE = ("ament_cmake", "cmake")
-# Whether a build that did not end waited, or None where that is not known -> what to look for.
-_LOOK_FOR = {
-    None: Words(
-        python="Look for input(), an endless loop or a long computation in setup.py or "
-        "CMakeLists.txt.",
-        cpp="Look for an endless loop in CMakeLists.txt, and for templates and constexpr functions "
-        "that keep the compiler busy.",
-    ),
-    True: Words(
-        python="It waited: look for input(), a sleep, a lock or a download in setup.py or "
-        "CMakeLists.txt.",
-        cpp="It waited: look for a sleep, a lock or a download in CMakeLists.txt.",
-    ),
-    False: Words(
-        python="It kept computing: look for an endless loop or a long computation in setup.py or "
-        "CMakeLists.txt.",
-        cpp="It kept computing: look for an endless loop in CMakeLists.txt, and for templates and "
-        "constexpr functions that keep the compiler busy.",
-    ),
-}
 # What the build adds at the end when it ended colcon itself.
 _OURS = re.compile(r"\n\[rosgrade: (.+)\]\n\Z")
 
@@ -219,9 +199,23 @@ def build_takes_too_long(symptom: NotBuilt) -> Finding | None:
     begun = [one for one in build.failed_packages if _failed_itself(build, one)]
     if not build.timed_out or name not in (begun or build.failed_packages or [name]):
         return None
+    waits = worded(
+        python="input(), a sleep, a lock or a download in setup.py or CMakeLists.txt",
+        cpp="a sleep, a lock or a download in CMakeLists.txt",
+    )
+    computes = worded(
+        python="an endless loop or a long computation in setup.py or CMakeLists.txt",
+        cpp="an endless loop in CMakeLists.txt, and for templates and constexpr functions that "
+        "keep the compiler busy",
+    )
+    looked_for = {
+        None: f"Look for {worded('input(), ', '')}{computes}.",
+        True: f"It waited: look for {waits}.",
+        False: f"It kept computing: look for {computes}.",
+    }
     return Finding(
         "`colcon build` did not finish within its time limit and was ended",
-        str(_LOOK_FOR[build.waited]),
+        looked_for[build.waited],
         _evidence(build, name),
     )
 

@@ -38,10 +38,6 @@ _REFUSAL = Words(
     python="SetParametersResult(successful=False, reason='...')",
     cpp="a SetParametersResult with successful = false and a reason",
 )
-_GIVE = Words(
-    python="Give declare_parameter() a ParameterDescriptor",
-    cpp="Give declare_parameter() a third argument, a ParameterDescriptor",
-)
 
 
 class OfParameter(Parameters):
@@ -144,20 +140,27 @@ def _why_other_descriptor(
         kind = "IntegerRange" if found.type == "integer" else "FloatingPointRange"
         return Finding(
             f"its range is {_range_words(found.range)}" if found.range else "it has no range",
-            f"{_GIVE} with a {kind}"
-            + worded(
-                "(from_value=..., to_value=..., step=...).", " with from_value, to_value and step."
+            _give(
+                f" with a {kind}(from_value=..., to_value=..., step=...)",
+                f" with a {kind} with from_value, to_value and step",
             ),
             shown,
         )
     if parameters.read_only not in (None, found.read_only):
         seen = "it is read-only" if found.read_only else "it is not read-only"
-        read_only = worded(f"(read_only={parameters.read_only})", " with read_only set")
-        return Finding(seen, f"{_GIVE}{read_only}.", shown)
+        hint = _give(f"(read_only={parameters.read_only})", " with read_only set")
+        return Finding(seen, hint, shown)
     if parameters.described and not found.description.strip():
-        described = worded("(description='...')", " with a description")
-        return Finding("it has no description", f"{_GIVE}{described}.", shown)
+        hint = _give("(description='...')", " with a description")
+        return Finding("it has no description", hint, shown)
     return None
+
+
+def _give(python: str, cpp: str) -> str:
+    return worded(
+        python=f"Give declare_parameter() a ParameterDescriptor{python}.",
+        cpp=f"Give declare_parameter() a third argument, a ParameterDescriptor{cpp}.",
+    )
 
 
 def _evidence(

@@ -15,12 +15,13 @@ from grader.checks.need import ParameterSet, Recorded
 from grader.checks.parameter.parameter import OfSetting, refusal, settings_to
 from grader.diagnosis.no_answer import why_raised, why_taken
 from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.no_parameter import get_parameter
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.fields import FieldTolerance, difference_table, difference_words, unlike, words
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.value import EXACT
 from grader.findings.wording import code, counted, percent, value_text
-from grader.findings.words import Words, worded
+from grader.findings.words import Words
 from grader.measure.parameter_calls import settings
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
@@ -154,12 +155,8 @@ def _why_other_message(
     hint = f"Look at how the node uses {code(parameters.name)} where it publishes."
     if any(wrong == unlike(one.value, parameters.fields, parameters.tolerance) for one in before):
         hint = (
-            "The message is as it was before: read "
-            + worded(
-                python=f"self.get_parameter('{parameters.name}').value",
-                cpp=f'this->get_parameter("{parameters.name}")',
-            )
-            + " in the callback, or keep the new value in add_post_set_parameters_callback()."
+            f"The message is as it was before: read {get_parameter(parameters.name)} in the "
+            "callback, or keep the new value in add_post_set_parameters_callback()."
         )
     taken = why_taken(recording, seen, set_ns, message.stamp_ns, parameters.within)
     table = difference_table("That message", wrong)

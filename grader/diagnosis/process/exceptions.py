@@ -11,9 +11,8 @@ from pydantic import Field
 
 from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
 from grader.diagnosis.process.failure import Failure, Frame
-from grader.diagnosis.process.raised import student_place
+from grader.diagnosis.process.raised import READ_MESSAGE, student_place
 from grader.findings.wording import code, listing
-from grader.findings.words import worded
 from grader.recording.model import Recording
 from grader.spec.source import Model, read_source
 from grader.submission.record import CPP, PYTHON, PackageRecord, SubmissionRecord
@@ -200,7 +199,4 @@ def any_exception(symptom: Raised) -> str | None:
         return _GDB
     if not symptom.failure.frames:
         return None
-    return worded(
-        python="Read the traceback from its last line upwards.",
-        cpp="Read the message of the exception: what() prints it.",
-    )
+    return str(READ_MESSAGE)

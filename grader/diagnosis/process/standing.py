@@ -21,38 +21,32 @@ ASK_AND_RETURN = Words(
     cpp="Instead of future.get() or spin_until_future_complete() give async_send_request() or "
     "async_send_goal() a callback, return, and go on in that.",
 )
-_UNTAKEN = (
-    "It waits for an answer that the executor can take in only when this callback has returned."
-)
-_WAITS_FOR_ITSELF = (
-    "Do not spin or wait for a future in a callback: what it waits for can come only when the "
-    "callback has returned. Return, and go on in the callback "
-)
-# What a line waits for -> what to do about it in a callback.
+# What a line waits for -> why that does not end in a callback, and what to do instead.
 _WAITS = (
     (
         r"\brate\w*\.sleep\(",
-        "A rate waits for a timer that the same executor must call, so it waits for ever. Remove "
-        "it: what calls the callback already sets the rhythm.",
+        "A rate waits for a timer that the same executor must call, so it waits for ever.",
+        "Remove it: what calls the callback already sets the rhythm.",
     ),
     (
         r"\.call\(",
-        Words(
-            python=f"{_UNTAKEN} {ASK_AND_RETURN.python}",
-            cpp=f"{_UNTAKEN} {ASK_AND_RETURN.cpp}",
-        ),
+        "It waits for an answer that the executor can take in only when this callback has "
+        "returned.",
+        ASK_AND_RETURN,
     ),
     (
         r"\bspin|future|\.done\(|\.result\(",
+        "Do not spin or wait for a future in a callback: what it waits for can come only when the "
+        "callback has returned. Return, and go on in the callback",
         Words(
-            python=f"{_WAITS_FOR_ITSELF}of future.add_done_callback().",
-            cpp=f"{_WAITS_FOR_ITSELF}that async_send_request() or async_send_goal() is given.",
+            python="of future.add_done_callback().",
+            cpp="that async_send_request() or async_send_goal() is given.",
         ),
     ),
     (
         r"lock|acquire\(",
-        "Something holds this lock already, perhaps the same callback, and never releases it. A "
-        "callback that holds a lock must not call a method that takes it again.",
+        "Something holds this lock already, perhaps the same callback, and never releases it.",
+        "A callback that holds a lock must not call a method that takes it again.",
     ),
 )
 # What g++ says of a future that is not kept.
@@ -154,7 +148,7 @@ def _stand(found: Standing, place: SourceError, words: str) -> Stand:
 
 
 def _waits(text: str) -> bool:
-    return any(re.search(pattern, text) for pattern, _ in _WAITS)
+    return any(re.search(pattern, text) for pattern, *_ in _WAITS)
 
 
 def _text(found: Standing) -> str:
@@ -192,8 +186,8 @@ def _hint(text: str, loop: str, in_callback: bool) -> str:
             "Put one step of it into a callback, which is called again and again, and let main() "
             f"go on to {SPIN_NODE}."
         )
-    for pattern, hint in _WAITS:
+    for pattern, why, instead in _WAITS:
         if re.search(pattern, text) or re.search(pattern, loop):
-            return str(hint)
+            return f"{why} {instead}"
     is_loop = loop or text.startswith(("while ", "for "))
     return _LOOP if is_loop else _SLEEP
