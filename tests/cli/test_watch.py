@@ -110,8 +110,7 @@ def test_the_author_s_own_yaml_is_read_again_and_a_mistake_in_it_ends_nothing(
     shutil.copytree(ROOT / "assignments" / "timed_publisher", assignment)
     yaml = assignment / "assignment.yaml"
     right = yaml.read_text(encoding="utf-8")
-    title = "The package bot_publisher is there"
-    assert title in right
+    title, points = "The package bot_publisher is there", "{package: 0.1"
     # The report lies in the assignment's own folder, as it does for an author who works there.
     watch = subprocess.Popen(
         [sys.executable, "-m", "grader", "watch", ".", str(REFERENCE), "--only", "package"],
@@ -125,12 +124,13 @@ def test_the_author_s_own_yaml_is_read_again_and_a_mistake_in_it_ends_nothing(
     assert watch.stdout is not None
     try:
         assert title in read_until(watch.stdout, "Ctrl-C ends")
-        yaml.write_text(right.replace("uses: package.found", "uses: package.fund"))
+        yaml.write_text(right.replace(points, "{pakage: 0.1"))
         told = read_until(watch.stdout, "Ctrl-C ends")
-        line = right[: right.index("uses: package.found")].count("\n") + 1
-        assert f"assignment.yaml:{line}: " in told and "package.found" in told
+        line = right[: right.index(points)].count("\n") + 1
+        assert f"assignment.yaml:{line}: " in told and "Did you mean 'package'?" in told
         assert "Score" not in told
-        yaml.write_text(right.replace(title, "Somebody handed in a package"))
+        other = "  checks:\n    package: {title: Somebody handed in a package}\n"
+        yaml.write_text(right.replace("  checks:\n", other))
         told = read_until(watch.stdout, "Ctrl-C ends")
         package = f"{POINTS['package']:g}"
         assert f"Score: {package} of {package} points" in told
