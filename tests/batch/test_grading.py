@@ -36,7 +36,7 @@ from grader.report.model.facts import Clock
 from grader.run.runner import Runner, RunRequest
 from grader.spec.names import Names, Thing, WrongName
 from grader.submission.build.colcon import BuildLimits
-from grader.submission.prepare import Prepared
+from grader.submission.prepare import Preparation, Prepared
 from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
 
 YAML = """\
@@ -246,8 +246,8 @@ def test_a_misnamed_package_is_found_by_the_names_that_the_submission_chose(
     record = dataclasses.replace(SUBMISSION, packages=packages)
     asked: list[frozenset[str]] = []
 
-    def note(*_: object, tested: Callable[[SubmissionRecord], frozenset[str]], **__: object) -> Any:
-        asked.append(tested(record))
+    def note(_path: Path, how: Preparation) -> Prepared:
+        asked.append(how.tested(record))
         return Prepared(record=record, install=None)
 
     monkeypatch.setattr(grading_module, "prepare", note)
@@ -448,8 +448,8 @@ def test_an_untouched_starter_that_gets_many_points_is_judged_wrongly(
 def test_a_limit_of_the_build_is_the_author_s(lesson: LoadedAssignment, tmp_path: Path) -> None:
     asked: list[BuildLimits] = []
 
-    def note(*_: object, limits: BuildLimits, **__: object) -> Prepared:
-        asked.append(limits)
+    def note(_path: Path, how: Preparation) -> Prepared:
+        asked.append(how.limits)
         return Prepared(record=dataclasses.replace(SUBMISSION, build=None), install=None)
 
     written = "build_limits: {wall_time: 30 s, output: 1 MiB, memory: 1 GiB}\nscenarios:"
