@@ -61,8 +61,8 @@ def test_a_new_check_is_listed_validated_and_judges(copy: Path) -> None:
     folder = copy / "timed_publisher"
     shutil.copytree(copy / "assignments/timed_publisher", folder, dirs_exist_ok=True)
     yaml = folder / "assignment.yaml"
-    entry = "checks:\n  - id: newest\n    uses: messages.newest\n    points: 0\n    with: {topic: TOPIC, "
-    entry += "field: linear.x, value: 1.0}\n"
+    entry = "checks:\n  - id: newest\n    uses: messages.newest\n    points: 0\n"
+    entry += "    with: {topic: TOPIC, field: linear.x, value: 1.0}\n"
     before = yaml.read_text(encoding="utf-8")
     yaml.write_text(before + entry.replace("TOPIC", "/cmd_vel"), encoding="utf-8")
     assert "valid" in rosgrade(copy, "validate", str(folder))

@@ -215,8 +215,8 @@ PACKAGE = (
         "The package {package} is there",
         Words(
             "Create it with `ros2 pkg create --build-type ament_python {package}`.",
-            "Create it with `ros2 pkg create --build-type ament_cmake --dependencies rclcpp -- "
-            "{package}`.",
+            "Create it with `ros2 pkg create --build-type ament_cmake {package} --dependencies "
+            "rclcpp`.",
         ),
     ),
     Fact(
