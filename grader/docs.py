@@ -22,6 +22,7 @@ from pydantic import BaseModel
 
 from grader import resources
 from grader.assignment import limits, model, mutant, variable
+from grader.assignment.contract import model as contract
 from grader.assignment.own_check import FOLDER, lesson_checks
 from grader.assignment.stimuli.stimulus import stimulus_models
 from grader.checks import window
@@ -46,6 +47,14 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
     "assignment-yaml": {
         "The whole file": model.Assignment,
         "variables": variable.Variable,
+        "contract": contract.Contract,
+        "contract: packages": contract.ContractPackage,
+        "contract: executables": contract.Program,
+        "contract: publishes": contract.Publication,
+        "contract: subscribes": contract.Subscription,
+        "contract: serves, actions": contract.Server,
+        "contract: parameters": contract.Declared,
+        "contract: interfaces": contract.Interface,
         "packages": model.Package,
         "scenarios": model.Scenario,
         "launch": model.Launch,
