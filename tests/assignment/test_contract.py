@@ -172,6 +172,11 @@ def test_a_row_of_the_handout_tells_all_of_a_parameter(write: Write) -> None:
             "checks:\n  - {id: mine, uses: node.alife, points: 1}\nscenarios:\n",
             "19: checks[0].uses: there is no check 'node.alife'.",
         ),
+        (
+            "scenarios:\n",
+            "  checks: {period: {with: {spread: much}}}\nscenarios:\n",
+            "18: contract.checks.period.with.spread: ",
+        ),
         ("depth", "", ""),
         ("node: driver", "nodes: driver", "11: contract.packages.bot.executables.drive.nodes: "),
         (

@@ -34,12 +34,12 @@ def expanded(source: Source) -> Source:
         raise AssignmentError(source.file, in_order(problems))
     written = _Written(source)
     packages = [written.package(contract, name) for name in contract.packages]
-    derived = [(derivation.entry(one), one.place) for one in derivation.kept]
     authors = source.data.get("checks") or []
-    checks = [entry for entry, _ in derived]
+    checks = [derivation.entry(one) for one in derivation.kept]
     written.move("checks", len(checks))
-    for index, (entry, place) in enumerate(derived):
-        written.stand_for(("checks", index), entry, place)
+    for index, (entry, one) in enumerate(zip(checks, derivation.kept, strict=True)):
+        written.stand_for(("checks", index), entry, one.place)
+        written.differs(("checks", index), entry, (KEY, "checks", one.id))
     scenarios = [
         written.scenario(contract, index, one)
         for index, one in enumerate(source.data.get("scenarios") or [])
@@ -88,6 +88,14 @@ class _Written:
         """Note that a part which is made stands for one that is written."""
         self.origins[place] = origin
         self.lines.update(dict.fromkeys(_places(place, value), self.source.line(origin) or 1))
+
+    def differs(self, place: Place, made: dict[str, Any], origin: Place) -> None:
+        """Note what of an entry the author wrote under its id."""
+        for key, value in made.items():
+            if isinstance(value, dict) and key == "with":
+                self.differs((*place, key), value, (*origin, key))
+            elif (*origin, key) in self.source.lines:
+                self.stand_for((*place, key), value, (*origin, key))
 
     def move(self, key: str, by: int) -> None:
         """Note that the entries of a list have come to stand further down."""

@@ -146,7 +146,8 @@ def leaves(value: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, An
 
 def _found(spot: Spot) -> dict[str, Any]:
     if spot.of_package.interfaces:
-        return {"package": spot.package, "build_type": spot.of_package.build_type[0]}
+        build_type = spot.of_package.build_type[0]
+        return {"package": spot.package, "build_type": build_type, "remap": True}
     return {"package": spot.package, "remap": True}
 
 
@@ -494,7 +495,7 @@ SERVICE = (
     Fact(
         "service",
         "service.exists",
-        lambda it: {"service": it.name, "type": _server(it).type},
+        lambda it: {"service": it.name, "type": _server(it).type, "remap": True},
         "{subject} offers the service {name}",
         Words(
             "self.create_service({short}, '{name}', self.callback); `ros2 service list -t` shows "
@@ -510,7 +511,7 @@ ACTION = (
     Fact(
         "action",
         "action.exists",
-        lambda it: {"action": it.name, "type": _server(it).type},
+        lambda it: {"action": it.name, "type": _server(it).type, "remap": True},
         "{subject} offers the action {name}",
         Words(
             "ActionServer(self, {short}, '{name}', self.execute); `ros2 action list -t` shows it.",
@@ -541,7 +542,7 @@ INTERFACE = (
     Fact(
         "definition",
         "interface.found",
-        lambda it: {"interface": it.interface},
+        lambda it: {"interface": it.interface, "remap": True},
         "The definition is in {file}",
         "Its folder is beside package.xml, and the file has the name of the interface.",
         ("package",),
