@@ -16,6 +16,8 @@ from grader.assignment.contract.table import rows
 from grader.assignment.load import list_assignments, load_assignment
 
 ROOT = resources.root()
+# The site takes five seconds of a processor, which others may hold.
+pytestmark = pytest.mark.timeout(320)
 LINK = re.compile(r"\]\(([^)#\s]+)[^)]*\)")
 
 
@@ -65,7 +67,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=300,
         check=False,
     )
     assert built.returncode == 0, built.stderr
