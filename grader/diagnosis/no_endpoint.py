@@ -13,7 +13,7 @@ from grader.diagnosis.undeclared import why_never_appeared
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.first_seen import nodes_seen
 from grader.findings.wording import code, codes
-from grader.findings.words import Words, type_in_code
+from grader.findings.words import type_in_code, worded
 from grader.measure import declarations
 from grader.recording.interaction import Service
 from grader.recording.model import Kind, Owner, Recording
@@ -38,63 +38,52 @@ class Word:
 
     Attributes:
         does: What a node does that has one, before its name.
-        create: The code that makes one; ``{type}``, ``{full}`` (the type with its package) and
-            ``{name}`` stand for its own.
+        python: The code that makes one; ``{type}`` and ``{name}`` stand for its own.
+        cpp: The same, with ``{full}``: the type with its package.
     """
 
     noun: str
     does: str
-    create: Words
+    python: str
+    cpp: str
 
 
 PUBLISHER = Word(
     "publisher",
     "publishes on",
-    Words(
-        python="self.create_publisher({type}, '{name}', 10)",
-        cpp='this->create_publisher<{full}>("{name}", 10)',
-    ),
+    python="self.create_publisher({type}, '{name}', 10)",
+    cpp='this->create_publisher<{full}>("{name}", 10)',
 )
 SUBSCRIPTION = Word(
     "subscription",
     "subscribes to",
-    Words(
-        python="self.create_subscription({type}, '{name}', self.callback, 10)",
-        cpp='this->create_subscription<{full}>("{name}", 10, callback)',
-    ),
+    python="self.create_subscription({type}, '{name}', self.callback, 10)",
+    cpp='this->create_subscription<{full}>("{name}", 10, callback)',
 )
 SERVICE = Word(
     "service",
     "offers the service",
-    Words(
-        python="self.create_service({type}, '{name}', self.callback)",
-        cpp='this->create_service<{full}>("{name}", callback)',
-    ),
+    python="self.create_service({type}, '{name}', self.callback)",
+    cpp='this->create_service<{full}>("{name}", callback)',
 )
 ACTION = Word(
     "action",
     "offers the action",
-    Words(
-        python="ActionServer(self, {type}, '{name}', self.execute_callback)",
-        cpp='rclcpp_action::create_server<{full}>(this, "{name}", handle_goal, '
-        "handle_cancel, handle_accepted)",
-    ),
+    python="ActionServer(self, {type}, '{name}', self.execute_callback)",
+    cpp='rclcpp_action::create_server<{full}>(this, "{name}", handle_goal, '
+    "handle_cancel, handle_accepted)",
 )
 CLIENT = Word(
     "client",
     "has a client of",
-    Words(
-        python="self.create_client({type}, '{name}')",
-        cpp='this->create_client<{full}>("{name}")',
-    ),
+    python="self.create_client({type}, '{name}')",
+    cpp='this->create_client<{full}>("{name}")',
 )
 ACTION_CLIENT = Word(
     "action client",
     "has an action client of",
-    Words(
-        python="ActionClient(self, {type}, '{name}')",
-        cpp='rclcpp_action::create_client<{full}>(this, "{name}")',
-    ),
+    python="ActionClient(self, {type}, '{name}')",
+    cpp='rclcpp_action::create_client<{full}>(this, "{name}")',
 )
 _WORDS = (PUBLISHER, SUBSCRIPTION, SERVICE, ACTION, CLIENT, ACTION_CLIENT)
 ENDPOINTS = {Kind.PUBLISHER: PUBLISHER, Kind.SUBSCRIPTION: SUBSCRIPTION}
@@ -141,7 +130,9 @@ class NoEndpoint(Symptom[Finding], concept="names"):
         """The code that creates it."""
         names = self.types[0].split("/") if self.types else ["Type"]
         full, name = "::".join(names), self.name.lstrip("/")
-        return code(str(self.word.create).format(type=names[-1], full=full, name=name))
+        return code(
+            worded(self.word.python, self.word.cpp).format(type=names[-1], full=full, name=name)
+        )
 
 
 def offered(recording: Recording, word: Word, name: str) -> tuple[Service, ...]:

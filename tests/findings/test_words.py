@@ -88,9 +88,9 @@ def _texts(statement: ast.stmt) -> Iterator[str]:
             hidden |= {id(part) for part in node.values}
         if isinstance(node, ast.Call) and ast.unparse(node.func) in ("Field", "re.compile"):
             hidden |= {id(part) for part in ast.walk(node)}
-        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("Words", "worded"):
-            of_python = [*node.args, *(one.value for one in node.keywords)][0]
-            hidden |= {id(part) for part in ast.walk(of_python)}
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("Words", "worded", "Word"):
+            named = [one.value for one in node.keywords if one.arg == "python"]
+            hidden |= {id(part) for part in ast.walk([*named, *node.args][0])}
     for node in ast.walk(statement):
         if id(node) in hidden:
             continue
