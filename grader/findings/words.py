@@ -10,35 +10,32 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
-from typing import ClassVar
 
-from pydantic import ConfigDict
+from pydantic.dataclasses import dataclass
 
 from grader.submission.record import CPP, PYTHON
 
 _SPOKEN = ContextVar("language", default=PYTHON)
 
 
-@dataclass(frozen=True)
+@dataclass(
+    frozen=True,
+    config={"extra": "forbid", "json_schema_extra": {"x-words": "`{python: text, cpp: text}`"}},
+)
 class Words:
     """A sentence for later: ``str()`` and f-strings say it in the language that is spoken then."""
-
-    __pydantic_config__: ClassVar = ConfigDict(
-        extra="forbid", json_schema_extra={"x-words": "`{python: text, cpp: text}`"}
-    )
 
     python: str
     cpp: str
 
     def __str__(self) -> str:
         """Say it."""
-        return self.cpp if _SPOKEN.get() == CPP else self.python
+        return worded(self.python, self.cpp)
 
 
 def worded(python: str, cpp: str) -> str:
     """A sentence in the language that is spoken now."""
-    return str(Words(python, cpp))
+    return cpp if _SPOKEN.get() == CPP else python
 
 
 def type_in_code(name: str) -> str:

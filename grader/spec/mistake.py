@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import fields, is_dataclass
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -143,26 +142,19 @@ def _keys(model: type[BaseModel], loc: Place) -> set[str]:
         inner = [
             found
             for one in current
-            for name, annotation in _fields(one).items()
-            if step == name
-            for found in _models_in(annotation)
+            for name, field in one.__pydantic_fields__.items()
+            if step == (field.alias or name)
+            for found in _models_in(field.annotation)
         ]
         # Anything else than a field is the tag of a union, or a key of a mapping of models.
         tagged = [one for one in current if step == one.__name__]
         current = inner or tagged or current
-    return {name for one in current for name in _fields(one)}
-
-
-def _fields(model: type[Any]) -> dict[str, Any]:
-    """The keys of a model or a dataclass, and what is written there."""
-    if is_dataclass(model):
-        return {one.name: one.type for one in fields(model)}
-    return {one.alias or name: one.annotation for name, one in model.model_fields.items()}
+    return {
+        field.alias or name for one in current for name, field in one.__pydantic_fields__.items()
+    }
 
 
 def _models_in(annotation: Any) -> list[type[Any]]:
-    if isinstance(annotation, type) and (
-        issubclass(annotation, BaseModel) or is_dataclass(annotation)
-    ):
+    if isinstance(annotation, type) and hasattr(annotation, "__pydantic_fields__"):
         return [annotation]
     return [found for part in get_args(annotation) for found in _models_in(part)]
