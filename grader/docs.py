@@ -30,6 +30,7 @@ from grader.checks.catalogue import CATALOGUE, families
 from grader.checks.check import Check
 from grader.checks.tolerance import TimeTolerance
 from grader.diagnosis.explanation import explanations
+from grader.diagnosis.mistake import TABLE
 from grader.findings import finding
 from grader.recording import interaction, simulated
 from grader.recording import model as recording
@@ -193,7 +194,8 @@ def checks_markdown() -> dict[str, str]:
 def explanations_markdown() -> str:
     """What rosgrade can tell a student, by symptom."""
     symptoms = [(_sentence(symptom), entries) for symptom, entries in explanations().items()]
-    return _rendered("explanations.md", symptoms=sorted(symptoms, key=lambda item: item[0]))
+    symptoms.sort(key=lambda item: item[0])
+    return _rendered("explanations.md", symptoms=symptoms, mistakes=TABLE)
 
 
 def classes_markdown() -> dict[str, str]:

@@ -12,6 +12,7 @@ from grader.checks.check import stop_if
 from grader.checks.need import Doubt
 from grader.checks.wrong_name import Named, misnamed
 from grader.diagnosis.destroyed_endpoint import why_withdrawn
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_endpoint import (
     ACTION,
     SERVICE,
@@ -133,10 +134,12 @@ def why_other_fields(
     found = unlike(value or {}, wanted, tolerance)
     if not found:
         return None
-    return Finding(
+    tables = (difference_table(part.capitalize(), found), *evidence.tables)
+    return mistaken(
+        "other_answer",
         f"{seen} {difference_words(found)}",
-        hint or fields_hint(part, value or {}, [item.field for item in found]),
-        replace(evidence, tables=(difference_table(part.capitalize(), found), *evidence.tables)),
+        replace(evidence, tables=tables),
+        look=hint or fields_hint(part, value or {}, [item.field for item in found]),
     )
 
 

@@ -8,6 +8,7 @@ from typing import ClassVar
 from pydantic import Field
 
 from grader.checks.check import Parameters
+from grader.diagnosis.mistake import mistaken
 from grader.findings.finding import Evidence, Finding, Status
 from grader.findings.wording import code
 from grader.recording.model import Recording
@@ -70,12 +71,13 @@ def misnamed(
         return None
     names = parameters.wrong(own)
     how = f", with `--ros-args -r {' -r '.join(names.rules)}` to correct the name"
-    failed = Finding.failed(
-        parameters.asked_for,
+    failed = mistaken(
+        "other_name",
         f"found {code(own)} instead; everything else was judged in a second run"
         + (how if len(names.rules) <= _MOST_RULES else " that corrects the name"),
-        f"Write the {thing.value}'s name as '{_written(thing, asked)}'.",
         shown,
+        thing=thing.value,
+        name=_written(thing, asked),
     )
     return replace(failed, names=names)
 

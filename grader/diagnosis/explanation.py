@@ -40,7 +40,7 @@ class Symptom(Generic[A]):
 
     def __init_subclass__(cls, *, concept: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)
-        cls.concept = concept or cls.concept
+        cls.concept = concept
 
 
 @dataclass(frozen=True)

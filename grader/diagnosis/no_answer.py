@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.explanation import cause_of, explanation
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_endpoint import Word, offered
-from grader.diagnosis.process.blocked_executor import at_its_place, blocked_hint, why_never_spun
+from grader.diagnosis.process.not_called import (
+    NotCalled,
+    at_its_place,
+    blocked_executor,
+    never_spun,
+)
 from grader.diagnosis.process.process_exit import ended_early, exited, why_it_exited
 from grader.diagnosis.process.raised import (
     READ_MESSAGE,
@@ -16,7 +22,7 @@ from grader.diagnosis.process.raised import (
     parse_failures,
     raised_at,
 )
-from grader.diagnosis.process.standing import Stand, where_it_stands
+from grader.diagnosis.process.standing import where_it_stands
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.words import worded
 from grader.measure import declarations
@@ -29,7 +35,7 @@ _ROUNDING_S = 1e-6
 
 
 @dataclass(frozen=True)
-class NoAnswer(Symptom[Finding], concept="executors"):
+class NoAnswer(NotCalled, concept="executors"):
     """A call or a goal was not answered in time.
 
     Attributes:
@@ -38,7 +44,6 @@ class NoAnswer(Symptom[Finding], concept="executors"):
         while_busy: The cause where the executor is blocked or nothing tells, if not general.
     """
 
-    recording: Recording
     what: str
     server: Word
     name: str
@@ -53,9 +58,25 @@ class NoAnswer(Symptom[Finding], concept="executors"):
         return own[-1].node if own else self.name.rpartition("/")[0]
 
     @property
-    def process(self) -> Process | None:
+    def seen(self) -> str:
+        """The symptom in words."""
+        return self.what
+
+    @property
+    def nodes(self) -> Collection[str]:
+        """The node that should answer."""
+        return (self.node,)
+
+    @property
+    def processes(self) -> Sequence[Process]:
         """The process of the node, if it is known."""
-        return declarations.process_of(self.recording, self.node)
+        process = declarations.process_of(self.recording, self.node)
+        return () if process is None else (process,)
+
+    @property
+    def since_ns(self) -> int:
+        """When it was asked."""
+        return self.asked_ns
 
     @property
     def spins(self) -> bool | None:
@@ -69,18 +90,12 @@ class NoAnswer(Symptom[Finding], concept="executors"):
         answered = any((call.answered_ns or 0) > self.asked_ns for call in calls)
         return answered if calls else None
 
-    @property
-    def stand(self) -> Stand | None:
-        """Where the process did not go on."""
-        process = self.process
-        return where_it_stands(self.recording, process.name) if process else None
-
     def placed(self, cause: Finding) -> Finding:
         """A cause with the time of the call, and with where the process did not go on."""
         when_s = self.recording.since_launch_s(self.asked_ns)
         evidence = Evidence(moments=(Moment("call, not answered in time", when_s),))
-        cause, stand = replace(cause, evidence=evidence), self.stand
-        return cause if stand is None else at_its_place(cause, self.what, stand)
+        stands = [where_it_stands(self.recording, one.name) for one in self.processes]
+        return at_its_place(replace(cause, evidence=evidence), self.what, *stands or [None])
 
 
 def why_late(
@@ -91,13 +106,14 @@ def why_late(
     answered_ns: int | None,
     within_s: float,
     seen: str,
-    hint: str,
+    mistake: str,
     evidence: Evidence,
 ) -> Finding | None:
     """Why an answer did not come in time, or None if it did.
 
     Args:
         seen: What did not happen, such as ``the call was not answered``.
+        mistake: Where the node is there and the machine took no time.
     """
     if answered_ns is None:
         return why_unanswered(recording, seen, kind, name, asked_ns, within_s)
@@ -106,7 +122,7 @@ def why_late(
         return None
     seen = f"{seen} for {format_duration(took_s)}"
     taken = why_taken(recording, seen, asked_ns, answered_ns, within_s)
-    return taken or Finding(seen, hint, evidence)
+    return taken or mistaken(mistake, seen, evidence)
 
 
 def why_unanswered(
@@ -135,38 +151,16 @@ def no_cpu_time(symptom: NoAnswer) -> Finding | None:
     return why_taken(recording, symptom.what, symptom.asked_ns, recording.stop_ns, symptom.within_s)
 
 
-@explanation(NoAnswer)
+@explanation(NoAnswer, before=(never_spun,))
 def callback_raised(symptom: NoAnswer) -> Finding | None:
     """A callback raised an exception."""
-    own = [symptom.process] if symptom.process else []
-    return why_raised(symptom.recording, symptom.what, symptom.asked_ns, own)
+    return why_raised(symptom.recording, symptom.what, symptom.asked_ns, symptom.processes)
 
 
-@explanation(NoAnswer)
-def never_spun(symptom: NoAnswer) -> Finding | None:
-    """rclpy.spin() is never called, or the node is not given to the executor that spins."""
-    if symptom.process is None:
-        return None
-    return why_never_spun(symptom.recording, symptom.what, (symptom.node,), (symptom.process,))
-
-
-@explanation(NoAnswer)
-def blocked_executor(symptom: NoAnswer) -> Finding | None:
-    """A callback does not return and blocks the executor."""
-    blocked = None if symptom.spins else symptom.while_busy
-    if symptom.spins is False and blocked is None:
-        blocked = Finding(
-            f"{symptom.what}: something blocks the executor; the node's parameter services do "
-            "not answer either",
-            blocked_hint()
-            + worded(
-                python=" A call() to another service waits for an answer that the same executor "
-                "must receive: use call_async().",
-                cpp=" future.get() of a request to another service waits for an answer that the "
-                "same executor must receive: give async_send_request() a callback.",
-            ),
-        )
-    return blocked and symptom.placed(blocked)
+@explanation(NoAnswer, after=(never_spun,), before=(blocked_executor,))
+def busy_with_something_else(symptom: NoAnswer) -> Finding | None:
+    """The executor is busy with what was asked before, such as a goal."""
+    return None if symptom.spins or not symptom.while_busy else symptom.placed(symptom.while_busy)
 
 
 @explanation(NoAnswer, general=True)

@@ -10,8 +10,8 @@ from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import crashed, why_crashed
 from grader.diagnosis.undeclared import why_never_appeared
-from grader.findings.finding import Evidence, Finding, Moment, Table
-from grader.findings.first_seen import nodes_seen
+from grader.findings.finding import Evidence, Finding, Table
+from grader.findings.first_seen import evidence_at, nodes_seen
 from grader.findings.wording import code, codes
 from grader.findings.words import type_in_code, worded
 from grader.measure import declarations
@@ -171,7 +171,7 @@ def why_not_met(recording: Recording, word: Word, name: str, asked_ns: int) -> F
         "match a client with the default QoS",
         f"Keep the {word.noun} and its node as long as the program runs, and do not change its "
         "QoS.",
-        Evidence(moments=(Moment("rosgrade gave up", recording.since_launch_s(asked_ns)),)),
+        evidence_at(recording, "rosgrade gave up", asked_ns),
     )
 
 

@@ -8,9 +8,14 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.explanation import cause_of, explanation
 from grader.diagnosis.no_messages import why_few, why_not_delivered
-from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spun, why_slow
+from grader.diagnosis.process.not_called import (
+    CalledLate,
+    blocked_executor,
+    never_spun,
+    slow_callbacks,
+)
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.process.raised import defined_at
 from grader.diagnosis.wrong_value import factor_words
@@ -46,7 +51,7 @@ _RESENDS = ("reliable", "unknown")
 
 
 @dataclass(frozen=True)
-class NotLogged(Symptom[Finding]):
+class NotLogged(CalledLate):
     """The log does not show what the node received.
 
     Attributes:
@@ -57,7 +62,6 @@ class NotLogged(Symptom[Finding]):
         own: The student publishes the messages.
     """
 
-    recording: Recording
     topic: str
     wanted: Sequence[Wanted]
     found: Sequence[Echo]
@@ -84,6 +88,23 @@ class NotLogged(Symptom[Finding]):
     def nodes(self) -> set[str]:
         """The nodes that have them."""
         return {item.node for item in self.ends}
+
+    @property
+    def needs_spin(self) -> bool:
+        """Whether a callback must be called; what a node publishes it may log anywhere."""
+        return not self.own
+
+    @property
+    def since_ns(self) -> int:
+        """When the first message came."""
+        return self.recording.carried(self.topic)[0].stamp_ns
+
+    @property
+    def late(self) -> str:
+        """The symptom in words, where lines may be late."""
+        # What a late line shows may look like something else of the message that came before it.
+        limit = format_duration(self.within_ns / NS)
+        return self.seen if self.found else f"{self.seen} within {limit} of it"
 
     @property
     def near(self) -> list[LogLine]:
@@ -194,7 +215,7 @@ def no_cpu_time(symptom: NotLogged) -> Finding | None:
     )
 
 
-@explanation(NotLogged)
+@explanation(NotLogged, before=(never_spun,))
 def subscription_destroyed(symptom: NotLogged) -> Finding | None:
     """The program destroyed its subscription."""
     if symptom.own:
@@ -202,27 +223,7 @@ def subscription_destroyed(symptom: NotLogged) -> Finding | None:
     return why_unsubscribed(symptom.recording, symptom.topic, symptom.seen)
 
 
-@explanation(NotLogged)
-def never_spun(symptom: NotLogged) -> Finding | None:
-    """rclpy.spin() is never called, so the callback is never called."""
-    if symptom.own:
-        return None
-    return why_never_spun(
-        symptom.recording,
-        f"the callback is never called: the subscription to {code(symptom.topic)} is there and "
-        "its QoS matches",
-        symptom.nodes,
-    )
-
-
-@explanation(NotLogged)
-def blocked_executor(symptom: NotLogged) -> Finding | None:
-    """A callback does not return, and blocks the executor."""
-    begin_ns = symptom.recording.carried(symptom.topic)[0].stamp_ns
-    return why_blocked(symptom.recording, symptom.seen, symptom.nodes, begin_ns)
-
-
-@explanation(NotLogged)
+@explanation(NotLogged, after=(blocked_executor,), before=(slow_callbacks,))
 def output_dropped(symptom: NotLogged) -> Finding | None:
     """The program wrote more than is kept; this is an error and costs no points."""
     dropped = sum(process.dropped_bytes for process in symptom.recording.processes)
@@ -235,16 +236,7 @@ def output_dropped(symptom: NotLogged) -> Finding | None:
     )
 
 
-@explanation(NotLogged)
-def callbacks_wait(symptom: NotLogged) -> Finding | None:
-    """Callbacks wait for each other, so lines are missing or late."""
-    # What a late line shows may look like something else of the message that came before it.
-    limit = format_duration(symptom.within_ns / NS)
-    late = symptom.seen if symptom.found else f"{symptom.seen} within {limit} of it"
-    return why_slow(symptom.recording, late, symptom.nodes)
-
-
-@explanation(NotLogged)
+@explanation(NotLogged, after=(slow_callbacks,))
 def only_some_logged(symptom: NotLogged) -> Finding | None:
     """Only some messages are logged: an if, once=True or throttle_duration_sec skips the others."""
     recording, topic, found = symptom.recording, symptom.topic, symptom.found

@@ -8,21 +8,17 @@ from dataclasses import dataclass
 from grader.diagnosis.destroyed_endpoint import why_unpublished, why_unsubscribed
 from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
 from grader.diagnosis.no_endpoint import why_no_endpoint
+from grader.diagnosis.process.not_called import NotCalled, never_spun
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.wording import code, codes, counted
 from grader.findings.words import type_in_code, worded
 from grader.measure.compatibility import compatibility_table, refusals, sides
-from grader.measure.declarations import was_held_up
+from grader.measure.declarations import timers, was_held_up
 from grader.recording.model import NS, Endpoint, Kind, Owner, Qos, Recording
 from grader.spec.unit import format_duration
 from grader.submission.record import CPP
-
-ENDED_HINT = (
-    "Publish in every call of the callback. Look for a counter or a condition that ends it, for "
-    "timer.cancel() and timer.reset(), and for a callback that does not return."
-)
 
 # As rclcpp_lifecycle logs it, with the topic in quotes.
 _INACTIVE = "but the publisher is not activated"
@@ -94,21 +90,33 @@ class OnTopic(Symptom[Finding]):
         )
 
     @property
+    def since_ns(self) -> int:
+        """When the last message came, or the first one was sent that should be answered."""
+        last_ns = [one.stamp_ns for one in self.recording.on(self.topic)[-1:]]
+        asked_ns = [sent[0].stamp_ns for name in self.asked if (sent := self.recording.sent[name])]
+        return min(last_ns or asked_ns, default=self.recording.launched_ns)
+
+    @property
     def watched_s(self) -> float:
         """How long the topic was observed."""
         return (self.recording.stop_ns - self.begin_ns) / NS
 
 
 @dataclass(frozen=True)
-class NoMessages(OnTopic):
+class NoMessages(OnTopic, NotCalled):
     """No message came on a topic."""
 
 
 @dataclass(frozen=True)
-class FewMessages(OnTopic):
+class FewMessages(OnTopic, NotCalled):
     """Too few messages came on a topic."""
 
     needed: int
+
+    @property
+    def needs_spin(self) -> bool:
+        """Whether it has a timer: a program may publish without one, and needs no spin then."""
+        return bool(timers(self.recording))
 
     @property
     def seen(self) -> str:
@@ -302,7 +310,7 @@ def too_little_cpu_time(symptom: FewMessages) -> Finding | None:
     )
 
 
-@explanation(NoMessages, FewMessages)
+@explanation(NoMessages, FewMessages, before=(never_spun,))
 def publisher_destroyed(symptom: OnTopic) -> Finding | None:
     """The program destroyed its publisher."""
     return why_unpublished(symptom.recording, symptom.topic, symptom.seen)

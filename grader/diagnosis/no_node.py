@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.not_built import why_not_built
-from grader.diagnosis.process.blocked_executor import at_its_place
+from grader.diagnosis.process.not_called import at_its_place
 from grader.diagnosis.process.process_exit import ended_early, why_crashed, why_ended
 from grader.diagnosis.process.standing import where_it_stands
 from grader.diagnosis.undeclared import why_never_appeared
@@ -205,7 +205,7 @@ def main_does_not_come_to_it(symptom: NoNode) -> Finding:
             log=lines[-_LOG_LINES:],
         ),
     )
-    return cause if stand is None else at_its_place(cause, cause.observed, stand)
+    return at_its_place(cause, cause.observed, stand)
 
 
 @explanation(OtherNode)

@@ -12,7 +12,7 @@ from grader.diagnosis.no_endpoint import SERVICE
 from grader.diagnosis.no_node import why_not_node, written_nodes
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.first_seen import nodes_seen
+from grader.findings.first_seen import evidence_at, nodes_seen
 from grader.findings.wording import code, codes
 from grader.findings.words import worded
 from grader.measure.parameter_calls import calls_to, descriptor, undeclared
@@ -179,7 +179,7 @@ def why_services_silent(recording: Recording, calls: Iterable[Call]) -> Finding 
             "start_parameter_services=False", "start_parameter_services(false) in the NodeOptions"
         )
         + ": the parameters of a node are read and set through its services.",
-        Evidence(moments=(Moment("asked", recording.since_launch_s(lost.requested_ns)),)),
+        evidence_at(recording, "asked", lost.requested_ns),
     )
 
 
@@ -194,12 +194,9 @@ def why_not_asked(recording: Recording, node: str, what: str) -> Finding:
     for last in [] if ended else calls[-1:]:
         server, asked_ns, end_ns = last.service, last.requested_ns, last.answered_ns
         seen = f"the node's parameter service {code(server.rpartition('/')[2])} did not answer"
-        hint = (
-            "A callback must return soon: do not sleep or wait in it. The node answers only while "
-            "its executor spins."
-        )
-        shown = Evidence(moments=(Moment("asked", recording.since_launch_s(asked_ns)),))
-        ended = why_late(recording, SERVICE, server, asked_ns, end_ns, _ANSWER_S, seen, hint, shown)
+        shown = evidence_at(recording, "asked", asked_ns)
+        asked = (recording, SERVICE, server, asked_ns, end_ns, _ANSWER_S)
+        ended = why_late(*asked, seen, "slow_node", shown)
     return ended.after(what) if ended else Finding.undecided(f"{what} by the probe")
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.explanation import cause_of, explanation
 from grader.diagnosis.no_answer import why_raised, why_taken
 from grader.diagnosis.no_endpoint import ACTION_CLIENT, CLIENT, why_not_offered
-from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spun
+from grader.diagnosis.process.not_called import NotCalled, blocked_executor, never_spun
 from grader.diagnosis.process.process_exit import why_crashed
 from grader.diagnosis.process.standing import ASK_AND_RETURN
 from grader.findings.fields import brief, words
@@ -50,10 +50,9 @@ _MOST_ROWS = 50
 
 
 @dataclass(frozen=True)
-class NotAsked(Symptom[Finding]):
+class NotAsked(NotCalled):
     """Fewer requests or goals came to a server of the scenario than expected."""
 
-    recording: Recording
     server: str
     needed: int
 
@@ -108,21 +107,18 @@ def process_failed(symptom: NotAsked) -> Finding | None:
     return crashed.after(symptom.seen) if crashed is not None else raised
 
 
-@explanation(NotAsked, concept="executors")
+@explanation(NotAsked, before=(never_spun,), concept="executors")
 def waits_in_a_callback(symptom: NotAsked) -> Finding | None:
     """call() or spin_until_future_complete() in a callback waits for an answer, and blocks it."""
-    recording, seen = symptom.recording, symptom.seen
-    blocked = why_blocked(recording, seen, symptom.nodes, symptom.since_ns)
-    if blocked is not None and symptom.asked:
-        hint = (
-            "A callback must not wait for an answer: the executor that called it has to take the "
-            f"answer in. {ASK_AND_RETURN}"
-        )
-        return replace(blocked, hint=hint)
-    return blocked or why_never_spun(recording, seen, symptom.nodes)
+    blocked = blocked_executor(symptom) if symptom.asked else None
+    hint = (
+        "A callback must not wait for an answer: the executor that called it has to take the "
+        f"answer in. {ASK_AND_RETURN}"
+    )
+    return blocked and replace(blocked, hint=hint)
 
 
-@explanation(NotAsked)
+@explanation(NotAsked, after=(blocked_executor,))
 def stops_after_a_failure(symptom: NotAsked) -> Finding | None:
     """Nothing follows a goal that was rejected or aborted, or a request without an answer."""
     status = symptom.asked[-1].status if symptom.asked else ""

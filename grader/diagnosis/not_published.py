@@ -5,27 +5,25 @@ from __future__ import annotations
 from dataclasses import replace
 
 from grader.diagnosis.explanation import explanation
+from grader.diagnosis.mistake import remedy
 from grader.diagnosis.no_answer import why_raised
 from grader.diagnosis.no_messages import (
-    ENDED_HINT,
     FewMessages,
     NoMessages,
-    OnTopic,
     nothing_to_answer,
-    publisher_destroyed,
     seconds_hint,
     why_not_delivered,
 )
-from grader.diagnosis.process.blocked_executor import (
+from grader.diagnosis.process.not_called import (
     at_its_place,
+    blocked_executor,
     left_s,
-    why_blocked,
-    why_never_spun,
+    never_spun,
 )
 from grader.diagnosis.process.raised import defined_at
 from grader.diagnosis.process.standing import where_it_stands
 from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.first_seen import until_the_end
+from grader.findings.first_seen import evidence_at, until_the_end
 from grader.findings.wording import code, counted, listing
 from grader.findings.words import SILENT_EXCEPT
 from grader.measure import declarations
@@ -69,15 +67,15 @@ def no_cpu_time(symptom: NoMessages) -> Finding | None:
         return None
     # A callback that never returns burns what CPU the machine leaves it.
     guilty = blocked_executor(symptom)
-    begins_ns = [recording.sent[name][0].stamp_ns for name in symptom.asked if recording.sent[name]]
-    if not guilty and begins_ns and left_s(recording, min(begins_ns), recording.stop_ns) >= _OWN_S:
+    is_asked = symptom.since_ns > recording.launched_ns
+    if not guilty and is_asked and left_s(recording, symptom.since_ns, recording.stop_ns) >= _OWN_S:
         guilty = no_answer(symptom)
     if guilty:
         return replace(guilty, disturbed=True)
     return Finding.held_up(symptom.seen, symptom.stolen_s)
 
 
-@explanation(NoMessages)
+@explanation(NoMessages, before=(never_spun,))
 def publish_never_called(symptom: NoMessages) -> Finding | None:
     """No line of the program calls publish()."""
     sources = [file for one in symptom.recording.submission.packages for file in one.sources]
@@ -100,26 +98,7 @@ def publish_never_called(symptom: NoMessages) -> Finding | None:
     )
 
 
-@explanation(NoMessages, FewMessages, after=(publisher_destroyed,), concept="executors")
-def never_spun(symptom: OnTopic) -> Finding | None:
-    """rclpy.spin() is never called, or the node is not given to the executor that spins."""
-    # A program may publish without a timer, and needs no spin for that.
-    if symptom.recording.on(symptom.topic) and not declarations.timers(symptom.recording):
-        return None
-    return why_never_spun(symptom.recording, symptom.seen, symptom.nodes)
-
-
-@explanation(NoMessages, FewMessages, concept="executors")
-def blocked_executor(symptom: OnTopic) -> Finding | None:
-    """A callback does not return, and blocks the executor."""
-    recording = symptom.recording
-    asked_ns = [sent[0].stamp_ns for name in symptom.asked if (sent := recording.sent[name])]
-    last_ns = [one.stamp_ns for one in recording.on(symptom.topic)[-1:]]
-    since_ns = min(last_ns or asked_ns, default=recording.launched_ns)
-    return why_blocked(recording, symptom.seen, symptom.nodes, since_ns)
-
-
-@explanation(NoMessages)
+@explanation(NoMessages, after=(blocked_executor,))
 def no_answer(symptom: NoMessages) -> Finding | None:
     """The subscription's callback gets a message, but raises an exception or does not publish."""
     recording = symptom.recording
@@ -137,9 +116,7 @@ def no_answer(symptom: NoMessages) -> Finding | None:
             "Is publish(msg) reached in the subscription's callback? Look for an `if` or a "
             f"`return` before it. An {SILENT_EXCEPT} hides errors. Log a line right before "
             "publish(msg) to see.",
-            Evidence(
-                moments=(Moment(f"sent on {name}", recording.since_launch_s(sent[0].stamp_ns)),)
-            ),
+            evidence_at(recording, f"sent on {name}", sent[0].stamp_ns),
         ),
     )
 
@@ -200,7 +177,7 @@ def publishing_stopped(symptom: FewMessages) -> Finding:
     return Finding(
         f"{symptom.seen}; the process declared a timer of "
         f"{listing(map(format_duration, period_s))}",
-        seconds_hint() if is_slow else ENDED_HINT,
+        seconds_hint() if is_slow else remedy("ended"),
         evidence,
     )
 
@@ -250,5 +227,4 @@ def _heard(recording: Recording, topic: str) -> str:
 def _where_it_stands(recording: Recording, cause: Finding) -> Finding:
     """A cause with the line at which a process did not go on, if one did not."""
     stands = (where_it_stands(recording, process.name) for process in recording.processes)
-    stand = next(filter(None, stands), None)
-    return cause if stand is None else at_its_place(cause, cause.observed, stand)
+    return at_its_place(cause, cause.observed, next(filter(None, stands), None))

@@ -65,11 +65,8 @@ def why_not_canceled(
     if goal.status != "canceled" or end_ns is None:
         return cause_of(NotCanceled(recording, goal, within_s, evidence))
     seen = f"{the_goal(goal)} was not canceled"
-    asked = worded("goal_handle.is_cancel_requested", "goal_handle->is_canceling()")
-    hint = f"Look at {asked} in every round of the loop."
-    return why_late(
-        recording, ACTION, goal.action, asked_ns, end_ns, within_s, seen, hint, evidence
-    )
+    asked = (recording, ACTION, goal.action, asked_ns, end_ns, within_s)
+    return why_late(*asked, seen, "canceled_late", evidence)
 
 
 @explanation(NotCanceled)

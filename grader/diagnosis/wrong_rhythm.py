@@ -8,8 +8,9 @@ from functools import cached_property
 from statistics import mean
 
 from grader.diagnosis.explanation import Symptom, explanation
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_messages import seconds_hint
-from grader.diagnosis.process.blocked_executor import left_s
+from grader.diagnosis.process.not_called import left_s
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.process.standing import slow_callback
 from grader.findings.finding import Evidence, Finding, Moment
@@ -196,14 +197,14 @@ def other_period(symptom: WrongRhythm) -> Finding:
 
 
 def why_paused(
-    recording: Recording, pause_ns: tuple[int, int], allowed_s: float, seen: str, hint: str
+    recording: Recording, pause_ns: tuple[int, int], allowed_s: float, seen: str, mistake: str
 ) -> Finding | None:
     """Why nothing came for longer than allowed, or None where the pause is short enough.
 
     Args:
         pause_ns: When it began and ended.
         seen: What was seen, with how long it was.
-        hint: What to try where the program runs on, and the machine has no part in it.
+        mistake: Where the program runs on, and the machine has no part in it.
     """
     begin_ns, end_ns = pause_ns
     if (end_ns - begin_ns) / NS <= allowed_s:
@@ -214,4 +215,4 @@ def why_paused(
     if left_s(recording, begin_ns, end_ns) <= allowed_s:
         return Finding.undecided(f"{seen}, but the machine took the time from the process")
     moment = Moment("nothing from here on", recording.since_launch_s(begin_ns))
-    return Finding(seen, hint, Evidence(moments=(moment,)))
+    return mistaken(mistake, seen, Evidence(moments=(moment,)))

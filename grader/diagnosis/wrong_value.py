@@ -1,11 +1,11 @@
-"""Why a message has other values: swapped fields, wrong sign, wrong unit."""
+"""Messages that have other values, or are too many."""
 
 from __future__ import annotations
 
 import math
 import struct
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise, product
 from typing import Any
@@ -25,10 +25,6 @@ _FACTORS = {
 }
 _FACTOR_TOLERANCE = 2e-3
 MISREAD = Words("an integer, a text or a numpy.float32", "an integer or a text")
-FLOAT_HINT = Words(
-    python="A number in a message must be a float: write 1.0 instead of 1, or float(value).",
-    cpp="Give each variable a value where it is declared, as in `double speed = 0.0;`.",
-)
 # Python 3.11 has the number of digits of a negative integer with a minus.
 _LEAST_NEGATIVE = (1 << 64) - (1 << 8)
 
@@ -44,12 +40,14 @@ class WrongValue(Symptom[str]):
         observed: All leaves of the message.
         tolerance: Largest difference of two equal numbers.
         always: No other message is right.
+        series: What the first of the wrong fields is in all messages.
     """
 
     wrong: tuple[Difference, ...]
     observed: Mapping[str, Any]
     tolerance: float
     always: bool = True
+    series: Sequence[Any] = ()
 
     @property
     def numbers(self) -> list[Difference]:
@@ -60,6 +58,21 @@ class WrongValue(Symptom[str]):
     def wanted(self) -> list[Difference]:
         """Those where another number than 0 is expected."""
         return [one for one in self.numbers if one.expected != 0]
+
+
+@explanation(WrongValue)
+def added_up(symptom: WrongValue) -> str | None:
+    """A field that should stay the same grows by the same step in every message."""
+    expected, series = symptom.wrong[0].expected, symptom.series
+    if not _is_number(expected) or len(series) < 3 or not all(map(_is_number, series)):
+        return None
+    steps = [after - before for before, after in pairwise(series)]
+    step = steps[0]
+    if not math.isfinite(step) or step == 0:
+        return None
+    if not all(math.isclose(other, step, rel_tol=1e-6) for other in steps):
+        return None
+    return f"{symptom.wrong[0].field} grows from message to message, as if added up"
 
 
 @explanation(WrongValue)
@@ -145,17 +158,6 @@ def was_integer(number: Any) -> bool:
 def _bits(number: float) -> int:
     (bits,) = struct.unpack("<Q", struct.pack("<d", number))
     return int(bits)
-
-
-def accumulates(expected: Any, series: list[Any]) -> bool:
-    """Whether a field that should stay the same grows by the same step in every message."""
-    if not _is_number(expected) or len(series) < 3 or not all(map(_is_number, series)):
-        return False
-    steps = [after - before for before, after in pairwise(series)]
-    step = steps[0]
-    if not math.isfinite(step) or step == 0:
-        return False
-    return all(math.isclose(other, step, rel_tol=1e-6) for other in steps)
 
 
 def _is_number(value: Any) -> bool:

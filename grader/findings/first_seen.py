@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import islice
 
-from grader.findings.finding import Moment
+from grader.findings.finding import Evidence, Moment, Plot
 from grader.recording.model import Endpoint, Message, Recording
 
 _MOST = 5
@@ -44,3 +44,8 @@ def first_seen(recording: Recording, messages: Iterable[Message]) -> tuple[Momen
 def until_the_end(recording: Recording, what: str = "the observation ended") -> Moment:
     """The end of the observation, for what lasted or was missing until then."""
     return Moment(what, recording.since_launch_s(recording.stop_ns))
+
+
+def evidence_at(recording: Recording, label: str, time_ns: int, *plots: Plot) -> Evidence:
+    """A moment of a run, with series to draw."""
+    return Evidence(moments=(Moment(label, recording.since_launch_s(time_ns)),), plots=plots)

@@ -88,7 +88,7 @@ def answers() -> Iterator[set[str]]:
         def apply(symptom: Symptom[Any]) -> Any:
             answer = entry.apply(symptom)
             if answer is not None:
-                names.add(f"{entry.symptom.__name__}.{entry.name}")
+                names.add(f"{type(symptom).__name__}.{entry.name}")
             return answer
 
         return replace(entry, apply=apply)
@@ -366,7 +366,7 @@ CASES: list[Group] = [
             "NotLogged.never_spun": logging(declarations=declarations(spin=False)),
             "NotLogged.blocked_executor": logging(calls=HANGS),
             "NotLogged.output_dropped": logging(processes=(process(dropped_bytes=9),)),
-            "NotLogged.callbacks_wait": logging("hm", calls=builder.calls(0.9)),
+            "NotLogged.slow_callbacks": logging("hm", calls=builder.calls(0.9)),
             "NotLogged.only_some_logged": logging(
                 log=output("12.34", time_s=1.01) + output("12.34", time_s=1.31)
             ),
@@ -478,6 +478,10 @@ CASES: list[Group] = [
             ),
             "NotCanceled.executor_busy_with_the_goal": acting(
                 canceled(cancel_answered_ns=None, cancel_accepted=None, status="succeeded")
+            ),
+            "NoAnswer.busy_with_something_else": acting(
+                canceled(cancel_answered_ns=None, cancel_accepted=None, status="", end_s=None),
+                calls=(),
             ),
             "NotCanceled.request_ignored": acting(canceled(status="succeeded", end_s=0.9)),
         },

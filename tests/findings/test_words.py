@@ -19,6 +19,7 @@ from grader.assignment.load import list_assignments, load_assignment
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import NoParameters, Subject
 from grader.diagnosis.explanation import explanations
+from grader.diagnosis.mistake import TABLE, remedy
 from grader.findings.finding import Finding, Status
 from grader.findings.words import SPIN_NODE, speaking
 from grader.grade import grade
@@ -38,7 +39,7 @@ _OF_PYTHON = re.compile(
 # They look themselves at which language it is: what they say of Python is said of Python only.
 _READS_PYTHON = {
     *("newer_name", "why_too_new", "why_nothing_to_run"),
-    *("_why_unknown_imports", "tests"),
+    *("why_unknown_imports", "tests"),
 }
 SOURCE = SourceFile("src/look/bin/look", "look")
 _FOLDERS = ("checks", "diagnosis", "findings", "measure", "grade")
@@ -121,6 +122,17 @@ def test_no_word_of_python_is_left_for_students_of_cpp() -> None:
         for where, text in texts
         if (found := _OF_PYTHON.search(text))
     ]
+    assert not left, "\n".join(left)
+
+
+def test_mistakes_have_no_word_of_python_for_students_of_cpp() -> None:
+    with speaking(CPP):
+        left = [
+            f"{name}: {found[0]!r}"
+            for about in TABLE.values()
+            for name, one in about.items()
+            if one.only != PYTHON and (found := _OF_PYTHON.search(remedy(name)))
+        ]
     assert not left, "\n".join(left)
 
 

@@ -17,7 +17,7 @@ from grader.diagnosis.motion.no_motion import approach
 from grader.measure.motion.command import command_topic
 from grader.measure.motion.quantities import metres, speed
 from grader.checks.motion.robot_check import GoalParameters
-from grader.measure.motion.track import evidence_at
+from grader.findings.first_seen import evidence_at
 from grader.findings.wording import counted, percent
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.missed_goal import why_not_there

@@ -24,13 +24,13 @@ from grader.checks.requests import (
     timeline,
     why_other_fields,
 )
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.no_answer import why_late, why_raised, why_unanswered
 from grader.diagnosis.no_endpoint import ACTION
 from grader.findings.fields import FieldTolerance, the_goal, words
 from grader.findings.finding import Evidence, Finding
 from grader.findings.value import EXACT
 from grader.findings.wording import code, counted, percent
-from grader.findings.words import ARROW, worded
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
@@ -109,16 +109,7 @@ def why_rejected(recording: Recording, goal: Goal) -> Finding | None:
     """Why a goal that should have been accepted was not, or None if it was."""
     if goal.accepted is not False:
         return None
-    return Finding(
-        f"{the_goal(goal)} was rejected",
-        worded(
-            python="A goal_callback must return GoalResponse.ACCEPT for a goal that is right; "
-            "without one every goal is accepted.",
-            cpp="handle_goal must return rclcpp_action::GoalResponse::ACCEPT_AND_EXECUTE for a "
-            "goal that is right.",
-        ),
-        evidence(recording, goal),
-    )
+    return mistaken("rejected_goal", f"{the_goal(goal)} was rejected", evidence(recording, goal))
 
 
 def evidence(recording: Recording, goal: Goal) -> Evidence:
@@ -153,17 +144,9 @@ def rejects(recording: Recording, parameters: Rejects) -> Finding:
     for goal in goals:
         if goal.accepted:
             then = f", then {goal.status}" if goal.status else ""
-            return Finding(
-                f"{the_goal(goal)} was accepted{then}",
-                worded(
-                    python="The ActionServer's goal_callback decides: it looks at the request and "
-                    "returns GoalResponse.REJECT. Without one every goal is accepted.",
-                    cpp="The server's handle_goal decides: it looks at the request and returns "
-                    "rclcpp_action::GoalResponse::REJECT.",
-                ),
-                evidence(recording, goal),
-            )
-    return Finding.passed(parameters.asked_for, "it was rejected", evidence(recording, goals[0]))
+            seen = f"{the_goal(goal)} was accepted{then}"
+            return mistaken("accepted_goal", seen, evidence(recording, goal))
+    return Finding.as_asked("it was rejected", evidence(recording, goals[0]))
 
 
 class FeedbackOf(OfGoals):
@@ -220,7 +203,7 @@ def feedback(recording: Recording, parameters: FeedbackOf) -> Finding:
     number = min(len(goal.feedback) for goal in goals)
     at = f" at {_rate_hz(goals[0]):.3g} Hz" if len(goals[0].feedback) > 1 else ""
     shown = evidence(recording, goals[0])
-    return Finding.passed(parameters.asked_for, f"{counted(number, 'message')}{at}", shown)
+    return Finding.as_asked(f"{counted(number, 'message')}{at}", shown)
 
 
 def _rate_hz(goal: Goal) -> float:
@@ -235,11 +218,8 @@ def _why_little_feedback(
         return None
     seen = f"{the_goal(goal)} gave {counted(len(goal.feedback), 'message')} of feedback"
     seen += f" and then {goal.status}" if goal.status else ""
-    return why_raised(recording, seen, goal.sent_ns) or Finding(
-        seen,
-        f"Call goal_handle{ARROW}publish_feedback(feedback) in the loop of the execute callback.",
-        evidence(recording, goal),
-    )
+    raised = why_raised(recording, seen, goal.sent_ns)
+    return raised or mistaken("no_feedback", seen, evidence(recording, goal))
 
 
 def _why_other_rate(recording: Recording, goal: Goal, parameters: FeedbackOf) -> Finding | None:
@@ -255,13 +235,13 @@ def _why_other_rate(recording: Recording, goal: Goal, parameters: FeedbackOf) ->
     stolen_s = recording.stolen_s(begin_ns, end_ns)
     if 0.0 < late_s <= stolen_s:
         return Finding.held_up(seen, stolen_s)
-    hint = f"Each round of the loop should take {format_duration(1.0 / parameters.rate)}."
-    return Finding(seen, hint, evidence(recording, goal))
+    takes, shown = format_duration(1.0 / parameters.rate), evidence(recording, goal)
+    return mistaken("feedback_rate", seen, shown, takes=takes)
 
 
 def _why_other_feedback(recording: Recording, goal: Goal, parameters: FeedbackOf) -> Finding | None:
     shown = evidence(recording, goal)
-    hint = "Set the fields of the feedback before each publish_feedback(feedback)."
+    hint = remedy("other_feedback")
     for which, index, wanted in (("first", 0, parameters.first), ("last", -1, parameters.last)):
         seen, value = f"the {which} feedback of {the_goal(goal)} has", goal.feedback[index].value
         cause = why_other_fields(seen, f"{which} feedback", value, wanted, EXACT, shown, hint)
@@ -316,7 +296,7 @@ def result(recording: Recording, parameters: Result) -> Finding:
         for goal in goals
     )
     observed = f"{goals[0].status}: {words(goals[0].result or {})}"
-    return Finding.passed(parameters.asked_for, observed, evidence(recording, goals[0]))
+    return Finding.as_asked(observed, evidence(recording, goals[0]))
 
 
 def _why_other_status(recording: Recording, goal: Goal, parameters: Result) -> Finding | None:
@@ -326,25 +306,14 @@ def _why_other_status(recording: Recording, goal: Goal, parameters: Result) -> F
     is_aborted = goal.status == "aborted"
     call = {"succeeded": "succeed", "aborted": "abort", "canceled": "canceled"}[parameters.status]
     raised = why_raised(recording, seen, goal.sent_ns) if is_aborted else None
-    return raised or Finding(
-        seen,
-        worded(
-            python=f"Call goal_handle.{call}() before the execute callback returns its result."
-            + (" Without it rclpy aborts the goal." if is_aborted else ""),
-            cpp=f"Call goal_handle->{call}(result) before the execute callback returns."
-            + (" Without it the goal never ends." if is_aborted else ""),
-        ),
-        evidence(recording, goal),
-    )
+    mistake = "aborted" if is_aborted else "not_ended"
+    return raised or mistaken(mistake, seen, evidence(recording, goal), call=call)
 
 
 def _why_no_result(recording: Recording, goal: Goal, within_s: float) -> Finding | None:
-    seen, hint = (
-        f"the result of {the_goal(goal)} did not come",
-        "Look for a sleep that is too long.",
-    )
+    seen, mistake = f"the result of {the_goal(goal)} did not come", "slow_goal"
     sent_ns, end_ns, shown = goal.sent_ns, goal.result_ns, evidence(recording, goal)
-    return why_late(recording, ACTION, goal.action, sent_ns, end_ns, within_s, seen, hint, shown)
+    return why_late(recording, ACTION, goal.action, sent_ns, end_ns, within_s, seen, mistake, shown)
 
 
 def _why_other_result(recording: Recording, goal: Goal, parameters: Result) -> Finding | None:

@@ -7,13 +7,13 @@ from pydantic import Field
 from grader.checks.action.action import OfGoals, answered_goals, evidence, why_rejected
 from grader.checks.check import Subject, check, stop_if, stop_if_any
 from grader.checks.need import Act, Stimulated
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_answer import why_late
 from grader.diagnosis.no_endpoint import ACTION
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.unended_goal import ended_alone, why_no_end, why_not_canceled
 from grader.findings.fields import the_goal
 from grader.findings.finding import Finding
-from grader.findings.words import worded
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Duration
@@ -49,7 +49,7 @@ def cancels(recording: Recording, parameters: Cancels) -> Finding:
     )
     took_s = ((goals[0].result_ns or 0) - (goals[0].canceled_ns or 0)) / NS
     observed = f"canceled {format_duration(took_s)} after it was asked"
-    return Finding.passed(parameters.asked_for, observed, evidence(recording, goals[0]))
+    return Finding.as_asked(observed, evidence(recording, goals[0]))
 
 
 def _why_not_asked(recording: Recording, goal: Goal) -> Finding | None:
@@ -95,24 +95,21 @@ def preempts(recording: Recording, parameters: Preempts) -> Finding:
         stop_if(why_rejected(recording, old) or why_rejected(recording, goal))
         stop_if(_why_goes_on(recording, old, goal, parameters.within))
     shown = evidence(recording, goals[0])
-    return Finding.passed(parameters.asked_for, "the old goal ended", shown)
+    return Finding.as_asked("the old goal ended", shown)
 
 
 def _why_goes_on(recording: Recording, old: Goal, new: Goal, within_s: float) -> Finding | None:
     """Why the old goal was not ended by the new one, or None if it was."""
     sent_ns, end_ns, shown = new.sent_ns, old.result_ns, evidence(recording, old)
-    hint = "Keep the current goal handle, and call its abort() when a new goal comes " + worded(
-        python="(handle_accepted_callback); look at is_active in every round of the loop.",
-        cpp="(handle_accepted); look at is_active() in every round of the loop.",
-    )
+    mistake = "not_preempted"
     if end_ns is None:
         seen = f"{the_goal(old)} was still worked on at the end"
-        return why_no_end(recording, seen, sent_ns, within_s) or Finding(seen, hint, shown)
+        return why_no_end(recording, seen, sent_ns, within_s) or mistaken(mistake, seen, shown)
     if end_ns < sent_ns:
         if recording.stolen_s(old.sent_ns, sent_ns) >= (sent_ns - end_ns) / NS:
             return Finding.undecided("the old goal had ended before the new one was sent")
         return ended_alone(recording, old, shown)
     if old.status == "succeeded":
-        return Finding(f"{the_goal(old)} was worked on to its end, and succeeded", hint, shown)
+        return mistaken(mistake, f"{the_goal(old)} was worked on to its end, and succeeded", shown)
     seen = f"after the new goal was sent, {the_goal(old)} did not end"
-    return why_late(recording, ACTION, old.action, sent_ns, end_ns, within_s, seen, hint, shown)
+    return why_late(recording, ACTION, old.action, sent_ns, end_ns, within_s, seen, mistake, shown)

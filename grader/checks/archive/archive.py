@@ -8,6 +8,7 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.need import Bags
+from grader.diagnosis.mistake import mistaken
 from grader.findings.finding import Finding
 from grader.findings.wording import code, codes, counted, listing
 from grader.spec.name import InterfaceName, TopicName
@@ -31,13 +32,9 @@ def clean(submission: SubmissionRecord, parameters: Clean) -> Finding:
     workspace in which you have just built.
     """
     if not submission.leftovers:
-        return Finding.passed(parameters.asked_for, "there is nothing of that kind")
-    return Finding(
-        f"it holds {codes(submission.leftovers)}",
-        "Hand in the sources only. `git archive HEAD -o handin.zip` packs what is committed; put "
-        f"{codes(sorted({one.rpartition('/')[2] for one in submission.leftovers}))} into "
-        "`.gitignore`.",
-    )
+        return Finding.as_asked("there is nothing of that kind")
+    names = codes(sorted({one.rpartition("/")[2] for one in submission.leftovers}))
+    return mistaken("leftovers", f"it holds {codes(submission.leftovers)}", names=names)
 
 
 class File(Parameters):
@@ -71,20 +68,16 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding:
     """
     found = [path for path in submission.files if parameters.matches(path)]
     if not found:
-        return Finding(
-            "there is no such file", f"Add the file {code(parameters.path)} to what you hand in."
-        )
+        return mistaken("no_file", "there is no such file", file=code(parameters.path))
     texts = dict(submission.headings)
     missing = min((_missing(parameters, texts.get(path, ())) for path in found), key=len)
     if not missing:
-        return Finding.passed(parameters.asked_for, f"found {codes(found)}")
+        return Finding.as_asked(f"found {codes(found)}")
     headings = [heading for path in found for heading in texts.get(path, ())]
     there = listing(f'"{heading}"' for heading in headings) or "none"
     wanted = listing(f'"{heading}"' for heading in missing)
-    return Finding(
-        f"{codes(found)} lacks {wanted}; its headings: {there}",
-        f"Write a section with the heading `# {missing[0]}`.",
-    )
+    seen = f"{codes(found)} lacks {wanted}; its headings: {there}"
+    return mistaken("no_heading", seen, heading=missing[0])
 
 
 def _missing(parameters: File, headings: tuple[str, ...]) -> list[str]:
@@ -124,10 +117,10 @@ def bag(submission: SubmissionRecord, parameters: Bag) -> Finding:
         if cause is None:
             messages = counted(sum(topic.messages for topic in one.topics), "message")
             observed = f"{code(one.path)} has {messages} in {format_duration(one.duration_s)}"
-            return Finding.passed(parameters.asked_for, observed)
+            return Finding.as_asked(observed)
     if not causes:
         nothing = "there is no bag, a folder with `metadata.yaml` and an `.mcap` or `.db3` file"
-        return Finding(nothing, "Hand in the whole folder that `ros2 bag record` made.")
+        return mistaken("no_bag", nothing)
     return next(cause for _, cause in causes if cause is not None)
 
 
@@ -135,23 +128,16 @@ def _why_not(bag: BagRecord, parameters: Bag) -> Finding | None:
     """Why a bag is not what is asked for, or None."""
     here = code(bag.path)
     if bag.problem is not None:
-        return Finding(
-            f"{here}: {bag.problem}",
-            "End `ros2 bag record` with Ctrl-C and wait until it has ended. `ros2 bag info` must "
-            "be able to read the bag.",
-        )
+        return mistaken("broken_bag", f"{here}: {bag.problem}")
     types = {topic.name: topic.type for topic in bag.topics if topic.messages}
     for topic, kind in parameters.topics.items():
         if types.get(topic) != kind:
             there = f"as {code(types[topic])}" if topic in types else "no message"
             others = f"; it has {codes(types)}" if types else ""
-            return Finding(
-                f"{here} has {there} on {code(topic)}{others if topic not in types else ''}",
-                f"Record {code(topic)} ({kind}) while the node publishes on it.",
-            )
+            seen = f"{here} has {there} on {code(topic)}{others if topic not in types else ''}"
+            return mistaken("not_in_bag", seen, topic=f"{code(topic)} ({kind})")
     if parameters.lasts is not None and bag.duration_s < parameters.lasts:
-        seen = f"{here} lasts {format_duration(bag.duration_s)}"
-        return Finding(seen, "Record for a longer time.")
+        return mistaken("short_bag", f"{here} lasts {format_duration(bag.duration_s)}")
     if not types:
-        return Finding(f"{here} has no message", "Record while the node publishes.")
+        return mistaken("empty_bag", f"{here} has no message")
     return None

@@ -11,13 +11,13 @@ from pydantic import Field
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.need import Act, Doubt, Stimulated
 from grader.checks.requests import why_other_fields
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.no_answer import why_taken
 from grader.diagnosis.not_asked import evidence, why_not_asked
 from grader.findings.fields import FieldTolerance, brief, words
 from grader.findings.finding import Evidence, Finding
 from grader.findings.value import EXACT
 from grader.findings.wording import code, counted
-from grader.findings.words import worded
 from grader.recording.interaction import Asked
 from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
@@ -74,7 +74,7 @@ def asks(recording: Recording, parameters: Asks) -> Finding:
     """
     server, asked = parameters.server, recording.asked_of(parameters.server)
     shown, needed = evidence(recording, asked), len(parameters.sequence)
-    hint = "Look where the fields are set before the client sends them, and at the order."
+    hint = remedy("other_request")
     for number, (wanted, one) in enumerate(zip(parameters.sequence, asked, strict=False), start=1):
         seen, tolerance = f"number {number} that came to {code(server)} has", parameters.tolerance
         stop_if(why_other_fields(seen, "request", one.fields, wanted, tolerance, shown, hint))
@@ -84,12 +84,11 @@ def asks(recording: Recording, parameters: Asks) -> Finding:
         stop_if(why_not_asked(recording, server, needed))
     if len(asked) > needed and not parameters.more:
         seen = f"{code(server)} was asked {counted(len(asked), 'time')}, not {needed}"
-        hint = "Does a timer or a loop send again, or a callback that is called twice?"
-        stop_if(Finding(seen, hint, shown))
+        stop_if(mistaken("too_many_requests", seen, shown))
     if parameters.cancels is not None:
         stop_if(_why_not_canceled(recording, asked[needed - 1], parameters.cancels, shown))
     observed = f"asked {counted(len(asked), 'time')}, first for {brief(asked[0].fields)}"
-    return Finding.passed(parameters.asked_for, observed, shown)
+    return Finding.as_asked(observed, shown)
 
 
 def _why_too_early(before: Asked, after: Asked, shown: Evidence) -> Finding | None:
@@ -97,15 +96,8 @@ def _why_too_early(before: Asked, after: Asked, shown: Evidence) -> Finding | No
     ended = before.ended_ns is not None and before.ended_ns <= after.asked_ns
     if ended or before.status == "unanswered":
         return None
-    return Finding(
-        f"the next one ({brief(after.fields)}) came before the result of {brief(before.fields)}",
-        "Send the next one only in the callback that takes the result: of a goal that is "
-        + worded(
-            python="the future of get_result_async(), not that of send_goal_async().",
-            cpp="result_callback of SendGoalOptions, not goal_response_callback.",
-        ),
-        shown,
-    )
+    seen = f"the next one ({brief(after.fields)}) came before the result of {brief(before.fields)}"
+    return mistaken("too_early", seen, shown)
 
 
 def _why_not_canceled(
@@ -120,8 +112,6 @@ def _why_not_canceled(
     if canceled_ns is None:
         seen = "the last goal was never asked to cancel"
     is_early = canceled_ns is not None and took_s < span_s[0]
-    cancel = worded("goal_handle.cancel_goal_async()", "client->async_cancel_goal(goal_handle)")
-    hint = f"Start a timer when the goal is accepted, and call {cancel} in it."
     end_ns = canceled_ns or recording.stop_ns
     taken = None if is_early else why_taken(recording, seen, begin_ns, end_ns, span_s[1])
-    return taken or Finding(seen, hint, shown)
+    return taken or mistaken("not_canceled", seen, shown)

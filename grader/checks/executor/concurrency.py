@@ -12,15 +12,17 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.log.log_content import logged, printed
-from grader.diagnosis.process.blocked_executor import why_not_called
+from grader.diagnosis.explanation import cause_of, explain
+from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.process.not_called import Uncalled
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.undeclared import why_undeclared
+from grader.diagnosis.wrong_executor import GROUP, MULTI, SINGLE, OtherExecution
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code, codes, counted, listing
-from grader.findings.words import EXCLUSIVE, REENTRANT, SPIN_NODE, group_class, worded
+from grader.findings.words import group_class
 from grader.measure.callback_runs import Event, Run, overlaps, paired, spans, timed
 from grader.measure.declarations import (
-    declares,
     executors,
     hides_calls,
     traced,
@@ -29,8 +31,6 @@ from grader.measure.declarations import (
 from grader.recording.model import NS, Recording
 from grader.spec.unit import Dimension, parse_quantity
 
-_SINGLE, _MULTI = "SingleThreadedExecutor", "MultiThreadedExecutor"
-_EXCLUSIVE = "MutuallyExclusiveCallbackGroup"
 _CALLBACKS = (
     "Each is a topic that the node subscribes to or a service that it offers (`/chatter`), the "
     "period of a timer (`500 ms`), or the name of a function or method."
@@ -112,14 +112,15 @@ def overlap(recording: Recording, parameters: Overlap) -> Finding:
     begin_s = recording.since_launch_s((wrong or runs)[0].begin_ns)
     evidence = Evidence((Moment("one runs", begin_s),), spans=spans(recording, runs, wrong))
     if not found if never else min(numbers.values()) >= least:
-        return Finding.passed(parameters.asked_for, observed, evidence)
+        return Finding.as_asked(observed, evidence)
     followed = [pair for pair in pairwise(runs) if _half_s(*pair) > _gap_s(*pair) > -_half_s(*pair)]
     prevented = sum(_was_held_up(recording, *pair) for pair in pairwise(runs))
     kept_apart = sum(not _was_held_up(recording, *pair) for pair in followed)
     # Where one waited for the other, and the machine took nothing, they were kept apart.
     if not never and prevented > kept_apart and min(numbers.values()) + prevented >= least:
         return Finding.undecided(f"{observed}, but the machine held callbacks up")
-    return Finding(observed, _hint(recording, runs, together=not never), evidence)
+    hint = cause_of(OtherExecution(recording, runs, together=not never))
+    return Finding(observed, hint, evidence)
 
 
 def _was_held_up(recording: Recording, one: Run, other: Run) -> bool:
@@ -153,32 +154,10 @@ def _why_not_seen(recording: Recording, seen: str, *, declared: bool = True) -> 
     if declared and not traced(recording):
         return why_undeclared(recording, "its executor and callbacks")
     others = sorted({f"{run.callback} ({run.serves})" for run in timed(recording)})
-    cause = why_ended(recording, seen) or why_not_called(recording, seen, ())
-    return cause or Finding(
-        seen + (f"; {codes(others)} ran" if others else ""),
-        "Look whether it is created in the constructor, with the name or the seconds that are "
-        "asked for, and whether every callback returns, and logs what is asked for.",
-        Evidence((Moment("launched", 0.0),), spans=spans(recording, timed(recording))),
-        disturbed=was_held_up(recording),
-    )
-
-
-def _hint(recording: Recording, runs: Sequence[Run], *, together: bool) -> str:
-    if together and declares(recording, "made") and _MULTI not in dict(executors(recording)):
-        return (
-            f"The {_MULTI} that was made never spins: {SPIN_NODE} uses another one, with one "
-            "thread. Call executor.add_node(node) and executor.spin()."
-        )
-    if together and len({run.group for run in runs}) == 1 and runs[0].group.startswith(_EXCLUSIVE):
-        group = worded("callback_group=...", "callback group")
-        return (
-            f"They are in one {EXCLUSIVE}, the node's default group if no {group} is given. Give "
-            f"them a {REENTRANT}, or each a group of its own."
-        )
-    return (
-        f"{SPIN_NODE} and a {_SINGLE} run one callback at a time. When a {_MULTI} spins, only "
-        f"callbacks of one {EXCLUSIVE} wait for each other."
-    )
+    cause = why_ended(recording, seen) or explain(Uncalled(recording, seen))
+    shown = Evidence((Moment("launched", 0.0),), spans=spans(recording, timed(recording)))
+    lacking = mistaken("not_run", seen + (f"; {codes(others)} ran" if others else ""), shown)
+    return cause or replace(lacking, disturbed=was_held_up(recording))
 
 
 class ExecutorKind(Parameters):
@@ -218,7 +197,7 @@ def kind(recording: Recording, parameters: ExecutorKind) -> Finding:
         return Finding.ours(f"the declarations contradict each other: {impossible}")
     groups = sorted({run.group for run in runs})
     pairs = sorted({(run.callback, groups.index(run.group)) for run in runs})
-    exclusive = [group.startswith(_EXCLUSIVE) for group in groups]
+    exclusive = [group.startswith(GROUP) for group in groups]
     parts = [f"a {name} with {counted(threads, 'thread')} spins" for name, threads in spun]
     parts += [
         f"{code(name)} is in {group_class(groups[of].split()[0])} {of + 1}" for name, of in pairs
@@ -231,11 +210,11 @@ def kind(recording: Recording, parameters: ExecutorKind) -> Finding:
     }
     evidence = Evidence((Moment("launched", 0.0),), spans=spans(recording, runs))
     # Before one of several threads spins, another may wait for a service.
-    good = any(right) if wanted == _MULTI else all(right)
+    good = any(right) if wanted == MULTI else all(right)
     if good and (not names or grouped[parameters.groups]):
-        return Finding.passed(parameters.asked_for, listing(parts), evidence)
-    together = wanted == _MULTI and (not good or parameters.groups != "same")
-    hint = _hint(recording, runs, together=together)
+        return Finding.as_asked(listing(parts), evidence)
+    together = wanted == MULTI and (not good or parameters.groups != "same")
+    hint = cause_of(OtherExecution(recording, runs, together))
     return Finding(listing(parts), hint, evidence)
 
 
@@ -245,8 +224,8 @@ def _impossible(recording: Recording) -> str:
         one, other = both.one, both.other
         spins = [item.data for item in recording.declared("spin")]
         spun = [spin.get("executor") for spin in spins if str(spin.get("pid")) == one.pid]
-        in_one = one.group == other.group and one.group.startswith(_EXCLUSIVE)
-        alone = spun == [_SINGLE] and one.thread != other.thread
+        in_one = one.group == other.group and one.group.startswith(GROUP)
+        alone = spun == [SINGLE] and one.thread != other.thread
         if one.pid == other.pid and (in_one or alone):
             return f"{code(one.callback)} and {code(other.callback)} overlap"
     return ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median
 
 from pydantic import Field
@@ -10,13 +10,14 @@ from pydantic import Field
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Doubt
 from grader.checks.node.node import target_nodes
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
-from grader.diagnosis.process.blocked_executor import (
+from grader.diagnosis.process.not_called import (
+    Uncalled,
     at_its_place,
-    blocked_hint,
     left_s,
-    why_never_spun,
+    never_spun,
 )
 from grader.diagnosis.process.process_exit import ended_early, why_ended, why_it_exited
 from grader.diagnosis.process.standing import slow_callback, where_it_stands
@@ -24,7 +25,7 @@ from grader.diagnosis.undeclared import why_undeclared
 from grader.findings.finding import Evidence, Finding, Moment, Plot, Status
 from grader.findings.first_seen import first_seen, nodes_seen
 from grader.findings.wording import code, codes, counted
-from grader.findings.words import SLEEP, SPIN, SPIN_NODE, Words, worded
+from grader.findings.words import SPIN_NODE, worded
 from grader.measure import callback_runs, declarations
 from grader.measure.declarations import was_held_up
 from grader.measure.paused import paused, publishers
@@ -42,16 +43,6 @@ _MOST_HELD_NS = 3 * NS
 # How the tracer names a callback that is None: create_rate() makes a timer that calls nothing.
 _NOTHING = "NoneType"
 _CALLED_NOTHING = "rosgrade let the executor call nothing"
-_HINT = Words(
-    python="A thread or a loop that sleeps adds what its work takes to every period, and goes on "
-    "where the executor has stopped. Create a timer in the constructor, "
-    "self.timer = self.create_timer(period, self.callback) with the period in seconds, publish in "
-    "its callback, and call rclpy.spin(node) in main().",
-    cpp="A thread or a loop that sleeps adds what its work takes to every period, and goes on "
-    "where the executor has stopped. Create a timer in the constructor, "
-    "timer_ = this->create_wall_timer(period, callback) with the unit of the period, such as "
-    "300ms, publish in its callback, and call rclcpp::spin(node) in main().",
-)
 
 
 class Responsive(Parameters):
@@ -111,7 +102,7 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
     if not bad:
         stop_if(_why_mostly_late(recording, parameters, groups))
         summary = _summary(groups, parameters)
-        return Finding.passed(parameters.asked_for, summary, _evidence(recording, groups))
+        return Finding.as_asked(summary, _evidence(recording, groups))
     # Of the late calls, those that were late for another reason than what the host took.
     own = [sum(_own_s(recording, call) > parameters.within for call in one.late) for one in bad]
     if all(one.enough(late) for one, late in zip(bad, own, strict=True)):
@@ -190,13 +181,10 @@ def _why_mostly_late(
         if median(_own_s(recording, call) for call in group.judged) <= allowed_s:
             return Finding.undecided(f"{observed}, but the machine took the time from the process")
         late = [call for call in group.judged if _wait_s(recording, call) > allowed_s]
-        cause = Finding(
-            f"{observed}: callbacks keep the executor busy most of the time",
-            f"A callback does its work and returns at once: no {SLEEP} in it.",
-            _evidence(recording, [_Answers(group.node, group.judged, late)]),
-        )
-        stand = slow_callback(recording)
-        return cause if stand is None else at_its_place(cause, observed, stand)
+        shown = _evidence(recording, [_Answers(group.node, group.judged, late)])
+        seen = f"{observed}: callbacks keep the executor busy most of the time"
+        cause = mistaken("busy", seen, shown)
+        return at_its_place(cause, observed, slow_callback(recording))
     return None
 
 
@@ -211,13 +199,12 @@ def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> 
     seen += meanwhile if number else ""
     evidence = _evidence(recording, [group])
     processes = () if process is None else (process,)
-    never_spun = why_never_spun(recording, seen, (group.node,), processes)
-    if never_spun is not None:
-        return never_spun
+    stop_if(never_spun(Uncalled(recording, seen, (group.node,), processes)))
     name = process.name if process else None
-    stand = (name and where_it_stands(recording, name)) or slow_callback(recording, name)
-    cause = Finding(f"{seen}: something blocks the executor", blocked_hint(), evidence)
-    return cause if stand is None else at_its_place(cause, seen, stand)
+    stand = where_it_stands(recording, name) if name else None
+    stand = stand or slow_callback(recording, name)
+    cause = mistaken("blocked", f"{seen}: something blocks the executor", evidence)
+    return at_its_place(cause, seen, stand)
 
 
 def _unasked(recording: Recording, names: list[str], parameters: Responsive) -> Finding:
@@ -238,26 +225,18 @@ def _unasked(recording: Recording, names: list[str], parameters: Responsive) -> 
     if lacking:
         # Only declarations would be left, and a process can declare anything.
         busy, library = was_held_up(recording), worded("rclpy", "rclcpp")
-        return Finding(
+        found = mistaken(
+            "no_services",
             f"{codes(lacking)} has none of the services "
             f"{codes(EXECUTOR_SERVICES, 'and')} that {library} makes for every node: "
             "nothing shows from outside whether its executor spins",
-            "Leave at least one of them on: "
-            + worded(
-                python="do not set both start_parameter_services and "
-                "start_type_description_service to False.",
-                cpp="do not switch off both start_parameter_services and "
-                "start_type_description_service.",
-            ),
             Evidence(moments=nodes_seen(recording)),
-            Status.ERROR if busy else Status.FAILED,
-            disturbed=busy,
         )
+        return replace(found, status=Status.ERROR, disturbed=True) if busy else found
     if declarations.declares(recording, "spin") and declarations.declares(recording, "timer"):
-        return Finding.passed(
-            parameters.asked_for,
+        return Finding.as_asked(
             f"{codes(names)} answered no call that could be judged; the process declared a timer "
-            "and that its executor spins",
+            "and that its executor spins"
         )
     return Finding.ours(
         f"no call to {codes(executor_services(name)[0] for name in names)} could be judged, of "
@@ -331,13 +310,12 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
         created_s = recording.since_launch_s(calling[0].declared_ns)
         rest = f", and nothing was published while {_CALLED_NOTHING}"
         seen = rest if recording.pauses and publishers(recording, parameters.topic) else ""
-        return Finding.passed(
-            parameters.asked_for,
+        return Finding.as_asked(
             f"the process declared a timer of {format_duration(calling[0].period_s)}{name}{seen}",
             Evidence(moments=(Moment("timer created", created_s),)),
         )
     elif declarations.timer_of_zero(recording):
-        return Finding.passed(parameters.asked_for, "the process declared a timer")
+        return Finding.as_asked("the process declared a timer")
     else:
         rate = " but that of a rate, which calls nothing" if timers else ""
         observed = (
@@ -345,7 +323,7 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
             "such as a thread or a loop"
         )
     evidence = Evidence(moments=first_seen(recording, messages))
-    return Finding(observed, str(_HINT), evidence)
+    return mistaken("no_timer", observed, evidence)
 
 
 def _why_uncalled(recording: Recording, topic: str) -> Finding | None:
@@ -367,9 +345,8 @@ def _why_uncalled(recording: Recording, topic: str) -> Finding | None:
         return Finding.undecided(f"{observed}, but the machine held messages up")
     when_s = recording.since_launch_s(found.uncalled_ns[0])
     moment = Moment("published outside of every callback", when_s)
-    return Finding(
-        f"{observed}: a thread or a loop calls publish()", str(_HINT), Evidence((moment,))
-    )
+    seen = f"{observed}: a thread or a loop calls publish()"
+    return mistaken("no_timer", seen, Evidence((moment,)))
 
 
 def _why_not_paused(recording: Recording, topic: str) -> Finding | None:
@@ -391,7 +368,7 @@ def _why_not_paused(recording: Recording, topic: str) -> Finding | None:
         for one in recording.processes
         if one.name in publish and not declarations.declares(recording, "ran", one.name)
     ]
-    stop_if(why_never_spun(recording, seen, processes=uncalled))
+    stop_if(never_spun(Uncalled(recording, seen, (), uncalled)))
     if has_ended:
         if callback_runs.publishes(recording, topic):
             return None
@@ -401,10 +378,6 @@ def _why_not_paused(recording: Recording, topic: str) -> Finding | None:
         )
     if not declarations.declares(recording, "spin"):
         return Finding.ours(f"{seen}: rosgrade does not know its kind")
-    return Finding(
-        seen,
-        f"Every callback must return, and {SPIN} must wait for the next one. Do not "
-        "replace the executor's methods, and close only the file descriptors that you opened.",
-        Evidence(moments=first_seen(recording, recording.on(topic))),
-        disturbed=was_held_up(recording),
-    )
+    shown = Evidence(moments=first_seen(recording, recording.on(topic)))
+    found = mistaken("never_waits", seen, shown)
+    return replace(found, disturbed=was_held_up(recording))

@@ -15,6 +15,7 @@ from grader.checks.interface.definition_differences import (
     field_differences,
 )
 from grader.checks.wrong_name import Named
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.not_built import existing_package, why_no_manifest
 from grader.diagnosis.not_generated import (
     GENERATORS,
@@ -71,7 +72,7 @@ def found(submission: SubmissionRecord, parameters: Found) -> Finding:
     """
     definition = find_definition(submission, parameters.parts)
     if not isinstance(definition, Finding):
-        return Finding.passed(parameters.asked_for, f"found {code(definition.file)}")
+        return Finding.as_asked(f"found {code(definition.file)}")
     own = submission.names.own(*parameters.asked_name)
     if own == parameters.interface:
         return definition
@@ -102,7 +103,7 @@ def generated(submission: SubmissionRecord, parameters: Generated) -> Finding:
     """
     definition = _definition(submission, parameters)
     stop_if(why_not_generated(submission, parameters.own(submission), definition))
-    return Finding.passed(parameters.asked_for, "generated and installed")
+    return Finding.as_asked("generated and installed")
 
 
 class Defined(OfInterface):
@@ -169,35 +170,31 @@ def _compared(
     try:
         own = sections_of(str(name), definition.text)
     except DefinitionError as error:
-        return Finding(
-            f"{definition.file}:{error.line} cannot be read: {error}",
-            "A line holds a type and a name, such as `float64 x`, or a constant, such as "
-            "`uint8 ON=1`; `#` begins a comment.",
-            Evidence(places=(SourceError(definition.file, error.line, "cannot be read"),)),
-        )
+        shown = Evidence(places=(SourceError(definition.file, error.line, "cannot be read"),))
+        seen = f"{definition.file}:{error.line} cannot be read: {error}"
+        return mistaken("unreadable_definition", seen, shown)
     title = f"{name.file}: as it should be, and yours"
     sides = (Comparison(title, tuple(_lines(wanted)), tuple(_lines(own))),)
     if len(own) != len(wanted):
-        return Finding(
-            f"{code(definition.file)} has {len(own) - 1} lines `---`, not {len(wanted) - 1}",
-            f"The parts of a .{name.kind} file are {listing(_PARTS[len(wanted)])}, with a line "
-            "`---` between them.",
-            Evidence(comparisons=sides),
-        )
+        seen = f"{code(definition.file)} has {len(own) - 1} lines `---`, not {len(wanted) - 1}"
+        parts = listing(_PARTS[len(wanted)])
+        shown = Evidence(comparisons=sides)
+        return mistaken("other_parts", seen, shown, kind=name.kind, parts=parts)
     differing = [
         (item, section.lines.get(item.name))
         for expected, section in zip(wanted, own, strict=True)
         for item in differ(expected, section, name.package)
     ]
     if not differing:
-        return Finding.passed(parameters.asked_for, f"found in {code(definition.file)}")
+        return Finding.as_asked(f"found in {code(definition.file)}")
     places = tuple(
         SourceError(definition.file, line, item.text.replace("`", "")) for item, line in differing
     )
-    return Finding(
+    return mistaken(
+        "other_definition",
         "; ".join(item.text for item, _ in differing),
-        " ".join(dict.fromkeys(item.hint for item, _ in differing[:2])),
         Evidence(places=places[:10], comparisons=sides),
+        write=" ".join(dict.fromkeys(item.hint for item, _ in differing[:2])),
     )
 
 
@@ -231,24 +228,27 @@ def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding:
     package = existing_package(submission, parameters.parts.package)
     missing = tuple(_missing(package, used_packages(parameters.parts, definition)))
     if missing:
-        return Finding(
+        return mistaken(
+            "no_entry",
             f"package.xml lacks {listing(f'{code(tag)} ({why})' for tag, why in missing)}",
-            f"Add to package.xml: {codes(tag for tag, _ in missing)}.",
             Evidence(
                 places=(SourceError(package.file("package.xml"), None, "entries are missing"),),
                 tables=(Table("What package.xml lacks", ("entry", "what it is for"), missing),),
             ),
+            tags=codes(tag for tag, _ in missing),
         )
     if package.registered:
-        return Finding.passed(parameters.asked_for, "every entry is there")
+        return Finding.as_asked("every entry is there")
     cmake = package.file("CMakeLists.txt")
-    return Finding.failed(
-        f"{parameters.asked_for}, and the package is registered where ROS looks for it",
+    found = mistaken(
+        "unregistered",
         f"{code(package.name)} was installed, but not registered: neither `ros2 interface show` "
         "nor another package finds it",
-        f"End {code(cmake)} with ament_package().",
         Evidence(places=(SourceError(cmake, None, "ends without it"),)),
+        cmake=code(cmake),
     )
+    registered = "the package is registered where ROS looks for it"
+    return replace(found, expected=f"{parameters.asked_for}, and {registered}")
 
 
 def _missing(package: PackageRecord, used: Iterable[str]) -> Iterator[tuple[str, str]]:

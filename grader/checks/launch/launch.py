@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_node import why_no_node, why_not_node, written_nodes
 from grader.diagnosis.process.process_exit import why_crashed
 from grader.findings.finding import Evidence, Finding, Moment, Table
@@ -51,25 +52,18 @@ def graph(recording: Recording, parameters: Graph) -> Finding:
     nodes = written_nodes(recording)
     more = [one for one in nodes if one.name not in parameters.nodes]
     if more:
-        return Finding(
-            f"{codes(sorted({one.name for one in more}))} is started, too",
-            "Look for a condition such as IfCondition that is missing or reversed, and for names "
-            "and namespaces that are written in the launch file instead of taken from an argument.",
-            Evidence(moments=nodes_seen(recording)),
-        )
+        seen = f"{codes(sorted({one.name for one in more}))} is started, too"
+        return mistaken("more_nodes", seen, Evidence(moments=nodes_seen(recording)))
     ends = [one for kind in Kind for one in recording.student_endpoints(kind)]
     own = {one.topic for one in ends if one.node in parameters.nodes and "/_" not in one.topic}
     topics = own.difference(_OF_EVERY_NODE)
     wanted = topics if parameters.topics is None else set(parameters.topics)
     if topics != wanted:
         lacking, others = codes(sorted(wanted - topics)), codes(sorted(topics - wanted))
-        return Finding(
-            f"lacking: {lacking or 'no topic'}; beyond that there is: {others or 'no topic'}",
-            "Look at `remappings` and `namespace` of the nodes in the launch file.",
-            Evidence(moments=nodes_seen(recording)),
-        )
+        seen = f"lacking: {lacking or 'no topic'}; beyond that there is: {others or 'no topic'}"
+        return mistaken("other_topics", seen, Evidence(moments=nodes_seen(recording)))
     started = f"{codes(sorted({one.name for one in nodes}))} and no other node"
-    return Finding.passed(parameters.asked_for, started, Evidence(moments=nodes_seen(recording)))
+    return Finding.as_asked(started, Evidence(moments=nodes_seen(recording)))
 
 
 class Arguments(Parameters):
@@ -137,7 +131,7 @@ def arguments(recording: Recording, parameters: Arguments) -> Finding:
             continue
         value = "..." if wanted is None else wanted
         write = f"DeclareLaunchArgument('{name}', default_value='{value}', description='...')"
-        return Finding(seen, f"Write {code(write)}.", evidence)
+        return mistaken("other_argument", seen, evidence, argument=code(write))
     return Finding.passed(asked, there, evidence)
 
 

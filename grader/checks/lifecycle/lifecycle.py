@@ -11,13 +11,13 @@ from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Act, Doubt, Stimulated
 from grader.checks.requests import timeline
 from grader.checks.service.service import judged_calls, why_slow
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_endpoint import SERVICE, offered
 from grader.diagnosis.no_node import why_not_node
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import nodes_seen
 from grader.findings.wording import code, counted, listing
-from grader.findings.words import worded
 from grader.recording.model import Call, Recording
 from grader.spec.name import QualifiedNodeName
 
@@ -71,25 +71,17 @@ def state(recording: Recording, parameters: State) -> Finding:
             before = [one for one in changes if one.requested_ns < calls[number].requested_ns]
             observed = f"at call {number + 1} of get_state it is {label}"
             return _otherwise(observed, before[-1:], shown)
-    return Finding.passed(parameters.asked_for, listing(seen, "then"), shown)
+    return Finding.as_asked(listing(seen, "then"), shown)
 
 
 def _otherwise(observed: str, last_change: list[Call], shown: Evidence) -> Finding:
     """The finding for another state, after the last transition succeeded or failed."""
-    hint = "The node must begin unconfigured, and must not change its state by itself."
+    mistake = "own_transition"
     for call in last_change:
         if (call.response or {}).get("success") is not True:
             observed += f", after the transition {transition(call)} failed"
-            hint = (
-                "The callback of a transition (on_configure, on_activate, ...) must return "
-                + worded(
-                    python="TransitionCallbackReturn.SUCCESS, and call super() where it activates "
-                    "publishers.",
-                    cpp="CallbackReturn::SUCCESS, and on_activate() must activate its publishers: "
-                    "publisher_->on_activate().",
-                )
-            )
-    return Finding(observed, hint, shown)
+            mistake = "failed_transition"
+    return mistaken(mistake, observed, shown)
 
 
 def _state(call: Call) -> str:
@@ -111,9 +103,5 @@ def why_not_managed(recording: Recording, node: str) -> Finding | None:
     missing = why_not_node(recording, node)
     if missing is not None or offered(recording, SERVICE, service):
         return missing
-    base = worded("rclpy.lifecycle.LifecycleNode", "rclcpp_lifecycle::LifecycleNode")
-    return Finding(
-        f"{code(node)} is no lifecycle node: it has no service {code(service)}",
-        f"Inherit from {base} instead of Node.",
-        Evidence(moments=nodes_seen(recording)),
-    )
+    seen = f"{code(node)} is no lifecycle node: it has no service {code(service)}"
+    return mistaken("unmanaged", seen, Evidence(moments=nodes_seen(recording)))

@@ -10,9 +10,10 @@ from pydantic import Field
 
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.need import SentOrOwn
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_log import why_not_logged
 from grader.diagnosis.no_messages import why_silent
-from grader.diagnosis.process.blocked_executor import why_slow
+from grader.diagnosis.process.not_called import Uncalled, slow_callbacks
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen
 from grader.findings.value import FieldPath
@@ -106,10 +107,10 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     if parameters.own:
         stop_if(None if carried else why_silent(recording, parameters.topic))
     elif own:
-        return Finding(
+        return mistaken(
+            "echoed_sensor",
             f"the node itself publishes on {code(parameters.topic)}, so its log shows nothing of "
             "what it was sent",
-            "Only the robot publishes its sensors: remove this publisher, and subscribe.",
             Evidence(moments=endpoints_seen(recording, own)),
         )
     messages = [
@@ -138,8 +139,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     lines = [line for echo in found for line in echo.lines]
     last_s = recording.since_launch_s(lines[-1].time_ns)
     number = counted(len(messages), "message")
-    return Finding.passed(
-        parameters.asked_for,
+    return Finding.as_asked(
         f"log lines follow {len(found)} of {number}: {quote(lines[-1].text)}",
         Evidence(
             moments=(Moment(f"logged a message on {parameters.topic}", last_s),),
@@ -171,11 +171,9 @@ def _too_seldom(
     observed += f", although messages came on {code(parameters.topic)}"
     kind = Kind.PUBLISHER if parameters.own else Kind.SUBSCRIPTION
     nodes = {item.node for item in recording.student_endpoints(kind, parameters.topic)}
-    hint = "Log in every call of the callback, or at least once in a second."
-    moment = Moment("no line from here on", begin_s)
-    return why_slow(recording, observed, nodes) or Finding(
-        observed, hint, Evidence(moments=(moment,))
-    )
+    shown = Evidence(moments=(Moment("no line from here on", begin_s),))
+    slow = slow_callbacks(Uncalled(recording, observed, nodes))
+    return slow or mistaken("seldom", observed, shown)
 
 
 def _own_s(recording: Recording, gap: tuple[int, int]) -> float:

@@ -10,15 +10,17 @@ from typing import Annotated, Literal, get_args
 from pydantic import AfterValidator, Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
+from grader.diagnosis.explanation import explain
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_node import why_no_node, why_not_node
-from grader.diagnosis.process.blocked_executor import left_s, why_not_called
+from grader.diagnosis.process.not_called import Uncalled, left_s
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.wrong_rhythm import why_paused
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import until_the_end
 from grader.findings.text import check_asked, says
 from grader.findings.wording import code, counted, percent
-from grader.findings.words import LOG, worded
+from grader.findings.words import worded
 from grader.measure.printed import logged_text, quote
 from grader.recording.model import NS, LogLine, Recording
 from grader.spec.name import QualifiedNodeName
@@ -195,18 +197,10 @@ def contains(recording: Recording, parameters: Contains) -> Finding:
     if len(found) < low:
         return _why_lacking(recording, parameters, found)
     if high is not None and len(found) > high:
-        return Finding(
-            f"{len(found)} of them, such as {quote(found[-1].text)}",
-            "Log once where it happens, not in every call of a callback: "
-            + worded(
-                python="self.get_logger().info(..., once=True), or throttle_duration_sec=1.0.",
-                cpp="RCLCPP_INFO_ONCE(get_logger(), ...), or RCLCPP_INFO_THROTTLE(get_logger(), "
-                "*get_clock(), 1000, ...).",
-            ),
-            _evidence(recording, found),
-        )
+        seen = f"{len(found)} of them, such as {quote(found[-1].text)}"
+        return mistaken("logs_too_often", seen, _evidence(recording, found))
     what = f"{len(found)}, such as {quote(found[0].text)}" if found else "none"
-    return Finding.passed(parameters.asked_for, what, _evidence(recording, found))
+    return Finding.as_asked(what, _evidence(recording, found))
 
 
 def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]) -> Finding:
@@ -219,35 +213,32 @@ def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]
     other = [item for item in records if parameters.says(item.text) and item not in found]
     if other:
         observed = f"{quote(other[0].text)} is logged as {other[0].level}, not as {level}"
-        return Finding(observed, f"Call {call}.", _evidence(recording, other))
+        return mistaken("other_level", observed, _evidence(recording, other), call=call)
     seen = f"only {len(found)} of them" if found else "none"
     lost = sum(process.dropped_bytes for process in recording.processes)
     cause = parameters.why_no_node(recording) or why_ended(recording, seen)
     if cause is None and lost:
         return Finding.ours(f"{seen}, but {lost} bytes of output were not kept", "Log less.")
     nodes = {node.name for node in recording.student_nodes}
-    cause = cause or why_not_called(recording, seen, nodes)
+    cause = cause or explain(Uncalled(recording, seen, nodes))
     if cause is not None:
         return cause
     lines = [line for line in printed(recording) if parameters.says(line.text)]
     if lines and not found:
         moment = Moment("printed", recording.since_launch_s(lines[0].time_ns))
-        return Finding(
-            f"{quote(lines[0].text)} is printed, not logged",
-            f"Write {call} in place of {worded('print()', 'std::cout or printf()')}.",
-            Evidence(moments=(moment,), log=tuple(line.text for line in lines[:_SHOWN])),
-        )
-    hint = f"Is the line reached that calls {call} with such a text?"
-    if isinstance(parameters, Contains) and parameters.printed:
-        hint += " What a node of a launch file prints is shown with output='screen' only."
+        shown = Evidence(moments=(moment,), log=tuple(line.text for line in lines[:_SHOWN]))
+        seen = f"{quote(lines[0].text)} is printed, not logged"
+        return mistaken("printed", seen, shown, call=call)
+    prints = isinstance(parameters, Contains) and parameters.printed
+    mistake = "not_shown" if prints else "not_logged"
     if not records:
         nothing = until_the_end(recording, "nothing logged when the observation ended")
-        return Finding("the node logs nothing", hint, Evidence(moments=(nothing,)))
+        return mistaken(mistake, "the node logs nothing", Evidence(moments=(nothing,)), call=call)
     if not found:
         near = nearest(parameters.text or "", [item.text for item in records])
         seen = f"{counted(len(records), 'log message')}, but none of these"
         seen += f"; similar is {quote(near)}" if near else ""
-    return Finding(seen, hint, _evidence(recording, found or records[-_SHOWN:]))
+    return mistaken(mistake, seen, _evidence(recording, found or records[-_SHOWN:]), call=call)
 
 
 class Worst(Records):
@@ -271,14 +262,10 @@ def level(recording: Recording, parameters: Worst) -> Finding:
     severe = [item for item in records if item.level in above]
     if not severe:
         seen = f"{counted(len(records), 'log message')}, none above it"
-        return Finding.passed(parameters.asked_for, seen)
+        return Finding.as_asked(seen)
     observed = f"{counted(len(severe), 'log message')} above it, the first {severe[0].level}"
-    debug = worded("debug('...')", "RCLCPP_DEBUG")
-    return Finding(
-        f"{observed}: {quote(severe[0].text)}",
-        f"Correct what it warns about; what is no problem is logged with {LOG} or {debug}.",
-        _evidence(recording, severe),
-    )
+    seen = f"{observed}: {quote(severe[0].text)}"
+    return mistaken("severe", seen, _evidence(recording, severe))
 
 
 class Rate(Matching):
@@ -339,27 +326,16 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
                 _SILENT_PERIODS / low_hz if low_hz else math.inf,
                 f"{counted(len(found), 'log message')}, but none in the last "
                 f"{format_duration((recording.stop_ns - last_ns) / NS)}",
-                "The node must go on logging: look for a counter or a condition that ends it, for "
-                "a timer that is cancelled, and for a callback that does not return.",
+                "stops_logging",
             )
         )
         shown = _evidence(recording, found)
-        return Finding.passed(parameters.asked_for, f"{rate_hz:.3g} Hz", shown)
+        return Finding.as_asked(f"{rate_hz:.3g} Hz", shown)
     if not found:
         return _why_lacking(recording, parameters, found)
     if rate_hz < low_hz and left_s(recording, begin_ns, end_ns) <= len(found) / low_hz:
         return Finding.held_up(seen, recording.stolen_s(begin_ns, end_ns))
-    return Finding(
-        seen,
-        "Log in a timer of that period, or "
-        + worded(
-            python="with throttle_duration_sec=1.0 in a faster callback: "
-            "self.get_logger().info('...', throttle_duration_sec=1.0).",
-            cpp="in a faster callback with RCLCPP_INFO_THROTTLE(get_logger(), *get_clock(), 1000, "
-            '"...").',
-        ),
-        _evidence(recording, found),
-    )
+    return mistaken("other_log_rate", seen, _evidence(recording, found))
 
 
 def _evidence(recording: Recording, records: list[Logged]) -> Evidence:

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if, toleranced
 from grader.checks.need import PUBLISHED, Recorded
-from grader.diagnosis.explanation import explain
+from grader.diagnosis.explanation import cause_of, explain
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
-from grader.diagnosis.wrong_value import FLOAT_HINT, WrongValue, accumulates, was_integer
+from grader.diagnosis.wrong_order import WrongOrder, plain
+from grader.diagnosis.wrong_value import WrongValue, was_integer
 from grader.findings.fields import (
     FieldTolerance,
     difference_table,
     instead,
-    wanted_text,
     within_words,
     words,
 )
@@ -35,7 +35,6 @@ from grader.findings.value import (
     tolerance_of,
 )
 from grader.findings.wording import code, codes, counted
-from grader.findings.words import worded
 from grader.measure.numbering import is_numbered, published
 from grader.recording.model import Kind, Recording
 from grader.spec.expression import Expression
@@ -123,18 +122,13 @@ def count(recording: Recording, parameters: Count) -> Finding:
     observed = counted(number, "message") + (f" ({lost} of them lost on the way)" if lost else "")
     observed += per
     if high is None or number <= high * each:
-        return Finding.passed(parameters.asked_for, observed, evidence)
+        return Finding.as_asked(observed, evidence)
     publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
     if len(publishers) > 1:
         nodes = codes(sorted({item.node for item in publishers}))
         observed += f" from {len(publishers)} publishers (in {nodes})"
-    if per:
-        hint = "Publish once in each call of the callback: look for a second publish()."
-    elif high == 1:
-        hint = "Publish once, in the constructor: call publish() nowhere else, and in no loop."
-    else:
-        hint = "Look for a second publish() or a loop around it, and for what calls it too often."
-    return Finding(observed, hint, evidence)
+    mistake = "once_per_call" if per else "once" if high == 1 else "too_many"
+    return mistaken(mistake, observed, evidence)
 
 
 class Equal(Parameters):
@@ -189,7 +183,7 @@ def equal(recording: Recording, parameters: Equal) -> Finding:
         return _wrong(recording, parameters, found)
     if len(messages) < parameters.at_least:
         return why_few(recording, parameters.topic, parameters.at_least)
-    return Finding.passed(parameters.asked_for, f"all of {counted(len(messages), 'message')}")
+    return Finding.as_asked(f"all of {counted(len(messages), 'message')}")
 
 
 def _wrong(
@@ -204,37 +198,24 @@ def _wrong(
     more = len(found) - _MOST_FIELDS
     observed += f" and {counted(more, 'more wrong field')}" if more > 0 else ""
     field, message = found[0].field, messages[first - 1]
-    if accumulates(found[0].expected, [leaves(item.value).get(field) for item in messages]):
-        observed += f": {field} grows from message to message, as if added up"
-    else:
-        tolerance = tolerance_of(parameters.tolerance, field)
-        always = wrong == len(messages)
-        clause = explain(WrongValue(found, leaves(message.value), tolerance, always))
-        observed += f": {clause}" if clause else ""
+    tolerance, right = tolerance_of(parameters.tolerance, field), len(messages) - wrong
+    series = [leaves(item.value).get(field) for item in messages]
+    clause = explain(WrongValue(found, leaves(message.value), tolerance, not right, series))
+    observed += f": {clause}" if clause else ""
     if len(messages) > 1:
         observed += f" ({wrong} of {counted(len(messages), 'message')} wrong)"
     when_s = recording.since_launch_s(message.stamp_ns)
-    return Finding(
-        observed,
-        _hint(found, len(messages), len(messages) - wrong),
-        Evidence(
-            moments=(Moment(f"message {first} is wrong", when_s),),
-            tables=(difference_table(f"Message {first}", found),),
-        ),
+    shown = Evidence(
+        moments=(Moment(f"message {first} is wrong", when_s),),
+        tables=(difference_table(f"Message {first}", found),),
     )
-
-
-def _hint(found: tuple[Difference, ...], number: int, right: int) -> str:
     if any(was_integer(item.observed) for item in found):
-        return str(FLOAT_HINT)
+        return mistaken("float_field", observed, shown)
     if right:
-        return (
-            f"{counted(right, 'message')} of {number} {'is' if right == 1 else 'are'} right. Look "
-            "for what makes the others different: a counter, a condition, what is added up, or a "
-            "second publish()."
-        )
+        words = f"{counted(right, 'message')} of {len(messages)} {'is' if right == 1 else 'are'}"
+        return mistaken("some_wrong", observed, shown, right=words)
     fields = codes([item.field for item in found[:_MOST_FIELDS]])
-    return f"Look where the program sets {fields} before publish(msg), and to what."
+    return mistaken("all_wrong", observed, shown, fields=fields)
 
 
 class Series(Parameters):
@@ -280,9 +261,9 @@ class Series(Parameters):
     def _asked(self) -> str:
         which = f"{code(self.field)} of the messages on {code(self.topic)}"
         if self.values:
-            return f"{which}: {', '.join(map(_text, self.values))}, in this order"
-        begins = "" if self.start is None else f"begins with {_text(self.start)} and "
-        return f"{which} {begins}grows by {_text(self.step)} from message to message"
+            return f"{which}: {', '.join(map(plain, self.values))}, in this order"
+        begins = "" if self.start is None else f"begins with {plain(self.start)} and "
+        return f"{which} {begins}grows by {plain(self.step)} from message to message"
 
 
 @check("messages.sequence", Subject.RECORDING, Series)
@@ -315,9 +296,8 @@ def sequence(recording: Recording, parameters: Series) -> Finding:
         return why_few(recording, parameters.topic, needed)
     if parameters.values and len(parameters.values) - 1 not in places:
         return Finding.undecided("the last of these messages was lost in transit")
-    return Finding.passed(
-        parameters.asked_for,
-        f"{_text(found[0])} to {_text(found[-1])} in {counted(len(found), 'message')}",
+    return Finding.as_asked(
+        f"{plain(found[0])} to {plain(found[-1])} in {counted(len(found), 'message')}"
     )
 
 
@@ -337,51 +317,19 @@ def _wrong_order(
     wanted: Sequence[Any],
     first: int,
 ) -> Finding:
-    why, hint = _explain_order(parameters, found)
+    cause = cause_of(WrongOrder(found, parameters.step, parameters.tolerance))
     when_s = recording.since_launch_s(recording.on(parameters.topic)[first].stamp_ns)
     rows = tuple(
-        (str(number), "any" if want is None else _text(want), _text(have))
+        (str(number), "any" if want is None else plain(want), plain(have))
         for number, (want, have) in enumerate(zip(wanted, found, strict=True), start=1)
     )
     title, header = f"{parameters.field} of {parameters.topic}", ("message", "expected", "observed")
     return Finding(
-        f"{code(parameters.field)} is {_text(found[first])} instead of {_text(wanted[first])} in "
-        f"message {first + 1} of {len(found)}{why}",
-        hint,
+        f"{code(parameters.field)} is {plain(found[first])} instead of {plain(wanted[first])} in "
+        f"message {first + 1} of {len(found)}{cause.observed}",
+        cause.hint,
         Evidence(
             moments=(Moment(f"message {first + 1} is wrong", when_s),),
             tables=(Table(title, header, rows[:50]),),
         ),
     )
-
-
-def _explain_order(parameters: Series, found: Sequence[Any]) -> tuple[str, str]:
-    """What the values tell, as a clause, and what to try."""
-    if parameters.step is None:
-        return "", "Publish the values that are asked for, each once and in this order."
-    hint = f"Change the value once for every message, by {_text(parameters.step)}."
-    steps = [b - a for a, b in pairwise(found)]
-    if steps and not any(steps):
-        an_attribute = worded(
-            python="an attribute of the node, such as self.count",
-            cpp="a member of the node, such as count_",
-        )
-        return (
-            ": the value never changes",
-            f"Keep the value in {an_attribute}, and change it in the timer's callback.",
-        )
-    if steps and all(same(steps[0], item, parameters.tolerance) for item in steps):
-        grows = f"it begins with {_text(found[0])} and grows by {_text(steps[0])}"
-        return f": {grows} from message to message", hint
-    if found[0] in found[1:] and steps[0]:
-        return (
-            f": it goes back to the first value in message {found.index(found[0], 1) + 1}",
-            "Is the value reset, does it overflow, or do two publishers count?",
-        )
-    return "", hint
-
-
-def _text(value: Any) -> str:
-    """A value as people write it, whole numbers without a decimal point."""
-    is_whole = isinstance(value, float) and value.is_integer()
-    return wanted_text(int(value) if is_whole else value)

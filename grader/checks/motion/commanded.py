@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.motion.no_motion import (
     why_cut_short,
     why_not_judged,
@@ -17,12 +19,11 @@ from grader.diagnosis.motion.no_motion import (
 )
 from grader.diagnosis.no_messages import why_silent
 from grader.findings.finding import Evidence, Finding, Plot
-from grader.findings.first_seen import first_seen
+from grader.findings.first_seen import evidence_at, first_seen
 from grader.findings.wording import code, counted, percent
 from grader.measure.motion.approach import NO_SPEED_M_S
 from grader.measure.motion.command import VelocityCommand, command_topic, commands
 from grader.measure.motion.quantities import speed, turn
-from grader.measure.motion.track import evidence_at
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene
 from grader.spec.quantity import Ratio
@@ -80,13 +81,13 @@ def within_limits(recording: Recording, parameters: WithinLimits) -> Finding:
     first, worst = beyond[0], max(beyond, key=lambda item: _excess(item, scene)[0])
     share = percent(round(len(beyond) / len(sent), 3))
     most = "" if worst is first else f", the largest {_excess(worst, scene)[1]}"
-    return Finding.failed(
-        expected,
+    found = mistaken(
+        "beyond_limits",
         f"{len(beyond)} of {counted(len(sent), 'command')} ({share}): the first is "
         f"{_excess(first, scene)[1]}{most}",
-        "Clamp before you publish: max(-limit, min(limit, value)).",
         evidence_at(recording, "first command beyond a limit", first.time_ns, *plots),
     )
+    return replace(found, expected=expected)
 
 
 def _excess(item: VelocityCommand, scene: Scene) -> tuple[float, str]:
@@ -128,12 +129,9 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     if not driving:
         topic = command_topic(recording)
         sent = recording.on(topic)
-        cause = Finding(
-            f"no command on {code(topic)} has a linear.x other than 0",
-            "linear.x = gain * distance, on the way to the goal's position.",
-            Evidence(moments=first_seen(recording, sent)),
-        )
-        return cause if sent else why_silent(recording, topic)
+        shown = Evidence(moments=first_seen(recording, sent))
+        seen = f"no command on {code(topic)} has a linear.x other than 0"
+        return mistaken("no_drive", seen, shown) if sent else why_silent(recording, topic)
     fastest = max(map(_size, driving))
     last = min(driving[-_LAST:], key=_size)
     plot = _plot(recording, driving, "linear.x (m/s)")
@@ -142,18 +140,11 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     levels = Counter(round(_size(item), _DIGITS) for item in driving)
     if len(levels) == _SWITCHED and min(levels.values()) >= _SEVERAL and _stays(driving, levels):
         sizes = " and ".join(speed(size) for size in sorted(levels, reverse=True))
-        return Finding(
-            f"linear.x is switched between {sizes}, whatever the distance is",
-            "linear.x = gain * distance, at most the limit: it becomes less with every command.",
-            evidence,
-        )
+        seen = f"linear.x is switched between {sizes}, whatever the distance is"
+        return mistaken("on_off", seen, evidence)
     if _size(last) <= parameters.share * fastest:
-        return Finding.passed(parameters.asked_for, seen, evidence)
-    return Finding(
-        seen,
-        "linear.x = gain * distance: far from the goal the robot is fast, near it slow.",
-        evidence,
-    )
+        return Finding.as_asked(seen, evidence)
+    return mistaken("not_slower", seen, evidence)
 
 
 def _stays(driving: list[VelocityCommand], levels: Collection[float]) -> bool:

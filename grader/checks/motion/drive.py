@@ -11,11 +11,12 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters, moved_in
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
 from grader.diagnosis.wrong_value import factor_words
 from grader.findings.finding import Evidence, Finding
-from grader.findings.first_seen import until_the_end
+from grader.findings.first_seen import evidence_at, until_the_end
 from grader.findings.wording import counted, percent
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.ground import ahead
@@ -25,7 +26,6 @@ from grader.measure.motion.track import (
     MOVED_M,
     REST_M_S,
     departure,
-    evidence_at,
     final_rest,
     gone_ahead_m,
     over_time,
@@ -44,14 +44,6 @@ _SAME_SPEED = 0.05
 # Besides what the robot needs to speed up, a node may bring its commands up in steps.
 _IN_STEPS_S = 0.5
 _WAY_TOLERANCE_M = 2e-3
-_FIELDS_HINT = (
-    "linear.x is the speed in metres per second, and forward is positive (REP-103). angular.z is "
-    "the turn."
-)
-_IN_BETWEEN_HINT = (
-    "Log what makes it stop. A range that is not measured (inf, 0.0) may count as an obstacle. Or "
-    "a second place, such as a timer, publishes other commands than the callback."
-)
 
 
 class Drives(RobotParameters):
@@ -84,9 +76,10 @@ def drives(recording: Recording, parameters: Drives) -> Finding:
     steps = _free(recording.truth, scene, parameters)
     plot = speed_plot(recording, (low, high))
     if not steps:
-        return why_interrupted(recording) or Finding(
-            f"the robot drove only {metres(way_m(recording.truth))}, too little to judge its speed",
-            "Drive on as long as nothing is near ahead. One command holds until the next.",
+        way = metres(way_m(recording.truth))
+        return why_interrupted(recording) or mistaken(
+            "little_way",
+            f"the robot drove only {way}, too little to judge its speed",
             _since_departure(recording),
         )
     judged = [recording.since_launch_s(step.time_ns) for step in (steps[0], steps[-1])]
@@ -95,13 +88,13 @@ def drives(recording: Recording, parameters: Drives) -> Finding:
     good = sum(low <= step.linear_m_s <= high for step in steps) / len(steps)
     seen = f"median {speed(middle)}; the speed is right for {percent(round(good, 3))} of the time"
     if low <= middle <= high and good >= _LEAST_SHARE:
-        return Finding.passed(parameters.asked_for, seen, Evidence(plots=(plot,)))
+        return Finding.as_asked(seen, Evidence(plots=(plot,)))
     if low <= middle <= high:
         stop_if(why_interrupted(recording))
-    words, hint = _wrong_speed(steps, scene, wanted, middle)
+    words, mistake = _wrong_speed(steps, scene, wanted, middle)
     off = next((step for step in steps if not low <= step.linear_m_s <= high), steps[0])
     evidence = evidence_at(recording, "first at a wrong speed", off.time_ns, plot)
-    return Finding(f"{seen}: {words}", hint, evidence)
+    return mistaken(mistake, f"{seen}: {words}", evidence)
 
 
 def _free(truth: Sequence[Truth], scene: Scene, parameters: Drives) -> list[Truth]:
@@ -133,25 +126,25 @@ def _free(truth: Sequence[Truth], scene: Scene, parameters: Drives) -> list[Trut
 def _wrong_speed(
     steps: Sequence[Truth], scene: Scene, wanted: float, middle: float
 ) -> tuple[str, str]:
-    """What is wrong with the speed, and what to try."""
+    """What is wrong with the speed, in words."""
     command = median(step.command_m_s for step in steps)
     limit = scene.max_linear_m_s
     pauses = groupby(steps, lambda step: abs(step.linear_m_s) < REST_M_S or not step.command_m_s)
     number = sum(pausing for pausing, _ in pauses)
     if abs(middle) < REST_M_S and any(abs(step.angular_rad_s) > 0.01 for step in steps):
-        return "the robot turns on the spot instead of driving", _FIELDS_HINT
+        return "the robot turns on the spot instead of driving", "other_field"
     if number:
-        return f"the robot paused in between, {counted(number, 'time')}", _IN_BETWEEN_HINT
+        return f"the robot paused in between, {counted(number, 'time')}", "pauses"
     if abs(command) > limit * 1.001 and abs(middle) > limit * 0.98:
         times = factor_words(command, wanted)
         words = f"{speed(command)} was commanded, and the robot can do no more than {speed(limit)}"
-        return words + (f": the command {times}" if times else ""), _FIELDS_HINT
+        return words + (f": the command {times}" if times else ""), "other_field"
     pace = "slowly" if abs(middle) < abs(wanted) else "fast"
     words = f"it drives too {pace}" if middle * wanted >= 0.0 else "it drives the wrong way"
     slowest, fastest = min(s.linear_m_s for s in steps), max(s.linear_m_s for s in steps)
     if fastest - slowest > _SAME_SPEED * abs(middle) and speed(slowest) != speed(fastest):
         words = f"it varies from {speed(slowest)} to {speed(fastest)}"
-    return words, f"Publish the same speed as long as nothing is near ahead. {_FIELDS_HINT}"
+    return words, "other_speed"
 
 
 class KeepsDriving(RobotParameters):
@@ -174,7 +167,7 @@ def keeps_driving(recording: Recording, parameters: KeepsDriving) -> Finding:
     gone_m = gone_ahead_m(recording.truth)
     if gone_m >= parameters.distance - _WAY_TOLERANCE_M:
         evidence = Evidence(plots=(speed_plot(recording),))
-        return Finding.passed(parameters.asked_for, f"went {metres(gone_m)} ahead", evidence)
+        return Finding.as_asked(f"went {metres(gone_m)} ahead", evidence)
     return why_interrupted(recording) or _why_not_ahead(recording, gone_m)
 
 
@@ -182,10 +175,10 @@ def _why_not_ahead(recording: Recording, gone_m: float) -> Finding:
     truth = recording.truth
     if way_m(truth) < MOVED_M:
         words = "the robot only turned on the spot"
-        return Finding(words, _FIELDS_HINT, _since_departure(recording))
+        return mistaken("other_field", words, _since_departure(recording))
     if gone_m < -_WAY_TOLERANCE_M:
         words = f"the robot drove {metres(-gone_m)} backwards"
-        return Finding(words, _FIELDS_HINT, _since_departure(recording))
+        return mistaken("other_field", words, _since_departure(recording))
     rest = final_rest(truth)
     if rest is None:
         return _too_slow(recording, gone_m)
@@ -196,12 +189,8 @@ def _why_not_ahead(recording: Recording, gone_m: float) -> Finding:
     )
     seen = f"stopped after {metres(gone_m)} in all"
     if misread is not None:
-        return Finding(f"{seen}: {misread.words}", misread.hint, evidence)
-    return Finding(
-        f"{seen}, {when_s:.2f} s after launch",
-        "Which message made it stop? Log what the callback compares.",
-        evidence,
-    )
+        return mistaken("misread_scan", f"{seen}: {misread.words}", evidence, hint=misread.hint)
+    return mistaken("stopped", f"{seen}, {when_s:.2f} s after launch", evidence)
 
 
 def _too_slow(recording: Recording, gone_m: float) -> Finding:
@@ -218,7 +207,7 @@ def _too_slow(recording: Recording, gone_m: float) -> Finding:
     if lost_s > 0.25 * (driven_s + waited_s):
         return Finding.held_up(words, lost_s)
     evidence = Evidence(moments=(until_the_end(recording),), plots=(speed_plot(recording),))
-    return Finding(words, _FIELDS_HINT, evidence)
+    return mistaken("other_field", words, evidence)
 
 
 def _since_departure(recording: Recording) -> Evidence:
@@ -262,21 +251,21 @@ def straight(recording: Recording, parameters: Straight) -> Finding:
     if turning:
         worst = max((step.command_rad_s for step in turning), key=abs)
         when_s = recording.since_launch_s(turning[0].time_ns)
-        return Finding(
+        return mistaken(
+            "turn_commanded",
             f"angular.z = {turn(worst)} was commanded (from {when_s:.2f} s after launch, "
             f"{percent(len(turning) / len(truth))} of the time)",
-            "The speed ahead is linear.x, the turn is angular.z: leave angular.z at 0.0.",
             evidence_at(recording, "first turn commanded", turning[0].time_ns, plot),
         )
     turned = [wrap_angle(step.yaw_rad - truth[0].yaw_rad) for step in truth]
     off_rad = max(turned, key=abs)
     if abs(off_rad) > parameters.heading:
         first = next(i for i, angle in enumerate(turned) if abs(angle) > parameters.heading)
-        return Finding(
+        return mistaken(
+            "small_turns",
             f"the heading changed by {degrees(off_rad)}, through commands of less than "
             f"{turn(parameters.tolerance)} that add up",
-            "Leave angular.z at exactly 0.0.",
             evidence_at(recording, "the heading is too far off", truth[first].time_ns, plot),
         )
     seen = f"heading within {degrees(off_rad)} of the start"
-    return Finding.passed(parameters.asked_for, seen, Evidence(plots=(plot,)))
+    return Finding.as_asked(seen, Evidence(plots=(plot,)))

@@ -11,17 +11,18 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import GoalParameters, RobotParameters
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.missed_heading import why_not_aligned
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted, why_off_course, why_unsteered
 from grader.findings.finding import Evidence, Finding, Plot
-from grader.findings.first_seen import until_the_end
+from grader.findings.first_seen import evidence_at, until_the_end
 from grader.findings.wording import percent
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.quantities import degrees, metres, point, speed, turn
-from grader.measure.motion.track import evidence_at, final_rest, is_at_rest, speed_plot, way_m
+from grader.measure.motion.track import final_rest, is_at_rest, speed_plot, way_m
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 from grader.spec.quantity import Angle, Duration, PositiveLength, Ratio
@@ -76,11 +77,10 @@ def reaches(recording: Recording, parameters: Reaches) -> Finding:
 
 
 def _restless(recording: Recording, last: Truth, place: str) -> Finding:
-    return Finding(
+    return mistaken(
+        "restless",
         f"{place} not at rest when the observation ends: {speed(last.linear_m_s)} and "
         f"{turn(last.angular_rad_s)}",
-        "Publish a Twist of zeros where both errors are below your tolerances: the last command "
-        "holds until the next.",
         Evidence(
             moments=(until_the_end(recording, "not at rest when the observation ended"),),
             plots=(speed_plot(recording),),
@@ -114,7 +114,7 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
     took_s = (end.time_ns - truth[0].time_ns) / NS
     if rest is not None and took_s <= parameters.within:
         seen = f"at rest after {format_duration(took_s)}"
-        return Finding.passed(parameters.asked_for, seen, evidence)
+        return Finding.as_asked(seen, evidence)
     stop_if(why_interrupted(recording))
     lost_s = stolen_s(recording, truth[0].time_ns, end.time_ns)
     if lost_s > 0.0 and took_s - lost_s <= parameters.within:
@@ -123,9 +123,9 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
     stop_if(why_unsteered(recording))
     if rest is None:
         return _restless(recording, end, f"after {format_duration(took_s)} it is")
-    return Finding(
+    return mistaken(
+        "slow",
         f"at rest after {format_duration(took_s)}",
-        "With larger gains the robot is faster. With gains that are too large it overshoots.",
         evidence_at(recording, "at rest", end.time_ns, *evidence.plots),
     )
 
@@ -160,16 +160,14 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding:
     evidence = Evidence(plots=(run.distance_plot,))
     more_m = gone_m - straight_m * (1.0 + parameters.most)
     if more_m <= 0.0:
-        return Finding.passed(parameters.asked_for, seen, evidence)
+        return Finding.as_asked(seen, evidence)
     lost_s = stolen_s(recording, run.truth[0].time_ns, run.truth[-1].time_ns)
     # What it drives on without a command, it has to come back.
     if lost_s > 0.0 and 2.0 * lost_s * max(abs(step.linear_m_s) for step in run.truth) >= more_m:
         return Finding.held_up(seen, lost_s)
-    return Finding(
+    return mistaken(
+        "long_path",
         seen,
-        "Does the robot turn to the goal at once, and the short way? Wrap the error "
-        "atan2(dy, dx) - yaw to [-pi, pi]. Its gain must be several times the gain of the "
-        "distance.",
         evidence_at(
             recording,
             "farthest from the straight line to the goal",
@@ -211,19 +209,15 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     far = max(past_m, key=past_m.__getitem__)
     seen, plot = f"{metres(past_m[far])} past the goal", _plot(run, past_m, parameters.most)
     if past_m[far] <= parameters.most:
-        return Finding.passed(parameters.asked_for, seen, Evidence(plots=(plot,)))
+        return Finding.as_asked(seen, Evidence(plots=(plot,)))
     arrived = run.truth[parameters.arrival(run)]
     lost_s = stolen_s(recording, arrived.time_ns - _BRAKING_NS, far)
     fastest_m_s = max(abs(step.linear_m_s) for step in run.truth)
     # The robot keeps its last command for as long as the machine keeps the next one back.
     if lost_s * fastest_m_s >= past_m[far] - parameters.most:
         return Finding.held_up(seen, lost_s)
-    return why_off_course(recording) or Finding(
-        seen,
-        "Compute linear.x as a gain times the distance: then the robot slows down before the goal. "
-        "Make the gain smaller, so that linear.x is below its limit before the robot arrives.",
-        evidence_at(recording, seen, far, plot),
-    )
+    shown = evidence_at(recording, seen, far, plot)
+    return why_off_course(recording) or mistaken("overshoots", seen, shown)
 
 
 def _plot(run: Approach, past_m: dict[int, float], most_m: float) -> Plot:

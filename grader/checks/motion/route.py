@@ -13,14 +13,16 @@ from pydantic import AfterValidator, Field
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters, moved_in
 from grader.diagnosis.explanation import cause_of
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.motion.missed_place import PlaceMissed
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.first_seen import evidence_at
 from grader.findings.wording import counted, listing, percent
 from grader.measure.motion.ground import nearest
 from grader.measure.motion.quantities import metres, point
-from grader.measure.motion.track import evidence_at, is_at_rest, over_time, speed_plot, way_m
+from grader.measure.motion.track import is_at_rest, over_time, speed_plot, way_m
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
 from grader.spec.quantity import Duration, Length, PositiveLength, Ratio
@@ -92,14 +94,10 @@ def visits(recording: Recording, parameters: Visits) -> Finding:
     )
     missed = [place for number, place in enumerate(parameters.places) if number not in moments]
     if not missed:
-        return Finding.passed(
-            parameters.asked_for, f"all of them on {metres(way_m(recording.truth))}", evidence
-        )
+        return Finding.as_asked(f"all of them on {metres(way_m(recording.truth))}", evidence)
     cause = _why_missed(recording, parameters, moments, evidence.moments)
     credit = len(moments) / len(parameters.places)
-    return Finding.failed(
-        parameters.asked_for, cause.observed, cause.hint, cause.evidence, credit=credit
-    )
+    return Finding(cause.observed, cause.hint, cause.evidence, credit=credit)
 
 
 def _why_missed(
@@ -125,10 +123,9 @@ def _why_missed(
         return cause_of(symptom)
     short = f"at rest for less than {format_duration(parameters.pause or 0.0)}"
     how = short if parameters.pause else "only before the places before it"
-    hint = "Publish zeros at each place, for the time of the pause."
-    if not parameters.pause:
-        hint = "Take the places in their order: choose the next one when the robot is at this one."
-    told = symptom.cause(f"it was at {name}, {how}", hint, f"at {name}", there)
+    mistake = "short_pause" if parameters.pause else "other_order"
+    seen, label = f"it was at {name}, {how}", f"at {name}"
+    told = symptom.cause(seen, remedy(mistake), label, there)
     return why_off_course(recording) or told
 
 
@@ -208,11 +205,9 @@ def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding:
     )
     begin = next((index for index, is_right in enumerate(kept) if is_right), None)
     if begin is None:
-        return why_off_course(recording) or Finding(
-            "it never was at this distance",
-            "Look at the plot of the distance: which range does the node compare?",
-            evidence_at(recording, "the run began", truth[0].time_ns, plot),
-        )
+        shown = evidence_at(recording, "the run began", truth[0].time_ns, plot)
+        seen = "it never was at this distance"
+        return why_off_course(recording) or mistaken("never_at_distance", seen, shown)
     end_s = recording.since_launch_s(truth[-1].time_ns)
     plot = replace(plot, judged=(recording.since_launch_s(truth[begin].time_ns), end_s))
     steps = list(zip(truth[begin:], truth[begin + 1 :], kept[begin + 1 :], strict=False))
@@ -222,13 +217,8 @@ def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding:
     seen = f"{metres(right_m)} of {metres(whole_m)} at this distance ({percent(round(ratio, 2))})"
     evidence = evidence_at(recording, "first at this distance", truth[begin].time_ns, plot)
     if right_m >= parameters.way and ratio >= parameters.share:
-        return Finding.passed(parameters.asked_for, seen, evidence)
-    return why_off_course(recording) or Finding(
-        seen,
-        "Turn towards the wall where it is too far, and away where it is too near: angular.z is a "
-        "gain times the error, with the sign of REP-103 (positive is left).",
-        evidence,
-    )
+        return Finding.as_asked(seen, evidence)
+    return why_off_course(recording) or mistaken("other_distance", seen, evidence)
 
 
 def _distance(scene: Scene) -> Callable[[Truth], float | None]:

@@ -11,13 +11,14 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters, moved_in
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_it_exited
 from grader.findings.finding import Evidence, Finding, Table
-from grader.findings.first_seen import until_the_end
+from grader.findings.first_seen import evidence_at, until_the_end
 from grader.findings.wording import counted
 from grader.measure.motion.command import commands, scans, stolen_s
 from grader.measure.motion.ground import Sight, ahead
@@ -25,7 +26,6 @@ from grader.measure.motion.quantities import metres, speed
 from grader.measure.motion.scan import front, misreading
 from grader.measure.motion.track import (
     REST_M_S,
-    evidence_at,
     first_rest,
     index_at,
     is_at_rest,
@@ -75,20 +75,16 @@ def stops(recording: Recording, parameters: Stops) -> Finding:
     off_m = None if sight is None or step.contact else sight.distance_m - wanted_m
     if sight is not None and off_m is not None and -parameters.late <= off_m <= parameters.early:
         seen = f"{sight.name} at {metres(sight.distance_m)}"
-        return Finding.passed(parameters.asked_for, seen, evidence)
+        return Finding.as_asked(seen, evidence)
     stop_if(deeper)
     if sight is not None and off_m is not None and off_m < 0.0:
         return _late(recording, scene, rest, sight, parameters)
     misread = misreading(recording, step)
     where = f"{sight.name} still {metres(sight.distance_m)} ahead" if sight else "nothing ahead"
-    return Finding(
-        f"stopped early, with {where}{f': {misread.words}' if misread else ''}",
-        misread.hint
-        if misread
-        else "Which range made it stop? Log the value that the callback compares. Ranges are "
-        "measured from the LiDAR, not from the robot's edge.",
-        evidence,
-    )
+    seen = f"stopped early, with {where}"
+    if misread:
+        return mistaken("misread_scan", f"{seen}: {misread.words}", evidence, hint=misread.hint)
+    return mistaken("stopped_early", seen, evidence)
 
 
 def _never_stopped(recording: Recording) -> Finding:
@@ -99,13 +95,12 @@ def _never_stopped(recording: Recording) -> Finding:
         if sight
         else "nothing is ahead any more"
     )
-    return Finding(
+    return mistaken(
+        "never_stopped",
         "the robot has not come to rest: it turns on the spot"
         if abs(last.linear_m_s) < REST_M_S
         else f"the robot never stopped: it still drives at {speed(last.linear_m_s)} when the "
         f"observation ends, after {metres(way_m(recording.truth))}; {where}",
-        "The last command holds until the next: to stop, publish a Twist with linear.x = 0.0 and "
-        "angular.z = 0.0.",
         Evidence(
             moments=(until_the_end(recording, "not at rest when the observation ended"),),
             plots=(speed_plot(recording),),
@@ -131,12 +126,10 @@ def _late(
         return Finding.held_up(seen, lost_s)
     shown = [one.stamp_ns for one in scans(recording) if begin_ns <= one.stamp_ns <= end_ns]
     within = f"; {counted(len(shown), 'scan')} came meanwhile" if shown else ""
-    return Finding(
+    return mistaken(
+        "stopped_late",
         f"{seen}: it drove on for {format_duration((end_ns - begin_ns) / NS)} below "
         f"{metres(wanted_m)}, at up to {speed(fastest)}{within}",
-        "Which number does the callback compare the front range with? Ranges are in metres, and "
-        "-inf is nearer than the LiDAR can measure. Publish the stop in the scan callback itself, "
-        "from the newest scan: with a sleep, a slow timer or an average the robot stops late.",
         _evidence(recording, scene, rest, parameters),
     )
 
@@ -218,7 +211,7 @@ def stays_at_rest(recording: Recording, parameters: StaysAtRest) -> Finding:
         watched = format_duration((truth[-1].time_ns - truth[rest].time_ns) / NS)
         evidence = Evidence(plots=() if is_start else (speed_plot(recording),))
         seen = f"at rest for {watched}, to the end"
-        return Finding.passed(parameters.asked_for, seen, evidence)
+        return Finding.as_asked(seen, evidence)
     stop_if(None if is_start else why_cut_short(recording))
     heard = scans(recording)
     is_blind = is_start and bool(heard) and moved.time_ns < heard[0].stamp_ns
@@ -244,15 +237,10 @@ def _set_off(
     words += ", before the first scan had come" if is_blind else ""
     words += f", with {sight.name} {metres(sight.distance_m)} ahead" if sight else ""
     fastest = max(abs(item.linear_m_s) for item in truth)
-    return Finding(
+    mistake = "blind_start" if is_blind else "set_off" if is_start else "set_off_again"
+    return mistaken(
+        mistake,
         f"{words}: {metres(way_m(truth))} in all, at up to {speed(fastest)}",
-        "Publish no speed before the first scan: until then the node cannot know what is ahead."
-        if is_blind
-        else "Compare the range before you drive, in the first callback already, and stand still "
-        "near an obstacle: linear.x = 0.0, not less."
-        if is_start
-        else "Remember that the robot has stopped, or compare the same range in every callback: "
-        "two places that publish may contradict each other.",
         evidence_at(recording, "the robot set off", step.time_ns, speed_plot(recording)),
     )
 
@@ -276,4 +264,4 @@ def no_contact(recording: Recording, parameters: NoContact) -> Finding:
         return cause.after(touched.observed) if cause else touched
     stop_if(why_not_moved(recording))
     way, evidence = metres(way_m(recording.truth)), Evidence(plots=(speed_plot(recording),))
-    return Finding.passed(parameters.asked_for, f"no contact on a path of {way}", evidence)
+    return Finding.as_asked(f"no contact on a path of {way}", evidence)

@@ -9,13 +9,15 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import GoalParameters
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.findings.finding import Evidence, Finding
+from grader.findings.first_seen import evidence_at
 from grader.findings.wording import counted
-from grader.measure.motion.approach import WRAP_HINT, Approach, long_turns
+from grader.measure.motion.approach import Approach, long_turns
 from grader.measure.motion.quantities import degrees, metres, speed
-from grader.measure.motion.track import evidence_at, speed_plot, way_m
+from grader.measure.motion.track import speed_plot, way_m
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 from grader.spec.quantity import Angle, PositiveLength, Speed
@@ -55,15 +57,14 @@ def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
     fastest = 0.0 if recording.scene is None else recording.scene.max_linear_m_s
     if way <= max(_RUN_OUT_M, _RUN_OUT_S * fastest):
         seen = f"drove {metres(way)} after it had begun to turn"
-        return Finding.passed(parameters.asked_for, seen, evidence)
+        return Finding.as_asked(seen, evidence)
     first = stray[0][1]
     fastest = max((abs(after.command_m_s) for _, after in stray))
     when_s = recording.since_launch_s(first.time_ns)
-    return why_off_course(recording) or Finding(
+    return why_off_course(recording) or mistaken(
+        "drives_and_turns",
         f"drove {metres(way)} while it turned at the goal, commanded with up to {speed(fastest)} "
         f"(from {when_s:.2f} s after launch)",
-        "In the second phase linear.x is 0.0. Remember in a flag that the position was reached, so "
-        "that the node does not fall back into the first phase.",
         evidence_at(recording, "drives again", first.time_ns, *evidence.plots),
     )
 
@@ -133,15 +134,15 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
     if not detours:
         # A robot that drives off has shown nothing of how it turns to this goal.
         stop_if(why_not_there(run, parameters.position) if arrival is None else None)
-        return Finding.passed(parameters.asked_for, "it never turned the long way", evidence)
+        return Finding.as_asked("it never turned the long way", evidence)
     what, error_rad, step = detours[0]
     when_s = recording.since_launch_s(step.time_ns)
     more = f", and {counted(len(detours) - 1, 'more time')}" if len(detours) > 1 else ""
-    return why_off_course(recording) or Finding(
+    return why_off_course(recording) or mistaken(
+        "long_turn",
         f"turned away from {what} through half a turn: {degrees(math.tau - abs(error_rad))} "
         f"{_sense(-error_rad)} where {degrees(abs(error_rad))} {_sense(error_rad)} would do "
         f"({when_s:.2f} s after launch{more})",
-        WRAP_HINT,
         evidence_at(recording, "turns the long way", step.time_ns, *evidence.plots),
     )
 

@@ -8,8 +8,9 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.wrong_name import Named, misnamed
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_node import meant_node, why_no_node, why_not_node
-from grader.diagnosis.process.blocked_executor import left_s
+from grader.diagnosis.process.not_called import left_s
 from grader.diagnosis.process.process_exit import (
     ended_early,
     exited,
@@ -20,7 +21,6 @@ from grader.diagnosis.process.process_exit import (
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen, nodes_seen
 from grader.findings.wording import code, codes, counted
-from grader.findings.words import worded
 from grader.measure import declarations
 from grader.recording.event import LONGEST_STRETCH
 from grader.recording.model import NS, Kind, Node, Owner, Process, Recording
@@ -51,7 +51,7 @@ def _appeared(recording: Recording, parameters: Parameters, node: Node, what: st
     when_s = recording.since_launch_s(node.appeared_ns)
     shown = Evidence(moments=(Moment(f"node {node.name} appeared", when_s),))
     observed = f"{what} appeared {when_s:.2f} s after launch"
-    return Finding.passed(parameters.asked_for, observed, shown)
+    return Finding.as_asked(observed, shown)
 
 
 class NodeExists(Named):
@@ -81,11 +81,10 @@ def exists(recording: Recording, parameters: NodeExists) -> Finding:
     publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.publishes)
     others = sorted({item.node for item in publishers} - {parameters.name})
     if parameters.publishes is not None and others:
-        create = worded("self.create_publisher(...)", "this->create_publisher<...>(...)")
-        return Finding(
+        return mistaken(
+            "other_publisher",
             f"{code(parameters.name)} is there, but {codes(others)} publishes on "
             f"{code(parameters.publishes)}",
-            f"Create the publisher with {create} in the node that is asked for.",
             Evidence(moments=endpoints_seen(recording, publishers)),
         )
     node = next(item for item in recording.student_nodes if item.name == parameters.name)
@@ -140,7 +139,7 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
     stop_if(_why_gone(recording, name))
     watched_s = recording.since_launch_s(recording.stop_ns)
     observed = f"it ran for {format_duration(watched_s)}, until SIGINT"
-    return Finding.passed(parameters.asked_for, observed)
+    return Finding.as_asked(observed)
 
 
 def _why_gone(recording: Recording, name: str | None) -> Finding | None:
@@ -154,14 +153,10 @@ def _why_gone(recording: Recording, name: str | None) -> Finding | None:
     if not gone or (name is None and not concerned and len(gone) < len(nodes)):
         return None
     when_s = recording.since_launch_s(gone[0].vanished_ns or recording.stop_ns)
-    return Finding(
+    return mistaken(
+        "destroyed",
         f"the node {code(gone[0].name)} left the ROS graph {when_s:.2f} s after launch, although "
         "its process still ran",
-        worded(
-            python="Call destroy_node() and rclpy.shutdown() only after rclpy.spin() has returned.",
-            cpp="Let the node last, and call rclcpp::shutdown(), only after rclcpp::spin() has "
-            "returned.",
-        ),
         Evidence(moments=(Moment(f"node {gone[0].name} vanished", when_s),)),
     )
 
@@ -225,20 +220,16 @@ def ends(recording: Recording, parameters: Ends) -> Finding:
     for process in processes:
         if process.survivors:
             number = counted(len(process.survivors), "process", "processes")
-            return Finding(
+            return mistaken(
+                "survivors",
                 f"{code(process.name)} left {number} running behind it: {codes(process.survivors)}",
-                "End child processes before main() returns: "
-                + worded(
-                    python="process.terminate(), then process.wait().",
-                    cpp="kill(pid, SIGTERM), then waitpid(pid, nullptr, 0).",
-                ),
                 Evidence(moments=(_end(recording, process),)),
             )
     if not asked:
         return Finding.ours("a stimulus of the scenario had ended it before")
     observed = f"ended {format_duration(max(map(took_s, asked)))} after SIGINT"
     sigint = Moment("SIGINT", recording.since_launch_s(recording.stop_ns))
-    return Finding.passed(parameters.asked_for, observed, Evidence(moments=(sigint,)))
+    return Finding.as_asked(observed, Evidence(moments=(sigint,)))
 
 
 def _was_killed(recording: Recording, process: Process) -> bool:
@@ -280,18 +271,9 @@ def _why_slow(recording: Recording, process: Process) -> Finding:
         if line.process == process.name and line.time_ns >= recording.stop_ns
     ]
     sigint = Moment("SIGINT", recording.since_launch_s(recording.stop_ns))
-    return Finding(
-        seen,
-        worded(
-            python="Ctrl-C raises KeyboardInterrupt: look for a bare `except:` or "
-            "`except BaseException:` in a loop that swallows it, for a signal handler of your own, "
-            "for a callback that sleeps or loops, and for a thread that is not a daemon.",
-            cpp="Ctrl-C makes rclcpp::ok() false and rclcpp::spin() return: look for a "
-            "`while (true)` in place of `while (rclcpp::ok())`, for a signal handler of your own, "
-            "for a callback that sleeps or loops, and for a thread that is never joined.",
-        ),
-        Evidence(moments=(sigint, _end(recording, process)), log=tuple(lines[-10:])),
-    )
+    moments = (sigint, _end(recording, process))
+    shown = Evidence(moments=moments, log=tuple(lines[-10:]))
+    return mistaken("ignores_sigint", seen, shown)
 
 
 def _end(recording: Recording, process: Process) -> Moment:

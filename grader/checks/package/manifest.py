@@ -9,6 +9,7 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.package.package import OfPackage
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.not_built import existing_package, why_no_manifest
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code
@@ -39,12 +40,9 @@ def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding:
     faults = [*_placeholders(package), *_other_license(package, parameters)]
     if not faults:
         seen = f"{', '.join(package.maintainers)}; {', '.join(package.licenses)}"
-        return Finding.passed(parameters.asked_for, seen)
-    return Finding(
-        "; ".join(faults),
-        "Write in package.xml what the package does, your name and e-mail, and its licence.",
-        Evidence(places=(SourceError(package.file("package.xml"), None, faults[0]),)),
-    )
+        return Finding.as_asked(seen)
+    shown = Evidence(places=(SourceError(package.file("package.xml"), None, faults[0]),))
+    return mistaken("unsaid", "; ".join(faults), shown)
 
 
 def _placeholders(package: PackageRecord) -> Iterator[str]:

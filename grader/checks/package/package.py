@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import ClassVar
 
@@ -12,7 +11,7 @@ from pydantic import Field
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Need, Submitted
 from grader.checks.wrong_name import Named
-from grader.diagnosis.build_error import EMPTY_HINT
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_executable import why_no_executable, why_nothing_to_run
 from grader.diagnosis.not_built import (
     breach_of_rep_144,
@@ -22,17 +21,14 @@ from grader.diagnosis.not_built import (
     why_not_built,
     why_too_new,
 )
-from grader.diagnosis.process.exceptions import import_of
-from grader.findings.finding import Evidence, Finding, Table
+from grader.diagnosis.wrong_dependencies import why_unknown_imports, why_wrong_dependencies
+from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes
 from grader.findings.words import worded
 from grader.spec.name import BuildTypes, PackageName
 from grader.spec.names import NO_NAMES, Names, Thing, WrongName
-from grader.spec.nearest_name import nearest
-from grader.submission.read.dependencies import meant
-from grader.submission.read.includes import CODE
 from grader.submission.read.reachable import only_for
-from grader.submission.record import EMPTY, Import, PackageRecord, SourceError, SubmissionRecord
+from grader.submission.record import SourceError, SubmissionRecord
 
 
 class OfPackage(Parameters):
@@ -70,17 +66,13 @@ def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding:
         seen = f"{finding.observed}; everything else was judged in this package"
         return replace(finding, observed=seen, names=parameters.wrong(package.name))
     if breach := breach_of_rep_144(package.name):
-        seen = f"found in {code(package.path)}{breach}"
-        return Finding(seen, "Give the package another name.")
+        return mistaken("bad_name", f"found in {code(package.path)}{breach}")
     if not parameters.build_type or package.build_type in parameters.build_type:
-        return Finding.passed(parameters.asked_for, f"found in {code(package.path)}")
+        return Finding.as_asked(f"found in {code(package.path)}")
     manifest = SourceError(package.file("package.xml"), None, f"build type {package.build_type}")
     tags = (f"<export><build_type>{one}</build_type></export>" for one in parameters.build_type)
-    return Finding(
-        f"its build type is {package.build_type}",
-        f"Write {' or '.join(tags)} in package.xml.",
-        Evidence(places=(manifest,)),
-    )
+    seen, shown = f"its build type is {package.build_type}", Evidence(places=(manifest,))
+    return mistaken("other_build_type", seen, shown, tags=" or ".join(tags))
 
 
 class Builds(OfPackage):
@@ -99,7 +91,7 @@ def builds(submission: SubmissionRecord, parameters: Builds) -> Finding:
     """
     stop_if(why_not_built(submission, parameters.package))
     stop_if(why_nothing_to_run(existing_package(submission, parameters.package)))
-    return Finding.passed(parameters.asked_for, "it builds")
+    return Finding.as_asked("it builds")
 
 
 # Its name is the student's, and becomes an argument.
@@ -125,7 +117,7 @@ def executable(submission: SubmissionRecord, parameters: Executable) -> Finding:
     """
     cause = why_no_executable(submission, parameters.package, parameters.executable)
     if cause is None:
-        return Finding.passed(parameters.asked_for, f"installed in lib/{parameters.package}")
+        return Finding.as_asked(f"installed in lib/{parameters.package}")
     return replace(cause, names=_names(submission, parameters)) if parameters.remap else cause
 
 
@@ -140,17 +132,6 @@ def _names(submission: SubmissionRecord, parameters: Executable) -> Names:
     runs = len(there) == 1 and name not in package.executables and _FILE.fullmatch(there[0])
     asked = f"lib/{package.name}/{name}"
     return Names.of([WrongName(Thing.FILE, there[0], asked)] if runs else [])
-
-
-# Tags that make a package be there when the code runs or is built (REP-149).
-_COUNTING = frozenset(
-    {"depend", "exec_depend", "build_depend", "build_export_depend", "run_depend"}
-)
-# Words for a dependency in a tag that does not count, by the first part of the tag.
-_IDLE = {
-    "test_depend": " (test_depend counts for tests only)",
-    "export": " (package.xml names it inside <export>, where it does not count)",
-}
 
 
 class Dependencies(OfPackage):
@@ -183,102 +164,11 @@ def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Find
     stop_if(why_no_manifest(submission, parameters.package))
     package = existing_package(submission, parameters.package)
     stop_if(why_too_new(package))
-    stop_if(_why_unknown_imports(package))
+    stop_if(why_unknown_imports(package))
     if parameters.executable is not None:
         stop_if(why_no_executable(submission, parameters.package, parameters.executable))
         package = only_for(package, parameters.executable)
-    faults = [*_missing(package), *_unknown(submission, package)]
-    if not faults:
-        names = sorted({item.module for item in package.ros_imports} - {package.name})
-        observed = f"{codes(names)} declared" if names else f"none {worded('imported', 'included')}"
-        return Finding.passed(parameters.asked_for, observed)
-    seen, hints, places, rows = zip(*faults, strict=True)
-    tags = [write for (_, write), hint in zip(rows, hints, strict=True) if not hint]
-    add = (
-        [
-            f"Don't forget the dependencies: add {codes(tags)} to package.xml, directly below "
-            "<package>."
-        ]
-        if tags
-        else []
-    )
-    return Finding(
-        "; ".join(seen),
-        " ".join([*add, *filter(None, hints)]),
-        Evidence(places=places, tables=(Table("package.xml", ("what", "write"), rows),)),
-    )
-
-
-def _why_unknown_imports(package: PackageRecord) -> Finding | None:
-    """A file whose imports are unknown, since Python cannot parse it."""
-    read = {item.file for item in package.imports}
-    for error in package.syntax_errors:
-        if error.file not in read:
-            seen = f"the imports cannot be read: {error}"
-            hint = EMPTY_HINT if error.message == EMPTY else "Correct the syntax error first."
-            return Finding(seen, hint, Evidence(places=(error,)))
-    return None
-
-
-_Fault = tuple[str, str, SourceError, tuple[str, str]]
-"""What is seen, what to do (nothing: add a tag), where, and what is there and what to write."""
-
-
-def _is_elsewhere(package: PackageRecord, item: Import) -> bool:
-    """Whether all names that an import takes are known to be another package's."""
-    source = next((one for one in package.sources if one.path == item.file), None)
-    taken = [
-        dotted.rpartition(".")[2]
-        for _, dotted in (source.names if source else ())
-        if dotted.startswith(f"{item.module}.")
-    ]
-    right = [import_of(name) or f"from {item.module}." for name in taken]
-    return bool(right) and not any(line.startswith(f"from {item.module}.") for line in right)
-
-
-def _missing(package: PackageRecord) -> Iterator[_Fault]:
-    """The first import of each ROS package that is needed and not declared."""
-    kinds = {item.name: item.kind for item in package.dependencies if item.kind not in _COUNTING}
-    declared = {item.name for item in package.dependencies if item.kind in _COUNTING}
-    line = max((item.line or 0 for item in package.dependencies), default=0) or None
-    needed: dict[str, Import] = {}
-    for item in package.ros_imports:
-        if item.optional or item.module in declared or item.module == package.name:
-            continue
-        if not _is_elsewhere(package, item):
-            needed.setdefault(item.module, item)
-    for item in needed.values():
-        why = _IDLE.get(kinds.get(item.module, "").partition("/")[0], "")
-        tag = f"<depend>{item.module}</depend>"
-        verb, participle = "imports", "imported"
-        if item.file.endswith(CODE):
-            verb, participle = "includes", "included"
-        elif item.file.endswith("CMakeLists.txt"):
-            verb, participle = "uses", "used"
-        yield (
-            f"{item.file}:{item.line} {verb} {code(item.module)}{why}",
-            "",
-            SourceError(package.file("package.xml"), line, f"add {code(tag)} here"),
-            (f"{participle} in {item.file}:{item.line}", tag),
-        )
-
-
-def _unknown(submission: SubmissionRecord, package: PackageRecord) -> Iterator[_Fault]:
-    """The packages that package.xml names and that do not exist."""
-    own = {item.name for item in submission.packages}
-    imported = {item.module for item in package.ros_imports}
-    for entry in package.dependencies:
-        if entry.known is not False or entry.name in own:
-            continue
-        match = nearest(entry.name, imported) or meant(entry.name)
-        yield (
-            f"package.xml names {code(entry.name)}, which does not exist",
-            f"Did you mean {code(match)} instead of {code(entry.name)}?"
-            if match
-            else f"Remove {code(entry.name)} from package.xml.",
-            SourceError(package.file("package.xml"), entry.line, f"{entry.name} does not exist"),
-            (
-                f"<{entry.kind}>{entry.name}</{entry.kind}> does not exist",
-                f"<{entry.kind}>{match}</{entry.kind}>" if match else "remove it",
-            ),
-        )
+    stop_if(why_wrong_dependencies(submission, package))
+    names = sorted({item.module for item in package.ros_imports} - {package.name})
+    observed = f"{codes(names)} declared" if names else f"none {worded('imported', 'included')}"
+    return Finding.as_asked(observed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import PurePosixPath
 
@@ -11,6 +12,7 @@ from pydantic import Field
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.package.package import OfPackage
 from grader.checks.wrong_name import Named
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Finding
 from grader.findings.wording import code, codes
@@ -52,9 +54,9 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding:
     other = _meant(parameters.path, installed) if parameters.remap else None
     if other:
         seen = f"it installs {code(other)} instead; everything else was judged with that file"
-        hint = f"Call the file {code(name)}, and install it in `share/{package.name}/{folder}`."
+        found_there = mistaken("other_file", seen, file=name, folder=f"{package.name}/{folder}")
         names = parameters.wrong(f"share/{package.name}/{other}")
-        return Finding(seen, hint, names=names)
+        return replace(found_there, names=names)
     own = [path for path in submission.files if fnmatchcase(path.rpartition("/")[2], name)]
     seen = f"{codes(own)} is handed in, but not installed; " if own else ""
     line = f"install(DIRECTORY {folder} DESTINATION share/${{PROJECT_NAME}})` in CMakeLists.txt"
@@ -64,8 +66,8 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding:
             "of setup.py",
             cpp=line,
         )
-    hint = f"{'' if own else 'Add the file. '}Write `{line}."
-    return Finding(f"{seen}it installs {codes(installed)}", hint)
+    mistake = "not_installed" if own else "no_such_file"
+    return mistaken(mistake, f"{seen}it installs {codes(installed)}", line=line)
 
 
 def _meant(path: str, installed: Iterable[str]) -> str | None:

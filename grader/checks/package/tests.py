@@ -7,12 +7,11 @@ from pydantic import Field
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.need import StudentTests
 from grader.checks.package.package import OfPackage
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes, counted
 from grader.submission.record import SubmissionRecord
-
-_HINT = "Run `python3 -m pytest` in the folder of the package."
 
 
 class Tests(OfPackage):
@@ -40,14 +39,13 @@ def tests(submission: SubmissionRecord, parameters: Tests) -> Finding:
     if run is None:
         return Finding.ours("the tests were not run: grade again")
     if run.problem is not None:
-        hint = "Put tests into `test/test_*.py`, in functions with names that begin with `test_`."
-        return Finding(run.problem, f"{hint} {_HINT}")
+        return mistaken("no_tests", run.problem)
     if run.failed:
         names = codes(name for name, _ in run.failed)
         seen = f"{counted(run.passed, 'test')} passed, {len(run.failed)} failed: {names}"
         log = tuple(f"{name} - {message}" for name, message in run.failed)
-        return Finding(seen, _HINT, Evidence(log=log))
+        return mistaken("failed_tests", seen, Evidence(log=log))
     if run.passed < parameters.at_least:
         seen = f"there {'is' if run.passed == 1 else 'are'} {counted(run.passed, 'test')}"
-        return Finding(seen, "Write more tests.")
-    return Finding.passed(parameters.asked_for, f"{counted(run.passed, 'test')} passed")
+        return mistaken("few_tests", seen)
+    return Finding.as_asked(f"{counted(run.passed, 'test')} passed")

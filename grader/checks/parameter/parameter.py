@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Act, Doubt, ParameterSet, Stimulated
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_parameter import (
     answered_at,
     declare_parameter,
@@ -16,10 +17,10 @@ from grader.diagnosis.no_parameter import (
     why_services_silent,
 )
 from grader.findings.fields import wanted_text
-from grader.findings.finding import Evidence, Finding, Moment, Table
+from grader.findings.finding import Evidence, Finding, Table
+from grader.findings.first_seen import evidence_at
 from grader.findings.value import same, same_value
 from grader.findings.wording import code, value_text
-from grader.findings.words import Words, worded
 from grader.measure.parameter_calls import (
     Descriptor,
     Reading,
@@ -34,10 +35,6 @@ from grader.recording.model import Recording
 from grader.spec.name import QualifiedNodeName
 
 _TOLERANCE = 1e-9
-_REFUSAL = Words(
-    python="SetParametersResult(successful=False, reason='...')",
-    cpp="a SetParametersResult with successful = false and a reason",
-)
 
 
 class OfParameter(Parameters):
@@ -108,14 +105,11 @@ def declared(recording: Recording, parameters: Declared) -> Finding:
         if not values:
             stop_if(why_not_asked(recording, parameters.node, "its value was not read"))
         if not same_value(parameters.default, values[0].value):
-            return Finding(
-                f"it is {value_text(values[0].value)} at first",
-                "Its default is the second argument: "
-                f"{declare_parameter(parameters.name, wanted_text(parameters.default))}.",
-                shown,
-            )
+            declare = declare_parameter(parameters.name, wanted_text(parameters.default))
+            seen = f"it is {value_text(values[0].value)} at first"
+            return mistaken("other_default", seen, shown, declare=declare)
     value = f", {value_text(values[0].value)}" if values else ""
-    return Finding.passed(parameters.asked_for, f"{_article(found.type)}{value}", shown)
+    return Finding.as_asked(f"{_article(found.type)}{value}", shown)
 
 
 def _article(kind: str) -> str:
@@ -131,36 +125,21 @@ def _why_other_descriptor(
     found: Descriptor, parameters: Declared, shown: Evidence
 ) -> Finding | None:
     if parameters.type not in (None, found.type):
-        hint = f"The type is that of the default in {declare_parameter(parameters.name)}."
-        if (parameters.type, found.type) == ("double", "integer"):
-            hint += " 1 is an integer, 1.0 is a double."
-        return Finding(f"it is {_article(found.type)}", hint, shown)
+        is_integer = (parameters.type, found.type) == ("double", "integer")
+        mistake = "integer_parameter" if is_integer else "other_parameter_type"
+        declare = declare_parameter(parameters.name)
+        return mistaken(mistake, f"it is {_article(found.type)}", shown, declare=declare)
     wanted = [*(parameters.range or ()), *([] if parameters.step is None else [parameters.step])]
     if wanted and not (found.range and same(wanted, found.range[: len(wanted)], _TOLERANCE)):
         kind = "IntegerRange" if found.type == "integer" else "FloatingPointRange"
-        return Finding(
-            f"its range is {_range_words(found.range)}" if found.range else "it has no range",
-            _give(
-                f" with a {kind}(from_value=..., to_value=..., step=...)",
-                f" with a {kind} with from_value, to_value and step",
-            ),
-            shown,
-        )
+        seen = f"its range is {_range_words(found.range)}" if found.range else "it has no range"
+        return mistaken("other_range", seen, shown, kind=kind)
     if parameters.read_only not in (None, found.read_only):
         seen = "it is read-only" if found.read_only else "it is not read-only"
-        hint = _give(f"(read_only={parameters.read_only})", " with read_only set")
-        return Finding(seen, hint, shown)
+        return mistaken("read_only", seen, shown, read_only=str(parameters.read_only))
     if parameters.described and not found.description.strip():
-        hint = _give("(description='...')", " with a description")
-        return Finding("it has no description", hint, shown)
+        return mistaken("undescribed", "it has no description", shown)
     return None
-
-
-def _give(python: str, cpp: str) -> str:
-    return worded(
-        python=f"Give declare_parameter() a ParameterDescriptor{python}.",
-        cpp=f"Give declare_parameter() a third argument, a ParameterDescriptor{cpp}.",
-    )
 
 
 def _evidence(
@@ -235,47 +214,28 @@ def set_(recording: Recording, parameters: Set) -> Finding:
         stop_if(_why_other_answer(recording, item, parameters))
     observed = "accepted" if tried[0].accepted else refusal(tried[0])
     shown = _moment(recording, tried[0], parameters)
-    return Finding.passed(parameters.asked_for, observed, shown)
+    return Finding.as_asked(observed, shown)
 
 
 def _why_other_answer(recording: Recording, item: Setting, parameters: Set) -> Finding | None:
     shown = _moment(recording, item, parameters)
     if item.accepted and not parameters.accepted:
-        return Finding(
-            "it was accepted",
-            "Register a callback with "
-            + worded(
-                python="self.add_on_set_parameters_callback() that returns ",
-                cpp="this->add_on_set_parameters_callback(), whose handle is kept in a member, "
-                "that returns ",
-            )
-            + f"{_REFUSAL} for such a value, or give the parameter a range.",
-            shown,
-        )
+        return mistaken("accepted_value", "it was accepted", shown)
     if parameters.accepted and not item.accepted:
-        return Finding(
-            f"it was {refusal(item)}",
-            "Look at the callback of add_on_set_parameters_callback() and at the range: both "
-            "must allow it.",
-            shown,
-        )
+        return mistaken("refused_value", f"it was {refusal(item)}", shown)
     if parameters.reason.casefold() not in item.reason.casefold():
         reason = f"is “{item.reason}”" if item.reason else "is empty"
-        return Finding(
-            f"it was refused, but the reason {reason}",
-            f"Say why in {_REFUSAL}.",
-            shown,
-        )
+        return mistaken("no_reason", f"it was refused, but the reason {reason}", shown)
     for reading in readings(recording, parameters.node, parameters.name):
         if reading.call.requested_ns >= (item.call.answered_ns or 0):
             if same_value(parameters.value, reading.value) == parameters.accepted:
                 return None
             verb = "accepted" if item.accepted else "refused"
             seen = f"it was {verb}, but its value is {value_text(reading.value)} afterwards"
-            return Finding(seen, "Do not set the parameter yourself in the callback.", shown)
+            return mistaken("set_by_itself", seen, shown)
     return None
 
 
 def _moment(recording: Recording, item: Setting, parameters: Set) -> Evidence:
     text = f"set {parameters.name} = {value_text(item.value)}"
-    return Evidence(moments=(Moment(text, recording.since_launch_s(item.call.requested_ns)),))
+    return evidence_at(recording, text, item.call.requested_ns)

@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from grader.checks.check import NamedFields, Subject, check, stop_if, toleranced
 from grader.checks.need import ParameterSet, Recorded
 from grader.checks.parameter.parameter import OfSetting, refusal, settings_to
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_answer import why_raised, why_taken
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_parameter import get_parameter
@@ -21,7 +22,6 @@ from grader.findings.fields import FieldTolerance, difference_table, difference_
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.value import EXACT
 from grader.findings.wording import code, counted, percent, value_text
-from grader.findings.words import Words
 from grader.measure.parameter_calls import settings
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
@@ -29,13 +29,6 @@ from grader.spec.quantity import Duration, Ratio
 from grader.spec.unit import format_duration
 
 _LEAST_PERIODS = 3
-_NEW_TIMER = Words(
-    python="A timer keeps its period. In a callback of add_post_set_parameters_callback(), call "
-    "self.timer.cancel() and then self.timer = self.create_timer(period, self.callback), or set "
-    "self.timer.timer_period_ns.",
-    cpp="A timer keeps its period. In a callback of add_post_set_parameters_callback(), call "
-    "timer_->cancel() and then timer_ = this->create_wall_timer(period, ...).",
-)
 
 
 class TakesEffect(OfSetting):
@@ -90,11 +83,7 @@ def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding:
     when = Moment(f"set to {value_text(item.value)}", recording.since_launch_s(set_ns))
     shown = Evidence(moments=(when,))
     if not item.accepted:
-        return Finding(
-            f"the value was {refusal(item)}",
-            "Look at the callback of add_on_set_parameters_callback() and at the range.",
-            shown,
-        )
+        return mistaken("refused_value", f"the value was {refusal(item)}", shown)
     published = recording.on(parameters.topic)
     if not published:
         stop_if(why_silent(recording, parameters.topic))
@@ -110,9 +99,7 @@ def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding:
     for message in found:
         stop_if(_why_other_message(recording, parameters, message, before[-1:], set_ns, shown))
     stop_if(_why_other_period(recording, parameters, found, shown))
-    return Finding.passed(
-        parameters.asked_for, f"{counted(len(found), 'message')} after it was set", shown
-    )
+    return Finding.as_asked(f"{counted(len(found), 'message')} after it was set", shown)
 
 
 def _why_too_few(
@@ -133,10 +120,9 @@ def _why_too_few(
     stolen_s = recording.stolen_s(begin_ns, end_ns)
     if watched_s - stolen_s <= _LEAST_PERIODS * (parameters.period or 0.0):
         return Finding.held_up(f"{seen}, too few to judge", stolen_s)
-    hint = "Publish in every call of the callback, whatever the value of the parameter is."
-    return why_raised(recording, seen, begin_ns - round(parameters.within * NS)) or Finding(
-        seen, hint if parameters.period is None else str(_NEW_TIMER), shown
-    )
+    raised = why_raised(recording, seen, begin_ns - round(parameters.within * NS))
+    mistake = "stops_publishing" if parameters.period is None else "old_period"
+    return raised or mistaken(mistake, seen, shown, off="")
 
 
 def _why_other_message(
@@ -152,15 +138,13 @@ def _why_other_message(
         return None
     late_s = (message.stamp_ns - set_ns) / NS
     seen = f"{format_duration(late_s)} after it was set a message has {difference_words(wrong)}"
-    hint = f"Look at how the node uses {code(parameters.name)} where it publishes."
-    if any(wrong == unlike(one.value, parameters.fields, parameters.tolerance) for one in before):
-        hint = (
-            f"The message is as it was before: read {get_parameter(parameters.name)} in the "
-            "callback, or keep the new value in add_post_set_parameters_callback()."
-        )
+    was_before = [unlike(one.value, parameters.fields, parameters.tolerance) for one in before]
+    mistake = "old_value" if wrong in was_before else "other_use"
     taken = why_taken(recording, seen, set_ns, message.stamp_ns, parameters.within)
     table = difference_table("That message", wrong)
-    return taken or Finding(seen, hint, replace(shown, tables=(table,)))
+    shown = replace(shown, tables=(table,))
+    name, read = parameters.name, get_parameter(parameters.name)
+    return taken or mistaken(mistake, seen, shown, name=name, read=read)
 
 
 def _why_other_period(
@@ -177,5 +161,5 @@ def _why_other_period(
     stolen_s = recording.stolen_s(times[0], times[-1])
     if 0.0 < off_s * (len(times) - 1) <= stolen_s:
         return Finding.held_up(seen, stolen_s)
-    most = percent(parameters.period_tolerance)
-    return Finding(seen, f"{_NEW_TIMER} The period may be {most} off.", shown)
+    off = f" The period may be {percent(parameters.period_tolerance)} off."
+    return mistaken("old_period", seen, shown, off=off)

@@ -9,12 +9,13 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.undeclared import why_undeclared
 from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.wording import code, counted
-from grader.findings.words import A_PROFILE, Words, worded
+from grader.findings.words import Words
 from grader.measure import declarations
 from grader.measure.compatibility import (
     comparisons,
@@ -46,7 +47,6 @@ _WORDS = {
     Kind.PUBLISHER: ("offers", "offered", "subscription that requests"),
     Kind.SUBSCRIPTION: ("requests", "requested", "publisher that offers"),
 }
-_RULE = "A subscription receives nothing from a publisher that offers less than it requests."
 
 
 class Profile(Parameters):
@@ -142,12 +142,9 @@ def _judge(recording: Recording, parameters: Profile) -> Finding:
         seen = endpoints_seen(recording, own) or first_seen(
             recording, recording.on(parameters.topic)
         )
-        return Finding(
-            f"the {kind.value} of {code(node)} {has} {differences}{source}"
-            + still.format(f"{other_end} the expected profile"),
-            _hint(parameters, wrong),
-            Evidence(moments=seen),
-        )
+        differing = f"the {kind.value} of {code(node)} {has} {differences}{source}"
+        still = still.format(f"{other_end} the expected profile")
+        return _mistaken(parameters, wrong, f"{differing}{still}", Evidence(moments=seen))
     hidden = [
         name
         for name in parameters.policies
@@ -157,7 +154,7 @@ def _judge(recording: Recording, parameters: Profile) -> Finding:
         names = ", ".join(hidden) or "QoS"
         return Finding.ours(f"{names} of the {kind.value} was not discovered")
     observed = f"{did} by {counted(len(profiles), kind.value)}{source}"
-    return Finding.passed(parameters.asked_for, observed)
+    return Finding.as_asked(observed)
 
 
 def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
@@ -174,34 +171,27 @@ def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
     return found
 
 
-def _hint(parameters: Profile, wrong: Collection[str]) -> str:
+def _mistaken(parameters: Profile, wrong: Collection[str], seen: str, shown: Evidence) -> Finding:
     asked = parameters.policies
     if all(_DEFAULTS.get(name) == item for name, item in asked.items()):
-        hint = "A number as QoS, such as 10, is the default profile: reliable and volatile."
-        if "reliability" in wrong:
-            sensor_data = worded("qos_profile_sensor_data", "rclcpp::SensorDataQoS()")
-            hint += f" {sensor_data} is best_effort."
-        if "durability" in wrong:
-            hint += " A profile is transient_local only where its durability says so: leave it out."
-        return hint
-    policies = [_policy(name, item) for name, item in asked.items()]
-    profile = worded(
-        python=f"QoSProfile(depth=10, {', '.join(one.python for one in policies)}), from rclpy.qos",
-        cpp=f"rclcpp::QoS(10){''.join(one.cpp for one in policies)}",
-    )
-    return f"Give create_{parameters.kind.value} a profile: {profile}."
+        names = {"reliability": "best_effort_profile", "durability": "latched_profile"}
+        why = "".join(f" {remedy(name)}" for policy, name in names.items() if policy in wrong)
+        return mistaken("no_default", seen, shown, why=why)
+    policies = "".join(str(_policy(name, item)) for name, item in asked.items())
+    kind = parameters.kind.value
+    return mistaken("other_profile", seen, shown, kind=kind, policies=policies)
 
 
 def _policy(name: str, value: Any) -> Words:
     """A policy as an argument of rclpy's QoSProfile, and as a method of rclcpp::QoS."""
     key = _ARGUMENTS.get(name, name)
     if name not in _DEFAULTS:
-        return Words(f"{key}=Duration(seconds={value:g})", f".{key}({value:g}s)")
-    python = f"{key}={name.capitalize()}Policy.{value.upper()}"
+        return Words(f", {key}=Duration(seconds={value:g})", f".{key}({value:g}s)")
+    cpp = ".durability_volatile()" if value == "volatile" else f".{value}()"
     if name == "liveliness":
         camel = "".join(map(str.capitalize, value.split("_")))
-        return Words(python, f".liveliness(rclcpp::LivelinessPolicy::{camel})")
-    return Words(python, ".durability_volatile()" if value == "volatile" else f".{value}()")
+        cpp = f".liveliness(rclcpp::LivelinessPolicy::{camel})"
+    return Words(f", {key}={name.capitalize()}Policy.{value.upper()}", cpp)
 
 
 def _words(value: Any) -> str:
@@ -238,23 +228,16 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
         own = recording.student_endpoints(kind, parameters.topic)
         messages = recording.on(parameters.topic)
         seen = endpoints_seen(recording, own) or first_seen(recording, messages)
-        third = worded("third" if kind is Kind.PUBLISHER else "fourth", "second")
-        profile = worded(
-            f"QoSProfile(depth={parameters.depth}, ...)", f"rclcpp::QoS({parameters.depth})"
-        )
-        return Finding(
-            observed,
-            f"The {third} argument of create_{kind.value} is the depth, or {A_PROFILE} that has "
-            f"it beside the other policies: {profile}.",
-            Evidence(moments=seen),
-        )
+        third = "third" if kind is Kind.PUBLISHER else "fourth"
+        texts = {"third": str(third), "kind": kind.value, "depth": str(parameters.depth)}
+        return mistaken("other_depth", observed, Evidence(moments=seen), **texts)
     if any(queue.depth is None for queue in declared):
         return Finding.ours("the depth cannot be seen: the process declared no number")
     if not declared and shown is None:
         what = f"the {kind.value} on {code(parameters.topic)}"
         return why_undeclared(recording, what)
     source = "declared by the process" if declared else "as the heartbeats of the publisher show"
-    return Finding.passed(parameters.asked_for, f"depth {parameters.depth}, {source}")
+    return Finding.as_asked(f"depth {parameters.depth}, {source}")
 
 
 def _wrong_depth(
@@ -354,13 +337,10 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
         refused = refusals(*pair)
         own = f"the {kind.value} of {code(endpoint.node)}"
         left_open = _left_open(recording, endpoint, pair)
-        hint = (
-            f"Give create_{kind.value} {A_PROFILE} with the policies that are asked for; a number, "
-            "such as 10, is the default: reliable and volatile."
-        )
+        mistake = "matches"
         if refused and parameters.expect == "match":
             observed = f"{own} does not match such a {other}: {', '.join(refused)}"
-            hint = f"{_RULE} {hint}"
+            mistake = "offers_less"
         elif refused and left_open:
             taken = ", ".join(str(getattr(endpoint.qos, policy)) for policy in left_open)
             observed = (
@@ -378,10 +358,9 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
         evidence = Evidence(
             moments=endpoints_seen(recording, (endpoint,)), tables=(compatibility_table(*pair),)
         )
-        return Finding(observed, hint, evidence)
+        return mistaken(mistake, observed, evidence, kind=kind.value)
     pair = sides(kind, endpoints[0].qos, parameters.peer)
-    return Finding.passed(
-        parameters.asked_for,
+    return Finding.as_asked(
         ", ".join(refusals(*pair)) or "every policy is compatible",
         Evidence(tables=(compatibility_table(*pair),)),
     )

@@ -20,13 +20,13 @@ from grader.checks.check import (
 )
 from grader.checks.need import Act, Doubt, Stimulated
 from grader.checks.requests import Offered, is_offered, judged_requests, why_other_fields
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_answer import why_late
 from grader.diagnosis.no_endpoint import SERVICE
 from grader.findings.fields import FieldTolerance, brief, words
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.value import EXACT, value_at
 from grader.findings.wording import code, codes, counted
-from grader.findings.words import EXCLUSIVE, REENTRANT, SLEEP, SPIN_NODE, worded
 from grader.recording.model import NS, Call, Recording
 from grader.spec.name import TopicName
 from grader.spec.names import Thing
@@ -108,7 +108,7 @@ def responds(recording: Recording, parameters: Responds) -> Finding:
         stop_if(_why_other_response(recording, calls, call, parameters))
     slowest_s = max(map(_took_s, calls))
     observed = f"{counted(len(calls), 'call')}, answered within {format_duration(slowest_s)}"
-    return Finding.passed(parameters.asked_for, observed, _evidence(recording, calls))
+    return Finding.as_asked(observed, _evidence(recording, calls))
 
 
 def judged_calls(
@@ -123,12 +123,8 @@ def why_slow(recording: Recording, calls: tuple[Call, ...], within_s: float) -> 
     worst = max(calls, key=_took_s)
     sent_ns, end_ns, server = worst.requested_ns, worst.answered_ns, worst.service
     seen = f"{_which(calls, worst)} to {code(server)} was not answered"
-    hint = (
-        f"A service callback must return soon: no {SLEEP} and no waiting in it, nor in a "
-        "timer or subscription callback that the same executor runs."
-    )
-    shown = _evidence(recording, calls)
-    return why_late(recording, SERVICE, server, sent_ns, end_ns, within_s, seen, hint, shown)
+    mistake, shown = "slow_callback", _evidence(recording, calls)
+    return why_late(recording, SERVICE, server, sent_ns, end_ns, within_s, seen, mistake, shown)
 
 
 def _which(calls: tuple[Call, ...], call: Call) -> str:
@@ -156,8 +152,7 @@ def _why_other_response(
     ]
     if wrong or not lacking:
         return wrong
-    hint = "Look where the callback sets this text of the response that it returns."
-    return Finding(f"{seen} {' and '.join(lacking)}", hint, shown)
+    return mistaken("other_text", f"{seen} {' and '.join(lacking)}", shown)
 
 
 def _evidence(recording: Recording, calls: Sequence[Call]) -> Evidence:
@@ -220,7 +215,7 @@ def concurrent(recording: Recording, parameters: Concurrent) -> Finding:
     stop_if(why_slow(recording, calls, 2.0 * len(calls) * parameters.takes))
     stop_if_any(_why_other_order(recording, parameters, pair) for pair in pairs)
     observed = f"the answers came {format_duration(max(map(_gap_s, pairs)))} apart"
-    return Finding.passed(parameters.asked_for, observed, _evidence(recording, calls))
+    return Finding.as_asked(observed, _evidence(recording, calls))
 
 
 def _gap_s(pair: tuple[Call, Call]) -> float:
@@ -245,26 +240,14 @@ def _why_other_order(
         in_doubt = gap_s + stolen_s >= _APART * takes_s
     if in_doubt:
         return Finding.held_up(seen, stolen_s)
+    shown = _evidence(recording, pair)
     if not (together or far_apart):
-        return Finding(
-            f"{seen}: neither together nor one processing time apart",
-            f"Each call should take {format_duration(takes_s)}.",
-            _evidence(recording, pair),
-        )
+        seen = f"{seen}: neither together nor one processing time apart"
+        return mistaken("other_duration", seen, shown, takes=format_duration(takes_s))
     executors = sorted({str(item.data.get("executor")) for item in recording.declared("spin")})
     declared = f"; the process declared a {codes(executors)}" if executors else ""
     if not side_by_side:
-        return Finding(
-            f"{seen}, so both were processed at the same time{declared}",
-            f"Give the service a {EXCLUSIVE}, or use {SPIN_NODE}.",
-            _evidence(recording, pair),
-        )
-    return Finding(
-        f"{seen}, so the second call waited until the first was answered{declared}",
-        f"Spin with a MultiThreadedExecutor, and give the service a {REENTRANT}: "
-        + worded(
-            python="self.create_service(..., callback_group=ReentrantCallbackGroup()).",
-            cpp="this->create_service<...>(..., rclcpp::ServicesQoS(), group_).",
-        ),
-        _evidence(recording, pair),
-    )
+        seen = f"{seen}, so both were processed at the same time{declared}"
+        return mistaken("side_by_side", seen, shown)
+    seen = f"{seen}, so the second call waited until the first was answered{declared}"
+    return mistaken("one_after_another", seen, shown)

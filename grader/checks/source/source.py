@@ -15,6 +15,7 @@ from pydantic import AfterValidator, Field, field_validator
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.need import RuffRules, Submitted
 from grader.checks.package.package import OfPackage
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.not_built import existing_package, why_no_package, why_too_new
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes, counted, listing, percent
@@ -50,11 +51,10 @@ def _judged_package(submission: SubmissionRecord, name: str) -> PackageRecord:
     if package.syntax_errors:
         seen = f"Python cannot read {package.syntax_errors[0]}"
         places = package.syntax_errors[:_MOST_PLACES]
-        hint = "Correct this line or the one before it."
-        stop_if(Finding(seen, hint, Evidence(places=places)))
+        stop_if(mistaken("unreadable", seen, Evidence(places=places)))
     if not package.sources:
-        hint = f"The code belongs in the folder {code(f'{name}/{name}')}, beside __init__.py."
-        stop_if(Finding(f"the package {code(name)} has no Python code", hint))
+        seen = f"the package {code(name)} has no Python code"
+        stop_if(mistaken("no_python", seen, folder=code(f"{name}/{name}")))
     return package
 
 
@@ -94,7 +94,7 @@ def class_(submission: SubmissionRecord, parameters: Class) -> Finding:
         stop_if(_why_no_class(family, classes, named, parameters))
     place = _place(kin[0], f"class {kin[0].found.name}")
     observed = f"{codes(item.found.name for item in kin)} ({place.file}:{place.line})"
-    return Finding.passed(parameters.asked_for, observed, Evidence(places=(place,)))
+    return Finding.as_asked(observed, Evidence(places=(place,)))
 
 
 def _why_no_class(
@@ -102,15 +102,15 @@ def _why_no_class(
 ) -> Finding:
     module, _, base = parameters.inherits.rpartition(".")
     name = parameters.name or "MyClass"
-    hint = f"Write `from {module} import {base}` and `class {name}({base}):`."
+    write = f"from {module} import {base}", f"class {name}({base}):"
     if not classes:
-        return Finding("no class is defined in the package", hint)
+        return mistaken("no_class", "no class is defined in the package", write=codes(write))
     evidence = Evidence(places=tuple(_place(item, _inherits(item)) for item in classes[:10]))
     if not named:
         there = sorted({_short(item) for item in classes})
         match = nearest(name, there)
         found = f"found the class {code(match)}" if match else f"found {codes(there)} only"
-        return Finding(found, f"Call the class {code(name)}.", evidence)
+        return mistaken("other_class", found, evidence, name=code(name))
     for item in named:
         foreign = family.foreign(item)
         if foreign:
@@ -119,7 +119,7 @@ def _why_no_class(
             return Finding.ours(seen, hint)
     place = _place(named[0], "")
     seen = "; ".join(_inherits(item) for item in named[:4])
-    return Finding(f"{seen} ({place.file}:{place.line})", hint, evidence)
+    return mistaken("no_class", f"{seen} ({place.file}:{place.line})", evidence, write=codes(write))
 
 
 def _inherits(item: FoundClass) -> str:
@@ -183,11 +183,7 @@ def docstrings(submission: SubmissionRecord, parameters: Docstrings) -> Finding:
         for kind, documented, line, text in _documentable(file)
         if kind in parameters.of
     ]
-    hint = (
-        'A docstring is the first statement in the body: """Publish the next command.""" A '
-        "comment with # is not one."
-    )
-    return _shared(parameters, judged, "a docstring", hint)
+    return _shared(parameters, judged, "a docstring", "no_docstring")
 
 
 def _documentable(file: SourceFile) -> Iterator[tuple[str, bool, int, str]]:
@@ -232,8 +228,7 @@ def type_hints(submission: SubmissionRecord, parameters: TypeHints) -> Finding:
         for one in file.functions
         for lacking in [_lacking(one, parameters.returns)]
     ]
-    hint = "Write the types behind the names: `def callback(self, msg: Twist) -> None:`."
-    return _shared(parameters, judged, "every hint", hint)
+    return _shared(parameters, judged, "every hint", "no_type_hint")
 
 
 def _lacking(one: SourceFunction, returns: bool) -> str:
@@ -245,7 +240,7 @@ def _lacking(one: SourceFunction, returns: bool) -> str:
 
 
 def _shared(
-    parameters: _Share, judged: Sequence[tuple[bool, SourceError]], what: str, hint: str
+    parameters: _Share, judged: Sequence[tuple[bool, SourceError]], what: str, mistake: str
 ) -> Finding:
     """The finding by the share of items that have what they need."""
     lacking = [place for good, place in judged if not good]
@@ -253,10 +248,10 @@ def _shared(
     observed = f"{having} of {len(judged)} have {what}"
     # The small amount is float noise of the product.
     if judged and having >= parameters.share * len(judged) - 1e-9:
-        return Finding.passed(parameters.asked_for, observed)
+        return Finding.as_asked(observed)
     first = f"the first without is {lacking[0]}" if lacking else "there is nothing to judge"
     shown = Evidence(places=tuple(lacking[:_MOST_PLACES]))
-    return Finding(f"{observed}; {first}", hint, shown)
+    return mistaken(mistake, f"{observed}; {first}", shown)
 
 
 class NoPrint(OfPython):
@@ -277,14 +272,10 @@ def no_print(submission: SubmissionRecord, parameters: NoPrint) -> Finding:
         SourceError(file.path, line, "print") for file in package.sources for line in file.prints
     ]
     if not places:
-        return Finding.passed(parameters.asked_for, "no print()")
+        return Finding.as_asked("no print()")
     number = counted(len(places), "place")
-    return Finding(
-        f"{number} with print(), the first at {places[0].file}:{places[0].line}",
-        "Write self.get_logger().info('...'): it has a level and the node's name, and goes to "
-        "/rosout as well.",
-        Evidence(places=tuple(places[:_MOST_PLACES])),
-    )
+    seen = f"{number} with print(), the first at {places[0].file}:{places[0].line}"
+    return mistaken("prints", seen, Evidence(places=tuple(places[:_MOST_PLACES])))
 
 
 def _rule(text: str) -> str:
@@ -339,13 +330,14 @@ def ruff(submission: SubmissionRecord, parameters: Ruff) -> Finding:
     found = [item for item in lint.findings if parameters.is_broken_by(item.code)]
     if len(found) <= parameters.at_most:
         observed = counted(len(found), "place") if found else "none"
-        return Finding.passed(parameters.asked_for, observed)
+        return Finding.as_asked(observed)
     places = [SourceError(item.file, item.line, f"{item.code} {item.message}") for item in found]
-    return Finding(
+    return mistaken(
+        "breaks_rule",
         f"{counted(len(places), 'place')}, the first at {places[0]}",
-        f"`ruff check --select {','.join(parameters.rules)}` shows them all, "
-        f"`ruff rule {found[0].code}` explains this one.",
         Evidence(places=tuple(places[:_MOST_PLACES])),
+        rules=",".join(parameters.rules),
+        rule=found[0].code,
     )
 
 

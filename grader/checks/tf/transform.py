@@ -17,6 +17,7 @@ from grader.checks.messages import following, messages
 from grader.checks.need import Need, OwnTransform, Recorded, SimulatedRobot
 from grader.checks.timing import timing
 from grader.diagnosis.explanation import cause_of, explain
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.wrong_transform import (
     BadTransform,
     NoTransform,
@@ -145,8 +146,7 @@ def broadcast(recording: Recording, parameters: Broadcast) -> Finding:
     first, *others = alone.on(parameters.topic)
     if found.credit and parameters.moving and all(one.value == first.value for one in others):
         seen = f"{found.observed}, but the transform is always the same"
-        hint = "Compute translation and rotation again in each call of the callback."
-        return Finding(seen, hint, found.evidence)
+        return mistaken("still", seen, found.evidence)
     return replace(found, expected=parameters.asked_for)
 
 
@@ -214,10 +214,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     found = following.follows.judge(alone, wanted)
     if found.credit and parameters.same_stamp:
         stop_if(_why_other_stamp(recording, parameters))
-    hint = found.hint and (
-        "Copy the newest pose into translation and rotation of the transform, in the callback "
-        "that gets it."
-    )
+    hint = found.hint and remedy("other_pose")
     return replace(found, expected=parameters.asked_for, hint=hint)
 
 
@@ -243,12 +240,11 @@ def _why_other_stamp(recording: Recording, parameters: Follows) -> Finding | Non
         if message.stamp_ns <= one.message.stamp_ns:
             source = message
     off_s = (one.stamp_ns - (stamp_of(source.value) or 0)) / NS
-    return Finding(
+    return mistaken(
+        "other_stamp",
         f"{len(wrong)} of {counted(len(judged), 'transform')} have another stamp than the message "
         f"on {code(source.topic)}; the first one is {format_duration(abs(off_s))} "
         f"{'later' if off_s > 0.0 else 'earlier'}",
-        "A transform says where the robot was when it was measured: copy header.stamp of the "
-        "message into header.stamp of the transform.",
         moment(recording, one, "has another stamp"),
     )
 

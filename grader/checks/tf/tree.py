@@ -8,6 +8,7 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Recorded
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_crashed
 from grader.diagnosis.wrong_transform import edge, moment
@@ -47,37 +48,36 @@ def tree(recording: Recording, parameters: Tree) -> Finding:
     there = list(sent(recording, (parameters.topic, parameters.static_topic)))
     if not there:
         stop_if(why_silent(recording, parameters.topic))
-    for seen, hint, one in _faults(parameters, there):
-        stop_if(why_crashed(recording) or Finding(seen, hint, moment(recording, one, "sent")))
+    for seen, mistake, one in _faults(parameters, there):
+        stop_if(why_crashed(recording) or mistaken(mistake, seen, moment(recording, one, "sent")))
     frames = {name for one in there for name in (one.parent, one.child)}
     seen = f"{counted(len(frames), 'frame')} below {codes(roots(there))}"
-    return Finding.passed(parameters.asked_for, seen, moment(recording, there[0], "sent"))
+    return Finding.as_asked(seen, moment(recording, there[0], "sent"))
 
 
 def _faults(parameters: Tree, there: Sequence[Sent]) -> Iterator[tuple[str, str, Sent]]:
-    """What is wrong with the tree, what to try, and a transform that shows it."""
+    """What is wrong with the tree, in words, and a transform that shows it."""
     parents, found = {one.child: one.parent for one in reversed(there)}, roots(there)
     for one in there:
         name, topic = code(one.child), one.message.topic
         if one.parent != parents[one.child]:
             both = codes((parents[one.child], one.parent))
-            hint = "A frame has one parent. Turn one of the transforms round, or leave it out."
-            yield f"the frame {name} has two parents, {both}", hint, one
+            yield f"the frame {name} has two parents, {both}", "two_parents", one
         if one.parent.startswith("/") or one.child.startswith("/"):
-            hint = "Frames are no topics: write their names without the slash."
-            yield f"{edge(one.parent, one.child)} has a slash in front of a name", hint, one
+            slash = f"{edge(one.parent, one.child)} has a slash in front of a name"
+            yield slash, "slash", one
         static = parameters.static
         if static is not None and is_static(topic) != (one.child in static):
-            hint = "What never changes is static, and sent once; what moves is not (REP-105)."
-            yield f"the transform of the frame {name} is on {code(topic)}", hint, one
-    hint = "Publish one transform for each frame but the root, from its parent."
+            other = f"the transform of the frame {name} is on {code(topic)}"
+            yield other, "other_kind", one
+    mistake = "no_tree"
     circle = [name for name in found if name in parents]
     missing = [name for name in parameters.frames if name not in {*parents, *found}]
     if circle:
-        yield f"{codes(circle)} is above itself: a circle of frames", hint, there[0]
+        yield f"{codes(circle)} is above itself: a circle of frames", mistake, there[0]
     if len(found) > 1:
-        yield f"{len(found)} trees, with the roots {codes(found)}", hint, there[0]
+        yield f"{len(found)} trees, with the roots {codes(found)}", mistake, there[0]
     if missing:
-        yield f"no frame {codes(missing, last='or')}", hint, there[0]
+        yield f"no frame {codes(missing, last='or')}", mistake, there[0]
     if parameters.root not in (None, *found):
-        yield f"the root is {codes(found)}", hint, there[0]
+        yield f"the root is {codes(found)}", mistake, there[0]

@@ -12,11 +12,11 @@ from pydantic import Field, model_validator
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import PUBLISHED, Recorded
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_messages import why_not_sent, why_silent
-from grader.diagnosis.process.blocked_executor import left_s
+from grader.diagnosis.process.not_called import left_s
 from grader.findings.finding import Evidence, Finding, Moment, Plot
 from grader.findings.wording import code, counted
-from grader.findings.words import SLEEP
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
@@ -109,7 +109,7 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
     evidence = _evidence(recording, parameters, waits, missing)
     is_missing = len(missing) > parameters.unanswered
     if not is_missing and not parameters.is_too_slow(times):
-        return Finding.passed(parameters.asked_for, figures, evidence)
+        return Finding.as_asked(figures, evidence)
     observed = (
         f"{len(missing)} of {counted(len(found), 'message')} on {code(parameters.stimulus)} "
         f"had no answer within {format_duration(parameters.within)}"
@@ -124,17 +124,9 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
         stolen_s = recording.stolen_s(sent[0].stamp_ns, recording.stop_ns)
         return Finding.held_up(figures, stolen_s)
     if not is_missing:
-        hint = (
-            "Publish the answer in the subscription's callback itself, not from a timer. Let the "
-            f"callback return soon: no {SLEEP}, no wait, no loop over what is there already."
-        )
-        return Finding(figures, hint, evidence)
-    hint = (
-        "Publish one answer in every call of the subscription's callback, with no condition that "
-        "leaves one out."
-    )
+        return mistaken("slow_answer", figures, evidence)
     observed += f"; of the others {figures}" if times else ""
-    return Finding(observed, hint, evidence)
+    return mistaken("missing_answer", observed, evidence)
 
 
 def _excused(

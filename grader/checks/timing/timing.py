@@ -14,13 +14,13 @@ from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Recorded
 from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.diagnosis.explanation import cause_of
-from grader.diagnosis.no_messages import ENDED_HINT, why_few
-from grader.diagnosis.process.blocked_executor import left_s
+from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.no_messages import why_few
+from grader.diagnosis.process.not_called import left_s
 from grader.diagnosis.wrong_rhythm import WrongRhythm, why_paused
 from grader.findings.finding import Evidence, Finding, Moment, Plot
-from grader.findings.first_seen import first_seen
+from grader.findings.first_seen import evidence_at, first_seen
 from grader.findings.wording import code, counted
-from grader.findings.words import SILENT_EXCEPT, SLEEP, worded
 from grader.measure import declarations
 from grader.measure.numbering import is_numbered, lost
 from grader.measure.period import (
@@ -55,7 +55,6 @@ _MOST_LATE, _LATE_SHARE = 3, 0.2
 _AROUND_NS = NS // 10
 # Middleware that stamps every message.
 _STAMPING = "rmw_fastrtps_cpp"
-_CLOCK_HINT = "Publish at the right time, and do not change the clock of the process."
 
 
 class Period(Parameters):
@@ -141,9 +140,9 @@ def period(recording: Recording, parameters: Period) -> Finding:
             _ENDED_PERIODS * parameters.period if len(messages) <= MOST_INTERVALS else math.inf,
             f"{counted(len(messages), 'message')} at the right period, but none in the last "
             f"{format_duration((recording.stop_ns - last_ns) / NS)} of the observation",
-            ENDED_HINT,
+            "ended",
         )
-        return silent or Finding.passed(parameters.asked_for, observed, evidence)
+        return silent or Finding.as_asked(observed, evidence)
     if verdict.period_good:
         number = len(verdict.irregular)
         observed += (
@@ -194,18 +193,18 @@ def _evidence(
         middle_s, within_s = limits.period_s, limits.median_s
     worst = max(measured, key=lambda item: abs(item.seconds - limits.period_s))
     label = f"worst interval: {format_duration(worst.seconds)}"
-    return Evidence(
-        moments=(Moment(label, recording.since_launch_s(worst.end_ns)),),
-        plots=(
-            Plot(
-                title=f"Time between messages on {parameters.topic}",
-                x_label="time since launch (s)",
-                y_label="time between messages (ms)",
-                x=tuple(recording.since_launch_s(item.end_ns) for item in measured),
-                y=tuple(item.seconds * _MS for item in measured),
-                band=((middle_s - within_s) * _MS, (middle_s + within_s) * _MS),
-                histogram=True,
-            ),
+    return evidence_at(
+        recording,
+        label,
+        worst.end_ns,
+        Plot(
+            title=f"Time between messages on {parameters.topic}",
+            x_label="time since launch (s)",
+            y_label="time between messages (ms)",
+            x=tuple(recording.since_launch_s(item.end_ns) for item in measured),
+            y=tuple(item.seconds * _MS for item in measured),
+            band=((middle_s - within_s) * _MS, (middle_s + within_s) * _MS),
+            histogram=True,
         ),
     )
 
@@ -269,18 +268,9 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     ):
         return Finding.undecided(f"{observed}, but the machine took time from the process")
     if is_slow or (parameters.at_most is not None and found_hz > parameters.at_most):
-        return Finding(
-            observed,
-            "Publish once in every call of the callback: look for a condition that leaves calls "
-            f"out, for a {SLEEP}, and for a second timer or publish(). "
-            + worded(
-                python="create_timer takes its period in seconds: 1 / rate.",
-                cpp="create_wall_timer takes its period with a unit: 100ms for 10 Hz.",
-            ),
-            evidence,
-        )
+        return mistaken("other_rate", observed, evidence)
     stop_if(_why_paused(recording, parameters, messages))
-    return Finding.passed(parameters.asked_for, observed, evidence)
+    return Finding.as_asked(observed, evidence)
 
 
 def _why_paused(
@@ -303,8 +293,7 @@ def _why_paused(
         f"no message for {format_duration((end_ns - begin_ns) / NS)}{until}, from "
         f"{recording.since_launch_s(begin_ns):.2f} s after launch on, after "
         f"{counted(before, 'message')}",
-        f"Look for an `if` or a `return` before publish(msg), for an {SILENT_EXCEPT} that hides an "
-        "error, for a timer that is cancelled, and for a callback that does not return.",
+        "silent_calls",
     )
 
 
@@ -316,12 +305,9 @@ def _why_not_believed(recording: Recording, messages: Sequence[Message]) -> Find
     for message in messages:
         begin_ns = recording.launched_ns - _CLOCK_SLACK_NS
         if not begin_ns <= message.stamp_ns <= message.received_ns + _CLOCK_SLACK_NS:
-            return Finding(
-                "the source timestamps are not the times of publishing: one lies "
-                + ("before the launch" if message.stamp_ns < begin_ns else "after its arrival"),
-                _CLOCK_HINT,
-                _arrival(recording, message),
-            )
+            when = "before the launch" if message.stamp_ns < begin_ns else "after its arrival"
+            seen = f"the source timestamps are not the times of publishing: one lies {when}"
+            return mistaken("other_clock", seen, _arrival(recording, message))
     # What was published before the match (transient local) arrives all at once.
     begin_ns = recording.matched_ns or recording.launched_ns
     live = [message for message in messages if message.stamp_ns >= begin_ns]
@@ -342,14 +328,14 @@ def _why_arrivals_differ(recording: Recording, live: Sequence[Message]) -> Findi
     ]
     if len(late) > max(_MOST_LATE, _LATE_SHARE * len(live)):
         way_s = max(map(_way_s, late)) - min(map(_way_s, live))
-        return Finding(
+        found = mistaken(
+            "other_clock",
             f"{counted(len(late), 'message')} of {len(live)} came up to {format_duration(way_s)} "
             "earlier or later than their source timestamps say, and the machine took no such "
             "time: the timestamps are not the times of publishing",
-            _CLOCK_HINT,
             _arrival(recording, late[0]),
-            disturbed=True,
         )
+        return replace(found, disturbed=True)
     arrivals_ns = sorted(message.received_ns for message in live)
     source_s = median((b.stamp_ns - a.stamp_ns) / NS for a, b in pairwise(live))
     arrival_s = median((b - a) / NS for a, b in pairwise(arrivals_ns))

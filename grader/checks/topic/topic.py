@@ -11,6 +11,7 @@ from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Recorded
 from grader.checks.wrong_name import Named, misnamed
 from grader.diagnosis.destroyed_endpoint import why_dropped
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_endpoint import ENDPOINTS, meant_endpoint, why_no_endpoint
 from grader.diagnosis.no_node import why_no_node
 from grader.findings.finding import Evidence, Finding
@@ -76,11 +77,10 @@ def _presence(recording: Recording, kind: Kind, parameters: Topic) -> Finding:
     endpoints = recording.student_endpoints(kind, parameters.topic)
     if not endpoints:
         seen = "messages came from one, but too briefly for the ROS graph"
-        return Finding.passed(parameters.asked_for, seen)
+        return Finding.as_asked(seen)
     first = min(endpoints, key=lambda item: item.appeared_ns)
     nodes, when_s = {item.node for item in endpoints}, recording.since_launch_s(first.appeared_ns)
-    return Finding.passed(
-        parameters.asked_for,
+    return Finding.as_asked(
         f"{codes(sorted(nodes))} has one, seen {when_s:.2f} s after launch",
         Evidence(moments=endpoints_seen(recording, [first])),
     )
@@ -121,14 +121,11 @@ def type_(recording: Recording, parameters: Type) -> Finding:
     types = sorted({item.type for item in endpoints or recording.on(topic)[:1]})
     wrong = [name for name in types if name != wanted]
     if not wrong:
-        return Finding.passed(parameters.asked_for, f"the type is {codes(types)}")
+        return Finding.as_asked(f"the type is {codes(types)}")
     which = f"another {kind.value} on the topic" if wanted in types else f"the {kind.value}"
-    return Finding(
-        f"{which} has the type {code(wrong[0])}",
-        "A publisher and a subscription meet only if their types are the same: "
-        f"{code(type_in_code(wanted))}.",
-        Evidence(moments=endpoints_seen(recording, endpoints)),
-    )
+    shown = Evidence(moments=endpoints_seen(recording, endpoints))
+    seen = f"{which} has the type {code(wrong[0])}"
+    return mistaken("other_topic_type", seen, shown, type=code(type_in_code(wanted)))
 
 
 class Untouched(Parameters):
@@ -154,19 +151,18 @@ def untouched(recording: Recording, parameters: Untouched) -> Finding:
     stop_if(why_no_node(recording))
     for endpoint in recording.student_endpoints(Kind.PUBLISHER):
         if endpoint.topic in parameters.topics:
-            return Finding(
+            return mistaken(
+                "robots_topic",
                 f"the node {code(endpoint.node)} publishes on {code(endpoint.topic)}, which "
                 "belongs to the robot",
-                "To read the sensor use create_subscription; what you compute goes to a topic of "
-                "your own.",
                 Evidence(moments=endpoints_seen(recording, [endpoint])),
             )
     for node in recording.student_nodes:
         if node.name.rpartition("/")[2] == PROBE:
-            return Finding(
+            return mistaken(
+                "probes_name",
                 f"a node of the submission is called {code(node.name)}, which is the name of the "
                 "node that watches the run",
-                "Give your node the name that the assignment asks for.",
                 Evidence(moments=nodes_seen(recording)),
             )
-    return Finding.passed(parameters.asked_for, "none")
+    return Finding.as_asked("none")

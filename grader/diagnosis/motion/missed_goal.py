@@ -6,16 +6,18 @@ import math
 from dataclasses import dataclass
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.mistake import remedy
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.off_course import why_off_course
-from grader.diagnosis.process.blocked_executor import at_its_place
+from grader.diagnosis.process.not_called import at_its_place
 from grader.diagnosis.process.standing import stuck
 from grader.findings.finding import Finding
+from grader.findings.first_seen import evidence_at
 from grader.findings.words import MATH
-from grader.measure.motion.approach import WRAP_HINT, Approach, long_turns
+from grader.measure.motion.approach import Approach, long_turns
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.quantities import metres, point, speed, turn
-from grader.measure.motion.track import evidence_at, is_at_rest, turned_rad
+from grader.measure.motion.track import is_at_rest, turned_rad
 from grader.recording.model import NS, Ending
 from grader.recording.simulated import Truth
 from grader.spec.unit import format_duration
@@ -153,7 +155,7 @@ def angle_not_wrapped(symptom: GoalMissed) -> Finding | None:
     return symptom.cause(
         f": {turned}",
         "Print yaw, the error and the command while it turns. Yaw follows the robot, from "
-        f"-pi to pi. The error is atan2(dy, dx) - yaw. {WRAP_HINT}",
+        f"-pi to pi. The error is atan2(dy, dx) - yaw. {remedy('long_turn')}",
     )
 
 

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.mistake import remedy
 from grader.diagnosis.no_messages import NoMessages, why_refused, why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
-from grader.diagnosis.wrong_value import FLOAT_HINT, MISREAD, was_integer
+from grader.diagnosis.wrong_value import MISREAD, was_integer
 from grader.findings.finding import Evidence, Finding
+from grader.findings.first_seen import evidence_at
 from grader.findings.reference import Goal, UnknownValue
 from grader.findings.value import leaves
 from grader.findings.wording import code, codes, counted
@@ -24,7 +26,7 @@ from grader.measure.motion.command import (
 )
 from grader.measure.motion.quantities import speed
 from grader.measure.motion.scan import misreading
-from grader.measure.motion.track import evidence_at, has_moved, index_at, is_at_rest
+from grader.measure.motion.track import has_moved, index_at, is_at_rest
 from grader.recording.model import NS, Recording
 from grader.spec.unit import format_duration
 
@@ -181,7 +183,7 @@ def integer_in_command(symptom: NotMoved) -> Finding | None:
             return Finding(
                 f"{_STILL}: {MISREAD} was put into {code(field)}, a float field, "
                 "which ROS misreads",
-                str(FLOAT_HINT),
+                remedy("float_field"),
                 symptom.evidence,
             )
     return None

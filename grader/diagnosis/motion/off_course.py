@@ -5,9 +5,10 @@ from __future__ import annotations
 from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short
 from grader.findings.finding import Finding
+from grader.findings.first_seen import evidence_at
 from grader.findings.words import SLEEP
 from grader.measure.motion.command import commands, is_zero
-from grader.measure.motion.track import evidence_at, speed_plot
+from grader.measure.motion.track import speed_plot
 from grader.recording.model import NS, Recording
 from grader.spec.unit import format_duration
 

@@ -14,10 +14,6 @@ from grader.recording.simulated import Truth
 from sim.motion import Pose, wrap_angle
 
 NO_SPEED_M_S = 1e-3
-WRAP_HINT = (
-    "With an angle error outside [-pi, pi] the robot turns the long way round: normalise it with "
-    "atan2(sin(e), cos(e)) before you multiply it by the gain."
-)
 
 
 @dataclass(frozen=True)

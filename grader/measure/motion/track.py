@@ -7,7 +7,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from grader.findings.finding import Evidence, Moment, Plot
+from grader.findings.finding import Plot
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 from sim.motion import Pose, wrap_angle
@@ -125,11 +125,6 @@ def over_time(
     ]
     x, y = zip(*points, strict=True) if points else ((), ())
     return Plot(title, "time since launch (s)", y_label, x, y, band)
-
-
-def evidence_at(recording: Recording, label: str, time_ns: int, *plots: Plot) -> Evidence:
-    """A moment of a run, with series to draw."""
-    return Evidence(moments=(Moment(label, recording.since_launch_s(time_ns)),), plots=plots)
 
 
 def speed_plot(recording: Recording, band: tuple[float, float] | None = None) -> Plot:

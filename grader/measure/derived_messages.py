@@ -4,52 +4,18 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
-from typing import Any
 
 from grader.findings.condition import difference
-from grader.findings.value import NoSuchItem, Tolerance, leaves, number_at, tolerance_of
-from grader.findings.words import MATH
+from grader.findings.value import NoSuchItem, Tolerance, number_at, tolerance_of
 from grader.measure.numbering import lost
 from grader.recording.model import NS, Message, Recording
 from grader.spec.expression import Expression
 
-_QUATERNION = ("x", "y", "z", "w")
-
 Row = tuple[float, ...]
 """A number for each field."""
-
-
-def mistakes(value: str, message: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
-    """What students take instead: words that end the sentence "it is ...", and the number.
-
-    The words of all messages of a type are the same, in the same order, as far as their arrays
-    have the same length.
-    """
-    right = number_at(message, value)
-    quaternion = "".join(Expression.of(value).fields)
-    if value.replace(" ", "") == f"yaw({quaternion})":
-        x, y, z, w = (number_at(message, f"{quaternion}.{part}") for part in _QUATERNION)
-        for part, number in zip(_QUATERNION, (x, y, z, w), strict=True):
-            yield f"`{part}` of the quaternion, which is no angle: convert the quaternion", number
-        yield "the yaw in degrees: ROS has angles in radians (REP-103)", math.degrees(right)
-        yield "the yaw with the wrong sign", -right
-        yield "half of the yaw: atan2(z, w) is half of the angle", math.atan2(z, w)
-        turn = 2.0 * math.acos(max(-1.0, min(1.0, w)))
-        yield "2 acos(w), which has lost the sign of the yaw", turn
-        turn = 2.0 * math.asin(max(-1.0, min(1.0, z)))
-        yield f"2 asin(z), which is wrong where w is negative: use {MATH}atan2", turn
-        turn = math.atan(math.tan(right))
-        words = f"the yaw in a wrong quadrant: use {MATH}atan2(a, b), not {MATH}atan(a / b)"
-        yield words, turn
-    else:
-        yield f"`{value}` with the wrong sign", -right
-        yield f"`{value}` without its sign, as from {MATH}hypot() or abs()", abs(right)
-    for path, number in leaves(message).items():
-        if path != value and isinstance(number, int | float):
-            yield f"`{path}`", float(number)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,181 @@
+"""Messages that do not hold the values of those that they are made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from grader.diagnosis.explanation import Symptom, explanation
+from grader.findings.finding import Finding
+from grader.findings.value import leaves, number_at
+from grader.findings.wording import code, codes, listing
+from grader.findings.words import MATH
+from grader.measure.derived_messages import DerivedMessages, Sample
+from grader.recording.model import NS
+from grader.spec.expression import Expression
+from grader.spec.unit import format_duration
+
+_MOST_EXPLAINED = 100
+# Share of the messages for which an explanation must hold.
+_NEARLY_ALL = 0.9
+_QUATERNION = ("x", "y", "z", "w")
+
+
+@dataclass(frozen=True)
+class NotFollowing(Symptom[Finding]):
+    """Messages do not hold the values of another topic.
+
+    Attributes:
+        source: That topic, marked as code.
+        wrong: Those of the judged messages that are; at least one.
+    """
+
+    source: str
+    derived: DerivedMessages
+    judged: list[Sample]
+    wrong: list[Sample]
+
+    @cached_property
+    def some(self) -> list[Sample]:
+        """Wrong messages, not too many."""
+        return self.wrong[:: max(1, len(self.wrong) // _MOST_EXPLAINED)]
+
+    @cached_property
+    def bad(self) -> list[int]:
+        """The fields that are wrong in one of them."""
+        return [
+            index
+            for index in range(len(self.derived.fields))
+            if not all(self.derived.fitting(one.errors, index) for one in self.some)
+        ]
+
+
+@explanation(NotFollowing)
+def older_values(symptom: NotFollowing) -> Finding | None:
+    """The values are those of an older message: a timer or a sleep holds the newest one up."""
+    late_s, source = _lag_s(symptom.derived, symptom.some), symptom.source
+    if late_s is None:
+        return None
+    return Finding(
+        f"the values are those of {source} {format_duration(late_s)} earlier",
+        f"Publish from the callback of {source}, or store its newest message there and publish "
+        "that. A callback that sleeps lets the newer ones wait.",
+    )
+
+
+@explanation(NotFollowing)
+def different_moments(symptom: NotFollowing) -> Finding | None:
+    """The fields are filled from different messages."""
+    if symptom.bad:
+        return None
+    return Finding(
+        f"the values are of different moments of {symptom.source}",
+        "Fill all fields from one message: `msg` of the callback.",
+    )
+
+
+@explanation(NotFollowing, general=True)
+def other_values(symptom: NotFollowing) -> Finding:
+    """Fields hold something else: another field, a quaternion, degrees, a wrong sign."""
+    derived, bad, source = symptom.derived, symptom.bad, symptom.source
+    sample = symptom.wrong[len(symptom.wrong) // 2]
+    newest = derived.table[sample.window[-1]]
+    seen = symptom.judged[:: max(1, len(symptom.judged) // _MOST_EXPLAINED)]
+    by_clause: dict[str, list[str]] = {}
+    for index in bad:
+        text = f"{code(derived.fields[index])} = {sample.values[index]:.4g} instead of "
+        text += f"{newest[index]:.4g}"
+        by_clause.setdefault(_clause(derived, seen, symptom.some, index), []).append(text)
+    return Finding(
+        "; ".join(listing(texts) + clause for clause, texts in by_clause.items()),
+        f"Set {codes(derived.fields[index] for index in bad)} in the callback of {source}, from "
+        f"{codes(derived.values[index] for index in bad)} of its message.",
+    )
+
+
+def _lag_s(derived: DerivedMessages, wrong: list[Sample]) -> float | None:
+    """How old the values are, if all wrong messages have those of an older source."""
+    ages = []
+    for sample in wrong:
+        older = derived.fitting(derived.errors(sample.values, range(sample.window[0])))
+        if not older:
+            return None
+        ages.append((sample.message.stamp_ns - derived.sources[older[-1]].stamp_ns) / NS)
+    still = spread([sample.values[0] for sample in wrong]) <= derived.tolerances[0]
+    # A value that never changes is old as well, but that says less.
+    return None if still and len(wrong) > 1 else sorted(ages)[len(ages) // 2]
+
+
+def _clause(derived: DerivedMessages, seen: list[Sample], wrong: list[Sample], index: int) -> str:
+    """What stands in a wrong field, as a clause; empty where the messages do not tell.
+
+    It must be in nearly all messages, and in nearly all of those in which the field is wrong: of a
+    number that is not negative, what has lost its sign is right as well.
+    """
+    numbers = [sample.values[index] for sample in seen]
+    if not all(map(math.isfinite, numbers)):
+        short = ", or not there at all: the array is too short"
+        return f": not a finite number{short if '[' in derived.fields[index] else ''}"
+    if len(numbers) > 1 and spread(numbers) <= 0.0:
+        return ": no change from message to message"
+    wrong = [sample for sample in wrong if not derived.fitting(sample.errors, index)]
+    rows = sorted({row for sample in (*seen, *wrong) for row in sample.window})
+    tolerance = derived.tolerances[index]
+    found = [_mistakes(derived.values[index], derived.sources[row].value) for row in rows]
+    # Arrays of the sources may have other lengths, which come last: those are left out.
+    for same_mistake in zip(*found, strict=False):
+        series = {row: number for row, (_, number) in zip(rows, same_mistake, strict=True)}
+        if spread(list(series.values())) > tolerance and all(
+            _share(samples, index, series, tolerance) >= _NEARLY_ALL for samples in (seen, wrong)
+        ):
+            return f": it is {same_mistake[0][0]}"
+    return ""
+
+
+def spread(numbers: Sequence[float]) -> float:
+    """How far apart the least and the greatest number are."""
+    return max(numbers) - min(numbers)
+
+
+def _share(
+    samples: list[Sample], index: int, series: Mapping[int, float], tolerance: float
+) -> float:
+    """Share of the messages in which a field holds one of the numbers of a mistake."""
+    hits = sum(
+        any(abs(sample.values[index] - series[row]) <= tolerance for row in sample.window)
+        for sample in samples
+    )
+    return hits / len(samples)
+
+
+def _mistakes(value: str, message: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    """What students take instead: words that end the sentence "it is ...", and the number.
+
+    The words of all messages of a type are the same, in the same order, as far as their arrays
+    have the same length.
+    """
+    right = number_at(message, value)
+    quaternion = "".join(Expression.of(value).fields)
+    if value.replace(" ", "") == f"yaw({quaternion})":
+        x, y, z, w = (number_at(message, f"{quaternion}.{part}") for part in _QUATERNION)
+        for part, number in zip(_QUATERNION, (x, y, z, w), strict=True):
+            yield f"`{part}` of the quaternion, which is no angle: convert the quaternion", number
+        yield "the yaw in degrees: ROS has angles in radians (REP-103)", math.degrees(right)
+        yield "the yaw with the wrong sign", -right
+        yield "half of the yaw: atan2(z, w) is half of the angle", math.atan2(z, w)
+        turn = 2.0 * math.acos(max(-1.0, min(1.0, w)))
+        yield "2 acos(w), which has lost the sign of the yaw", turn
+        turn = 2.0 * math.asin(max(-1.0, min(1.0, z)))
+        yield f"2 asin(z), which is wrong where w is negative: use {MATH}atan2", turn
+        turn = math.atan(math.tan(right))
+        words = f"the yaw in a wrong quadrant: use {MATH}atan2(a, b), not {MATH}atan(a / b)"
+        yield words, turn
+    else:
+        yield f"`{value}` with the wrong sign", -right
+        yield f"`{value}` without its sign, as from {MATH}hypot() or abs()", abs(right)
+    for path, number in leaves(message).items():
+        if path != value and isinstance(number, int | float):
+            yield f"`{path}`", float(number)

@@ -1,0 +1,184 @@
+"""Why no callback is called, or late: nothing spins, or something blocks the executor."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+from grader.diagnosis.explanation import Symptom, explanation
+from grader.diagnosis.mistake import remedy
+from grader.diagnosis.process.standing import Stand, slow_callback, unkept_future, where_it_stands
+from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.first_seen import until_the_end
+from grader.findings.wording import codes
+from grader.findings.words import SPIN, SPIN_NODE
+from grader.measure import declarations
+from grader.recording.model import NS, Call, Process, Recording
+from grader.spec.unit import format_duration
+
+# A call with less time for an answer than this may be unanswered for that reason.
+_ANSWER_S = 1.0
+# A node whose callbacks return at once answers a call to its parameter services sooner.
+_SLOW_S = 0.5
+
+
+def left_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
+    """Time without what the machine took of it."""
+    return (end_ns - begin_ns) / NS - recording.stolen_s(begin_ns, end_ns)
+
+
+@dataclass(frozen=True)
+class NotCalled(Symptom[Finding], concept="executors"):
+    """No callback is called, whatever was waited for: messages, answers, requests, log lines."""
+
+    recording: Recording
+
+    @property
+    def seen(self) -> str:
+        """What is missing, in words."""
+        raise NotImplementedError
+
+    @property
+    def needs_spin(self) -> bool:
+        """Whether an executor must have called a callback for what is missing."""
+        return True
+
+    @property
+    def nodes(self) -> Collection[str]:
+        """Those with the callbacks, as far as they are known."""
+        return ()
+
+    @property
+    def processes(self) -> Sequence[Process]:
+        """Those that may never have spun."""
+        return self.recording.processes
+
+    @property
+    def since_ns(self) -> int:
+        """From when on the executor must not have answered anything."""
+        return self.recording.launched_ns
+
+
+class CalledLate(NotCalled, concept="executors"):
+    """Callbacks are called late or not at all."""
+
+    @property
+    def late(self) -> str:
+        """What is missing or late, in words."""
+        return self.seen
+
+
+@dataclass(frozen=True)
+class Uncalled(CalledLate):
+    """A callback did not do what a check waited for."""
+
+    what: str
+    of_nodes: Collection[str] = ()
+    of_processes: Sequence[Process] | None = None
+
+    @property
+    def seen(self) -> str:
+        """What is missing, in words."""
+        return self.what
+
+    @property
+    def nodes(self) -> Collection[str]:
+        """Those with the callbacks, as far as they are known."""
+        return self.of_nodes
+
+    @property
+    def processes(self) -> Sequence[Process]:
+        """Those that may never have spun; by default all."""
+        return self.recording.processes if self.of_processes is None else self.of_processes
+
+
+@explanation(NotCalled)
+def never_spun(symptom: NotCalled) -> Finding | None:
+    """rclpy.spin() is never called, or the node is not given to the executor that spins."""
+    recording = symptom.recording
+    if not symptom.needs_spin:
+        return None
+    names = [one.name for one in symptom.processes]
+    process = next((name for name in names if declarations.never_spun(recording, name)), None)
+    nodes = sorted(set(symptom.nodes))
+    if process is None:
+        if not nodes or not all(declarations.in_no_executor(recording, node) for node in nodes):
+            return None
+        return Finding(
+            f"{symptom.seen}: an executor spins, but {codes(nodes)} was not added to it, so none "
+            "of its callbacks runs",
+            "Add the node to the executor that spins, executor.add_node(node), or call "
+            f"{SPIN_NODE}.",
+            Evidence(moments=(until_the_end(recording, "no executor had the node"),)),
+        )
+    cause = Finding(
+        f"{symptom.seen}: {SPIN} was never called, so no callback runs",
+        f"Call {SPIN_NODE} in main(). Nothing before it may wait or loop for ever.",
+        Evidence(moments=(until_the_end(recording, f"{SPIN} was still not called"),)),
+    )
+    return at_its_place(cause, symptom.seen, where_it_stands(recording, process))
+
+
+@explanation(NotCalled)
+def blocked_executor(symptom: NotCalled) -> Finding | None:
+    """A callback does not return, and blocks the executor."""
+    # A node's parameter services answer only while its executor spins. What the machine took from
+    # the node is no time for an answer, and so a node that only gets no CPU is never blocked.
+    recording = symptom.recording
+    calls = [
+        call
+        for call in _calls(recording, symptom.nodes)
+        if left_s(recording, call.requested_ns, recording.stop_ns) >= _ANSWER_S
+    ]
+    call = next((call for call in calls if call.answered_ns is None), None)
+    if call is None or any((one.answered_ns or 0) >= symptom.since_ns for one in calls):
+        return None
+    process = declarations.process_of(recording, min(symptom.nodes))
+    since_s = recording.since_launch_s(call.requested_ns)
+    cause = Finding(
+        f"{symptom.seen}: something blocks the executor; from {since_s:.2f} s after launch on the "
+        "node's parameter service does not answer either",
+        remedy("blocked"),
+        Evidence(moments=(Moment("first call that was not answered", since_s),)),
+    )
+    stand = where_it_stands(recording, process.name) if process is not None else None
+    return at_its_place(cause, symptom.seen, stand or unkept_future(recording))
+
+
+@explanation(CalledLate)
+def slow_callbacks(symptom: CalledLate) -> Finding | None:
+    """Callbacks keep each other waiting for long."""
+    recording = symptom.recording
+    waits = [
+        (call, left_s(recording, call.requested_ns, call.answered_ns or recording.stop_ns))
+        for call in _calls(recording, symptom.nodes)
+    ]
+    # The longest but one: a single answer may have been lost on its way.
+    call, wait_s = sorted(waits, key=lambda item: item[1])[-2] if len(waits) > 1 else (None, 0.0)
+    if call is None or wait_s <= _SLOW_S:
+        return None
+    moment = Moment("call that waited", recording.since_launch_s(call.requested_ns))
+    cause = Finding(
+        f"{symptom.late}: the callbacks keep each other waiting, and calls to the node's parameter "
+        f"service waited {format_duration(wait_s)} or more",
+        remedy("blocked"),
+        Evidence(moments=(moment,)),
+    )
+    return at_its_place(cause, symptom.late, slow_callback(recording))
+
+
+def at_its_place(cause: Finding, seen: str, stand: Stand | None) -> Finding:
+    """A cause that names the line which keeps the program, if that is known."""
+    if stand is None:
+        return cause
+    evidence = replace(cause.evidence, places=(stand.place,))
+    return replace(cause, observed=f"{seen}: {stand.words}", hint=stand.hint, evidence=evidence)
+
+
+def _calls(recording: Recording, nodes: Collection[str]) -> list[Call]:
+    """Calls to services of the nodes that found a server."""
+    return [
+        call
+        for call in recording.calls
+        if call.service.rpartition("/")[0] in nodes and not call.error
+    ]

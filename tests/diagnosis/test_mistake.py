@@ -1,0 +1,77 @@
+"""The table of mistakes that a check sees at once."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from string import Template
+
+import pytest
+
+from grader import resources
+from grader.diagnosis.mistake import TABLE, mistaken, remedy
+from grader.findings import words
+from grader.findings.words import Words, speaking
+from grader.submission.record import CPP
+
+MISTAKES = {name: one for about in TABLE.values() for name, one in about.items()}
+
+
+def sources() -> Iterator[ast.Module]:
+    for folder in ("checks", "diagnosis"):
+        for file in (resources.root() / "grader" / folder).rglob("*.py"):
+            yield ast.parse(file.read_text(encoding="utf-8"))
+
+
+def named() -> Iterator[tuple[str, set[str]]]:
+    """Each mistake that is named in a call, with the texts that it is given."""
+    for tree in sources():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and ast.unparse(node.func) in ("mistaken", "remedy"):
+                name = node.args[0]
+                if isinstance(name, ast.Constant):
+                    yield str(name.value), {str(one.arg) for one in node.keywords}
+
+
+def wanted(hint: str | Words) -> set[str]:
+    texts = [hint] if isinstance(hint, str) else [hint.python, hint.cpp]
+    found = [Template.pattern.findall(text) for text in texts]
+    names = {one[1] or one[2] for some in found for one in some}
+    return {name for name in names if not hasattr(words, name)}
+
+
+def test_every_mistake_that_a_check_names_is_in_the_table() -> None:
+    assert {name for name, _ in named()} <= MISTAKES.keys()
+
+
+def test_every_mistake_of_the_table_is_named_by_a_check() -> None:
+    texts = {
+        node.value
+        for tree in sources()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant)
+    }
+    assert MISTAKES.keys() <= texts
+    assert len(MISTAKES) == sum(map(len, TABLE.values()))
+
+
+def test_a_check_gives_every_text_that_a_hint_asks_for() -> None:
+    for name, given in named():
+        if "None" not in given:
+            assert wanted(MISTAKES[name].hint) <= given, name
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_every_mistake_is_one_plain_sentence(name: str) -> None:
+    assert re.fullmatch(r"\S.*[.]", MISTAKES[name].mistake)
+    assert len(MISTAKES[name].mistake) <= 110
+
+
+def test_a_hint_says_its_terms_in_the_language_and_what_it_is_given_as_it_is() -> None:
+    finding = mistaken("once_per_call", "it did")
+    assert finding.observed == "it did" and finding.hint.startswith("Publish once")
+    assert "time.sleep()" in remedy("slow_callback")
+    with speaking(CPP):
+        assert "std::this_thread::sleep_for()" in remedy("slow_callback")
+        assert "`$SLEEP`" in remedy("other_use", name="$SLEEP")
