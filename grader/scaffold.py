@@ -40,7 +40,7 @@ def write_assignment(name: str, folder: Path, *, cpp: bool = False) -> Path:
 def assignment_files(name: str, *, cpp: bool = False) -> dict[str, str]:
     """Make the files of a new assignment."""
     languages = (PYTHON, CPP) if cpp else (PYTHON,)
-    names = (ASSIGNMENT_FILE, HANDOUT_FILE, *(one.mutants for one in languages))
+    names = (ASSIGNMENT_FILE, HANDOUT_FILE, PYTHON.mutants)
     files = {file: rendered(f"new/{file}", id=name, cpp=cpp) for file in names}
     for one in languages:
         client = "rclcpp" if one is CPP else "rclpy"

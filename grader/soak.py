@@ -25,8 +25,8 @@ from pathlib import Path
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.mutant import CPP, PYTHON, Language, reference_of
+from grader.authoring.mutants.selftest import Role, Trial, TrialResult, run_trial, trials
 from grader.batch.grading import Grading
-from grader.batch.selftest import Role, Trial, TrialResult, run_trial, trials
 from grader.report.model.grade_part import differences
 from grader.resources import cache_folder
 from grader.run.admission import Admission

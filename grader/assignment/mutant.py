@@ -1,6 +1,7 @@
 """``mutants.yaml``: what the checks of an assignment must notice, and what they must not.
 
-``mutants_cpp.yaml`` is the same for the reference in C++.
+An entry says under ``python`` and ``cpp`` what is different in the reference in each language.
+``mutants_cpp.yaml`` holds what there is only for C++.
 
 A mutant is the reference with one mistake of a student in it, and names the checks that must
 fail for it. A variant is another right solution, in an unusual style, and must keep every
@@ -10,11 +11,11 @@ point.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from grader import resources
 from grader.assignment.model import Assignment
@@ -31,18 +32,20 @@ class Language:
     """Where the solution in one language and its mutants lie.
 
     Attributes:
+        key: What an entry of mutants.yaml calls it.
         mutants: Name of the file beside assignment.yaml.
         reference: Name of the folder beside assignment.yaml.
         own: The folder in ``reference/`` with the solutions of rosgrade's own assignments.
     """
 
+    key: Literal["python", "cpp"]
     mutants: str
     reference: str
     own: str
 
 
-PYTHON = Language("mutants.yaml", "reference", ".")
-CPP = Language("mutants_cpp.yaml", "reference_cpp", "cpp")
+PYTHON = Language("python", "mutants.yaml", "reference", ".")
+CPP = Language("cpp", "mutants_cpp.yaml", "reference_cpp", "cpp")
 LANGUAGES = (PYTHON, CPP)
 
 _LEFT_OUT = {"__pycache__", "build", "install", "log"}
@@ -59,22 +62,32 @@ def _inside(text: str) -> str:
 FilePath = Annotated[str, AfterValidator(_inside)]
 
 
-class Edit(Model):
+class _Place(Model):
+    """Where texts are replaced."""
+
+    file: FilePath | None = Field(
+        None,
+        description="Path in the reference, with forward slashes; by default the `file` of all.",
+    )
+    count: int = Field(1, ge=1, description="How often the text occurs in the file.")
+
+
+class Edit(_Place):
     """A text to replace in one file of the reference."""
 
-    file: FilePath = Field(description="Path in the reference, with forward slashes.")
     replace: str = Field(
         min_length=1, description="The text in the file; it occurs exactly `count` times."
     )
     with_: str = Field(alias="with", description="The new text.")
-    count: int = Field(1, ge=1, description="How often the text occurs in the file.")
 
 
-class Change(Model):
+class Edits(_Place):
     """What is different from the reference: `edits` first, then `files`, then `move`."""
 
-    id: Id = Field(description="Short name, unique in the file.")
-    title: str = Field(description="What is different, in plain words.")
+    replace: str | None = Field(
+        None, min_length=1, description="Where there is one edit only: the text in the file."
+    )
+    with_: str | None = Field(None, alias="with", description="The new text of that edit.")
     edits: tuple[Edit, ...] = Field((), description="Texts to replace, one after the other.")
     files: dict[FilePath, str | None] = Field(
         default_factory=dict,
@@ -83,6 +96,29 @@ class Change(Model):
     move: dict[FilePath, FilePath] = Field(
         default_factory=dict, description="Files or folders to move: from -> to."
     )
+
+    @model_validator(mode="after")
+    def _belong_together(self) -> Edits:
+        if (self.replace is None) != (self.with_ is None):
+            raise ValueError("`replace` and `with` belong together")
+        return self
+
+    def every_edit(self, file: str | None = None) -> Iterator[tuple[Place, Edit]]:
+        """Its edits, and where they stand in it; those that name no file are in the given one."""
+        one = self.model_dump(include={"file", "count", "replace"}) | {"with": self.with_}
+        single = [((), Edit.model_validate(one))] if self.replace is not None else []
+        listed = [(("edits", index), edit) for index, edit in enumerate(self.edits)]
+        for place, edit in (*single, *listed):
+            yield place, edit.model_copy(update={"file": edit.file or file})
+
+
+class Change(Edits):
+    """What is different from the reference of the file's language, or of each language."""
+
+    id: Id = Field(description="Short name, unique in the file.")
+    title: str = Field(description="What is different, in plain words.")
+    python: Edits | None = Field(None, description="What is different in the Python reference.")
+    cpp: Edits | None = Field(None, description="What is different in the C++ reference.")
     skip_reason: str = Field(
         "", description="Why `rosgrade selftest` skips it; by default it does not."
     )
@@ -102,37 +138,62 @@ class Variant(Change):
     """A correct solution in another style; every check must pass."""
 
 
+class Files(Model):
+    """A file of each reference."""
+
+    python: FilePath | None = Field(None, description="Path in the reference in Python.")
+    cpp: FilePath | None = Field(None, description="Path in the reference in C++.")
+
+
+class Losses(Model):
+    """What a standard mutant loses in this assignment."""
+
+    loses: tuple[Id, ...] = Field(min_length=1, description="Checks that must fail.")
+
+
 class MutantFile(Model):
     """The mutants and variants of an assignment: `assignments/<id>/mutants.yaml`.
 
-    The file for the reference in C++ is `mutants_cpp.yaml`.
+    `mutants_cpp.yaml` is the same for what there is only for the reference in C++.
     """
 
     rosgrade: Literal[1] = Field(description="Version of this format.")
-    mutants: tuple[Mutant, ...] = Field(min_length=1, description="Mistakes.")
+    file: Files = Field(default_factory=Files, description="Where edits are that name no file.")
+    derived: dict[Id, Literal[False] | Losses] = Field(
+        default_factory=dict,
+        description="Standard mutants that lose other checks than follow from the contract, or "
+        "`false` for one that is left out.",
+    )
+    mutants: tuple[Mutant, ...] = Field((), description="Mistakes.")
     variants: tuple[Variant, ...] = Field((), description="Correct solutions in another style.")
 
 
 def mutate(
-    change: Change, files: Mapping[str, bytes]
+    change: Edits, files: Mapping[str, bytes], file: str | None = None
 ) -> tuple[dict[str, bytes], list[tuple[Place, str]]]:
-    """Change the files of a reference: the new files, and what does not apply."""
+    """Change the files of a reference: the new files, and what does not apply.
+
+    Args:
+        file: Where edits are that name no file.
+    """
     result = dict(files)
-    problems = list(_apply(change, result))
+    problems = list(_apply(change, result, file))
     if not problems and result == dict(files):
         problems.append(((), "changes nothing"))
     return result, problems
 
 
-def _apply(change: Change, files: dict[str, bytes]) -> Iterator[tuple[Place, str]]:
-    for index, edit in enumerate(change.edits):
+def _apply(change: Edits, files: dict[str, bytes], file: str | None) -> Iterator[tuple[Place, str]]:
+    for place, edit in change.every_edit(file):
         old, new = edit.replace.encode(), edit.with_.encode()
-        found = files.get(edit.file, b"").count(old)
-        if edit.file not in files:
-            yield ("edits", index, "file"), f"the reference has no file {edit.file!r}"
+        found = files.get(edit.file or "", b"").count(old)
+        if edit.file is None:
+            yield place, "says no `file`, and there is none for all edits"
+        elif edit.file not in files:
+            yield (*place, "file"), f"the reference has no file {edit.file!r}"
         elif found != edit.count:
             text = f"the text occurs {found} times in {edit.file}, not {edit.count}"
-            yield ("edits", index, "replace"), text
+            yield (*place, "replace"), text
         else:
             files[edit.file] = files[edit.file].replace(old, new)
     for name, content in change.files.items():
@@ -196,12 +257,17 @@ def deviations(expected: Mapping[str, Status], actual: Mapping[str, Status]) -> 
 
 @dataclass(frozen=True)
 class Mutants:
-    """The mutants and variants of an assignment, all of which apply to its reference."""
+    """The mutants and variants of an assignment, all of which apply to its reference.
+
+    Attributes:
+        derived: What the author says of standard mutants, by their id.
+    """
 
     file: Path
     reference: Path
     mutants: tuple[Mutant, ...]
     variants: tuple[Variant, ...]
+    derived: Mapping[str, Literal[False] | Losses]
 
 
 def reference_of(assignment: str, folder: Path | None = None, language: Language = PYTHON) -> Path:
@@ -224,25 +290,91 @@ def load_mutants(
     reference: Path | None = None,
     language: Language = PYTHON,
 ) -> Mutants:
-    """Read and check the mutants of an assignment, for :func:`reference_of` by default."""
+    """Read and check the mutants of an assignment, for :func:`reference_of` by default.
+
+    Those of one language may stand in both files. Where standard mutants follow from a contract,
+    there need be no file.
+    """
     reference = reference_of(assignment.id, folder, language) if reference is None else reference
-    source = read_source(folder / language.mutants)
+    files = read_files(reference)
+    file = folder / language.mutants
+    found = Mutants(file, reference, (), (), {})
+    for written in dict.fromkeys((PYTHON, language)):
+        if (folder / written.mutants).exists():
+            more = _read_mutants(folder, written, language, assignment, files)
+            twice = {one.id for one in _changes(found)} & {one.id for one in _changes(more)}
+            if twice:
+                text = f"{', '.join(sorted(twice))} stands in {PYTHON.mutants} as well"
+                raise AssignmentError(more.file, [Problem(text)])
+            found = replace(
+                found,
+                mutants=found.mutants + more.mutants,
+                variants=found.variants + more.variants,
+                derived={**found.derived, **more.derived},
+            )
+    if not (found.mutants or has_standard_mutants(assignment)):
+        source = read_source(file)
+        raise AssignmentError(file, [source.problem(("mutants",), "there is no mutant")])
+    return found
+
+
+def has_standard_mutants(assignment: Assignment) -> bool:
+    """Whether mutants follow from the assignment."""
+    return assignment.contract is not None
+
+
+def _changes(mutants: Mutants) -> tuple[Change, ...]:
+    return (*mutants.mutants, *mutants.variants)
+
+
+def _read_mutants(
+    folder: Path,
+    written: Language,
+    language: Language,
+    assignment: Assignment,
+    files: Mapping[str, bytes],
+) -> Mutants:
+    """What one file has for a language; ``written`` is the language of the file itself."""
+    source = read_source(folder / written.mutants)
     content = source.read(MutantFile)
-    files = _read(reference)
     problems = [*source.duplicates("id", "mutants", "variants")]
     problems += _losses(source, content, assignment)
+    kept: dict[str, list[Any]] = {"mutants": [], "variants": []}
     for key, changes in (("mutants", content.mutants), ("variants", content.variants)):
         for index, change in enumerate(changes):
-            _, found = mutate(change, files)
-            problems += [source.problem((key, index, *inside), text) for inside, text in found]
+            edits, inner = _edits_of(change, language, is_own=written is language)
+            if edits is None:
+                continue
+            named = getattr(content.file, language.key)
+            _, found = mutate(edits, files, named)
+            problems += [
+                source.problem((key, index, *inner, *inside), text) for inside, text in found
+            ]
+            every = tuple(edit for _, edit in edits.every_edit(named))
+            made = {"edits": every, "replace": None, "files": edits.files, "move": edits.move}
+            kept[key].append(change.model_copy(update=made))
     if problems:
         raise AssignmentError(source.file, in_order(problems))
-    return Mutants(source.file, reference, content.mutants, content.variants)
+    return Mutants(
+        source.file, Path(), tuple(kept["mutants"]), tuple(kept["variants"]), content.derived
+    )
+
+
+def _edits_of(
+    change: Change, language: Language, *, is_own: bool
+) -> tuple[Edits | None, tuple[str, ...]]:
+    """What a change is in a language, and where that stands in it; None if it is none there."""
+    own = getattr(change, language.key)
+    if own is not None:
+        return own, (language.key,)
+    is_of_file = bool(change.edits or change.files or change.move or change.replace)
+    is_of_other = change.python is not None or change.cpp is not None
+    return (change if is_own and (is_of_file or not is_of_other) else None), ()
 
 
 def apply(change: Change, reference: Path, target: Path) -> None:
     """Write a changed copy of the reference into an empty folder."""
-    files, found = mutate(change, _read(reference))
+    files, found = mutate(change, read_files(reference))
     if found:
         raise AssignmentError(
             reference, [Problem(f"{change.id!r} does not apply: {text}") for _, text in found]
@@ -253,7 +385,7 @@ def apply(change: Change, reference: Path, target: Path) -> None:
         file.write_bytes(content)
 
 
-def _read(folder: Path) -> dict[str, bytes]:
+def read_files(folder: Path) -> dict[str, bytes]:
     """All files of a folder by path, without what a build leaves."""
     return {
         inside.as_posix(): (folder / inside).read_bytes()
@@ -264,13 +396,21 @@ def _read(folder: Path) -> dict[str, bytes]:
 
 def _losses(source: Source, content: MutantFile, assignment: Assignment) -> Iterator[Problem]:
     requires = {spec.id: spec.requires for spec in assignment.checks}
-    for index, mutant in enumerate(content.mutants):
-        for number, lost in enumerate(mutant.loses):
-            place = ("mutants", index, "loses", number)
+    named: list[tuple[Place, tuple[str, ...]]] = [
+        (("mutants", index, "loses"), mutant.loses) for index, mutant in enumerate(content.mutants)
+    ]
+    named += [
+        (("derived", name, "loses"), given.loses)
+        for name, given in content.derived.items()
+        if given
+    ]
+    for inside, loses in named:
+        for number, lost in enumerate(loses):
+            place = (*inside, number)
             if lost not in requires:
                 advice = nearest_or_all(lost, requires, "The checks are")
                 yield source.problem(place, f"there is no check {lost!r}.{advice}")
-            above = sorted(required_by(lost, requires) & set(mutant.loses))
+            above = sorted(required_by(lost, requires) & set(loses))
             if above:
                 text = f"{lost!r} requires {above[0]!r}, so it is skipped: leave it out"
                 yield source.problem(place, text)

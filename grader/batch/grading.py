@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager, nullcontext
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -28,6 +29,7 @@ from grader.report.files import write_whole
 from grader.report.html.replay import Replay
 from grader.run.admission import Admission
 from grader.run.host.load import cpu_count
+from grader.run.imposing.mistake import Mistake
 from grader.run.runner import Runner, RunRequest, scenario_seed
 from grader.sandbox.python_tree import check_installed
 from grader.spec.names import Names
@@ -84,6 +86,7 @@ class Grading:
         self._seed = seed
         self._first = first
         self._on_recorded = on_recorded
+        self._mistakes: tuple[Mistake, ...] = ()
         self._with_bags = any(True for _ in _needed(loaded, Bags))
         self._libraries = (*loaded.assignment.libraries, *([LIBRARY] if _tested(loaded) else ()))
         check_installed(self._libraries)
@@ -140,6 +143,12 @@ class Grading:
             prepared = prepared.named(name)
         prepared = replace(prepared, record=replace(prepared.record, given=outside))
         return self.grade_prepared(prepared, folder)
+
+    def imposing(self, mistakes: tuple[Mistake, ...]) -> Grading:
+        """The same, but that mistakes are imposed on the programs: for selftest only."""
+        other = copy(self)
+        other._mistakes = mistakes
+        return other
 
     @contextmanager
     def _build_place(self, alone: bool) -> Iterator[None]:
@@ -291,6 +300,7 @@ class Grading:
                 underlays=prepared.underlays,
                 type_support=support.prefixes(),
                 names=names[name],
+                mistakes=self._mistakes,
                 pauses=any(
                     bound.parameters.pauses and scenario in loaded.scenarios_of(bound)
                     for bound in loaded.checks

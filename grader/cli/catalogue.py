@@ -42,7 +42,7 @@ def validate(
     from grader.assignment.contract.expand import plain
     from grader.assignment.lint_warnings import lint_warnings
     from grader.assignment.load import load_assignment
-    from grader.assignment.mutant import LANGUAGES, load_mutants
+    from grader.authoring.mutants.standard import every_mutant
     from grader.batch.type_support import missing_underlays
     from grader.course.load import COURSE_FILE, load_course
     from grader.sandbox.python_tree import not_installed
@@ -63,14 +63,7 @@ def validate(
                 typer.echo(f"{name}: rules of {count}: valid")
                 continue
             loaded = load_assignment(name)
-            mutants = [
-                mutant
-                for language in LANGUAGES
-                if (loaded.folder / language.mutants).exists()
-                for mutant in load_mutants(
-                    loaded.assignment, loaded.folder, language=language
-                ).mutants
-            ]
+            mutants = every_mutant(loaded)
         except RosgradeError as error:
             print_error(str(error))
             broken += 1

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from grader.assignment.load import LoadedAssignment
+    from grader.authoring.mutants.selftest import TrialResult
     from grader.batch.grading import Graded
-    from grader.batch.selftest import TrialResult
 
 
 def selftest(
@@ -29,13 +29,17 @@ def selftest(
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Submissions at once; by default two for each CPU.")
     ] = None,
-    cpp: Annotated[
-        bool, typer.Option("--cpp", help="Use the reference in C++ and mutants_cpp.yaml.")
-    ] = False,
+    cpp: Annotated[bool, typer.Option("--cpp", help="Use the reference in C++.")] = False,
     record: Annotated[
         bool,
         typer.Option("--record", help="Grade only the reference; keep its recordings for reports."),
     ] = False,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--only", metavar="MUTANT", help="Grade only this mutant or variant; may be repeated."
+        ),
+    ] = None,
     keep: Annotated[
         Path | None,
         typer.Option(
@@ -55,14 +59,15 @@ def selftest(
     from grader import ros
     from grader.assignment.load import list_assignments, load_assignment
     from grader.assignment.mutant import CPP, PYTHON, reference_of
+    from grader.authoring.mutants.selftest import Role, Trial, mutation_score, trials
+    from grader.authoring.mutants.selftest import selftest as run_selftest
     from grader.batch.grading import Grading
     from grader.batch.reference_run import keep_reference
-    from grader.batch.selftest import Role, Trial, mutation_score, trials
-    from grader.batch.selftest import selftest as run_selftest
     from grader.errors import UsageError
     from grader.report.files import refuse_part
     from grader.run.host.load import cpu_count
     from grader.run.runner import Runner
+    from grader.spec.nearest_name import nearest_or_all
     from grader.submission.underlay.definition import find_underlay
     from grader.submission.underlay.store import UnderlayStore
 
@@ -79,7 +84,7 @@ def selftest(
         kept.append(keep_reference(loaded, graded.grade, graded.recordings))
 
     def chosen_trial(trial: Trial) -> bool:
-        return not record or trial.role is Role.REFERENCE
+        return trial.role is Role.REFERENCE if record else not only or trial.id in only
 
     console = output_console()
     perfect = True
@@ -91,7 +96,11 @@ def selftest(
             reference = reference_of(loaded.assignment.id, loaded.folder, language)
             refuse_part(keep, reference, f"the reference solution in {reference}")
         results: list[TrialResult] = []
-        wanted = sum(chosen_trial(trial) for trial in trials(loaded, language))
+        every = trials(loaded, language)
+        for missing in {*(only or ())} - {trial.id for trial in every}:
+            near = nearest_or_all(missing, [trial.id for trial in every])
+            raise UsageError(f"{loaded.assignment.id} has no mutant {missing!r}.{near}")
+        wanted = sum(map(chosen_trial, every))
         with Runner(ros.find(), sandbox=chosen) as runner, Progress(quiet).shown() as progress:
             grading = Grading(loaded, runner, cache_folder())
             for result in run_selftest(
@@ -113,11 +122,13 @@ def selftest(
             continue
         score = mutation_score(results)
         perfect = perfect and score.perfect
+        derived = f" ({score.derived} follow from the contract)" if score.derived else ""
         percent = 100.0 * score.killed / score.mutants if score.mutants else 0.0
         _print(console, loaded.assignment.id, results)
         say(
             f"{loaded.assignment.id}: {score.accepted} of {score.right} right solutions with "
-            f"full points, {score.killed} of {score.mutants} mutants judged as expected: "
+            f"full points, {score.killed} of {score.mutants} mutants judged as expected"
+            f"{derived}: "
             f"mutation score {percent:.0f} %"
         )
     raise typer.Exit(0 if perfect else 1)

@@ -41,7 +41,12 @@ def _begin(file: Path) -> bytes:
 
 
 def compiled_tracer(ros: RosInstallation, cache: Path) -> Path | None:
-    """The library for this ROS installation, or None where there is no C compiler to build it.
+    """The library for this ROS installation, or None where there is no C compiler to build it."""
+    return build_library(_SOURCE, ros, cache)
+
+
+def build_library(source: Path, ros: RosInstallation, cache: Path) -> Path | None:
+    """A library to preload, built once for this ROS installation; None without a C compiler.
 
     Raises:
         GraderFault: It does not compile.
@@ -49,10 +54,10 @@ def compiled_tracer(ros: RosInstallation, cache: Path) -> Path | None:
     compiler = shutil.which("cc")
     if compiler is None:
         return None
-    command = [compiler, *_OPTIONS, *_includes(ros), str(_SOURCE), *_LIBRARIES]
-    what = (*command, _version(compiler), _SOURCE.read_text(encoding="utf-8"))
+    command = [compiler, *_OPTIONS, *_includes(ros), str(source), *_LIBRARIES]
+    what = (*command, _version(compiler), source.read_text(encoding="utf-8"))
     key = hashlib.sha256("\0".join(what).encode()).hexdigest()
-    library = cache / "tracer" / f"rosgrade_rcl-{key[:16]}.so"
+    library = cache / "tracer" / f"{source.stem}-{key[:16]}.so"
     if not library.is_file():
         library.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=library.parent) as folder:
@@ -66,7 +71,7 @@ def compiled_tracer(ros: RosInstallation, cache: Path) -> Path | None:
                 check=False,
             )
             if result.returncode != 0:
-                raise GraderFault(f"{_SOURCE.name} does not compile: {result.stderr.strip()}")
+                raise GraderFault(f"{source.name} does not compile: {result.stderr.strip()}")
             built.replace(library)
     return library
 

@@ -96,6 +96,7 @@ class CellOrder:
         submission: The submission's facts, as JSON, to go into the recording unread.
         simulator: The simulated robot, or None.
         compiled_tracer: The library that compiled programs are started with, or None.
+        mutation: Folder with mistakes that selftest imposes on right programs, or None.
         process_sandbox: The sandbox of each process of the student, or None.
         pauses: Whether the executors pause before the processes are stopped.
         names: Wrong names that the commands put right.
@@ -117,6 +118,7 @@ class CellOrder:
     facts: dict[str, str] = field(default_factory=dict)
     type_support: tuple[str, ...] = ()
     compiled_tracer: str | None = None
+    mutation: str | None = None
     process_sandbox: ProcessSandbox | None = None
     tells_output: bool = False
     pauses: bool = False

@@ -26,6 +26,7 @@ from grader.run.cell.prefork_server import SIMULATOR_MODULE, PreforkServer
 from grader.run.compiled_tracer import compiled_tracer, has_compiled_programs
 from grader.run.environment import RMW, student_environment
 from grader.run.host.load import cpu_count
+from grader.run.imposing.mistake import Mistake, with_mistakes
 from grader.run.order import CellOrder, ProcessCommand, RunLimits, SimulatorOrder, Topic, Until
 from grader.run.sandboxed_order import sandboxed
 from grader.sandbox.python_tree import unlisted
@@ -229,6 +230,7 @@ class RunRequest:
         underlays: Of the submission; by default those of the runner's ROS.
         names: Wrong names to put right.
         pauses: Whether the executors pause after the observation.
+        mistakes: What is imposed on its programs; of selftest only.
     """
 
     assignment: Assignment
@@ -241,6 +243,7 @@ class RunRequest:
     type_support: tuple[Path, ...] = ()
     names: Names = NO_NAMES
     pauses: bool = False
+    mistakes: tuple[Mistake, ...] = ()
 
 
 @dataclass
@@ -411,6 +414,8 @@ class Runner:
             tells_output=self.verbose,
             pauses=request.pauses,
         )
+        if request.mistakes:
+            order = with_mistakes(order, request.mistakes, folder, ros)
         if self.sandbox is None or ros.source == "sourced":
             # A sandbox shows the system's libraries, which Python finds where ROS is sourced.
             shown = Path("/" if self.sandbox is None else "/usr")

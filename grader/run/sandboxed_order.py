@@ -15,6 +15,7 @@ from pathlib import Path
 from grader.ros import RosInstallation
 from grader.run.compiled_tracer import IN_SANDBOX
 from grader.run.environment import TRACER, TRACER_IN_SANDBOX, sandboxed_environment
+from grader.run.imposing.mistake import IN_SANDBOX as MUTATION_IN_SANDBOX
 from grader.run.order import CellOrder
 from grader.run.process.process_sandbox import HOME, WORKSPACE, ProcessSandbox
 from grader.sandbox import bubblewrap
@@ -64,6 +65,9 @@ def sandboxed(
         shutil.copyfile(order.compiled_tracer, folder / _COMPILED_TRACER)
         binds.append(Bind(CELL / _COMPILED_TRACER, IN_SANDBOX))
         places[order.compiled_tracer] = str(IN_SANDBOX)
+    if order.mutation is not None:
+        binds.append(Bind(CELL / Path(order.mutation).name, MUTATION_IN_SANDBOX))
+        places[order.mutation] = str(MUTATION_IN_SANDBOX)
     simulator = order.simulator
     if simulator is not None:
         shutil.copyfile(simulator.world, folder / _WORLD)

@@ -19,6 +19,7 @@ from grader.assignment.mutant import (
     load_mutants,
     reference_of,
 )
+from grader.authoring.mutants.standard import with_standard_mutants
 from grader.checks.check import Subject
 
 PUBLISHERS = ("simple_publisher", "timed_publisher")
@@ -36,12 +37,14 @@ def mutants(loaded: LoadedAssignment) -> Mutants:
 
 def test_every_check_is_noticed_by_a_mutant(loaded: LoadedAssignment, mutants: Mutants) -> None:
     """A check that no mutant loses might as well always pass."""
-    lost = {check for mutant in mutants.mutants if not mutant.skip_reason for check in mutant.loses}
+    standard = [one.mutant for one in with_standard_mutants(loaded, mutants)]
+    every = [one for one in (*mutants.mutants, *standard) if not one.skip_reason]
+    lost = {check for mutant in every for check in mutant.loses}
     assert lost == {bound.spec.id for bound in loaded.checks}
 
 
 def test_there_are_enough_mutants_and_variants(mutants: Mutants) -> None:
-    assert len(mutants.mutants) >= 12
+    assert len(mutants.mutants) >= 9
     assert len(mutants.variants) >= 5
 
 
@@ -134,6 +137,7 @@ def test_the_reference_in_cpp_is_the_same_package(loaded: LoadedAssignment) -> N
 def test_there_are_enough_mutants_in_cpp(loaded: LoadedAssignment) -> None:
     mutants = load_mutants(loaded.assignment, loaded.folder, language=CPP)
     assert len(mutants.mutants) >= 6
+    assert len(with_standard_mutants(loaded, mutants)) >= 12
     assert len(mutants.variants) >= 2
 
 

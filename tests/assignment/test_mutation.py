@@ -149,6 +149,92 @@ def test_the_solution_in_cpp_has_mutants_of_its_own(tmp_path: Path, reference: P
     assert (tmp_path / "one/bot/src/node.cpp").read_text() == 'auto topic = "/cmdvel";\n'
 
 
+BOTH = """\
+rosgrade: 1
+mutants:
+  - id: cmdvel
+    title: The topic is called /cmdvel
+    python:
+      edits: [{file: bot/bot/node.py, replace: /cmd_vel, with: /cmdvel}]
+    cpp:
+      edits: [{file: bot/src/node.cpp, replace: /cmd_vel, with: /cmdvel}]
+    loses: [topic]
+  - id: only_python
+    title: The topic is empty
+    edits: [{file: bot/bot/node.py, replace: /cmd_vel, with: ''}]
+    loses: [topic]
+  - id: only_cpp
+    title: The file is empty
+    cpp:
+      files: {bot/src/node.cpp: ''}
+    loses: [topic]
+"""
+
+
+def test_one_entry_is_a_mutant_in_each_language_that_it_names(
+    tmp_path: Path, reference: Path
+) -> None:
+    cpp = tmp_path / "reference_cpp"
+    (cpp / "bot/src").mkdir(parents=True)
+    (cpp / "bot/src/node.cpp").write_text('auto topic = "/cmd_vel";\n')
+    python = load_mutants(LESSON, write(tmp_path, BOTH), reference)
+    compiled = load_mutants(LESSON, tmp_path, language=CPP)
+    assert [one.id for one in python.mutants] == ["cmdvel", "only_python"]
+    assert [one.id for one in compiled.mutants] == ["cmdvel", "only_cpp"]
+    apply(compiled.mutants[0], cpp, tmp_path / "one")
+    assert (tmp_path / "one/bot/src/node.cpp").read_text() == 'auto topic = "/cmdvel";\n'
+
+
+def test_the_file_of_most_edits_is_said_once(tmp_path: Path, reference: Path) -> None:
+    short = GOOD.replace("file: bot/bot/node.py, ", "")
+    said = "rosgrade: 1\nfile: {python: bot/bot/node.py}"
+    mutants = load_mutants(LESSON, write(tmp_path, short.replace("rosgrade: 1", said)), reference)
+    apply(mutants.mutants[0], mutants.reference, tmp_path / "one")
+    assert (tmp_path / "one/bot/bot/node.py").read_text() == "topic = '/cmdvel'\n"
+    with pytest.raises(AssignmentError, match=r"mutants\[0\]\.edits\[0\]: says no `file`"):
+        load_mutants(LESSON, write(tmp_path, short), reference)
+
+
+def test_a_change_with_one_edit_needs_no_list(tmp_path: Path, reference: Path) -> None:
+    one = GOOD.replace("edits: [{file: bot/bot/node.py, replace: /cmd_vel, with: /cmdvel}]", "{}")
+    one = one.replace(
+        "    {}\n", "    file: bot/bot/node.py\n    replace: /cmd_vel\n    with: /cmdvel\n"
+    )
+    mutants = load_mutants(LESSON, write(tmp_path, one), reference)
+    apply(mutants.mutants[0], mutants.reference, tmp_path / "one")
+    assert (tmp_path / "one/bot/bot/node.py").read_text() == "topic = '/cmdvel'\n"
+    with pytest.raises(AssignmentError, match=r"\[0\]: `replace` and `with` belong together"):
+        load_mutants(LESSON, write(tmp_path, one.replace("    with: /cmdvel\n", "")), reference)
+    with pytest.raises(AssignmentError, match=r"mutants\[0\]\.replace: the text occurs 0 times"):
+        load_mutants(LESSON, write(tmp_path, one.replace("e: /cmd_vel", "e: /cmd_val")), reference)
+
+
+def test_an_edit_of_one_language_that_does_not_apply_is_reported_there(
+    tmp_path: Path, reference: Path
+) -> None:
+    folder = write(tmp_path, BOTH.replace("py, replace: /cmd", "py, replace: x", 1))
+    with pytest.raises(AssignmentError, match=r"\[0\]\.python\.edits\[0\]\.replace: the text"):
+        load_mutants(LESSON, folder, reference)
+
+
+def test_an_id_in_the_files_of_both_languages_is_refused(tmp_path: Path) -> None:
+    cpp = tmp_path / "reference_cpp"
+    (cpp / "bot/src").mkdir(parents=True)
+    (cpp / "bot/src/node.cpp").write_text('auto topic = "/cmd_vel";\n')
+    write(tmp_path, BOTH)
+    (tmp_path / "mutants_cpp.yaml").write_text(GOOD.replace("bot/node.py", "src/node.cpp"))
+    with pytest.raises(AssignmentError, match=r"cmdvel stands in mutants\.yaml as well"):
+        load_mutants(LESSON, tmp_path, language=CPP)
+
+
+def test_what_is_said_of_a_standard_mutant_names_checks_that_there_are(
+    tmp_path: Path, reference: Path
+) -> None:
+    text = f"{GOOD}derived:\n  depth_wrong: {{loses: [topics]}}\n  best_effort: false\n"
+    with pytest.raises(AssignmentError, match=r"depth_wrong\.loses\[0\]: there is no check"):
+        load_mutants(LESSON, write(tmp_path, text), reference)
+
+
 def test_a_missing_reference_is_reported() -> None:
     with pytest.raises(UsageError, match="the assignment 'lesson' has no reference solution"):
         reference_of("lesson")

@@ -19,6 +19,7 @@ import pytest
 
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
+from grader.authoring.mutants.selftest import Role, Trial, mutation_score, run_trial
 from grader.batch import grading as grading_module
 from grader.batch.class_files import find_reports
 from grader.batch.class_regrading import regrade_class
@@ -26,7 +27,6 @@ from grader.batch.files import REPORT_FILE, RESULT_FILE, write_graded
 from grader.batch.grading import Graded, Grading
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import compare, find, regrade
-from grader.batch.selftest import Role, Trial, mutation_score, run_trial
 from grader.errors import GraderFault, UsageError
 from grader.findings.finding import Status
 from grader.recording.event import Disturbance

@@ -14,6 +14,7 @@ from grader import ros
 from grader.assignment.model import Assignment
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording
+from grader.run.imposing.mistake import Mistake
 from grader.run.process.descendants import command_line
 from grader.run.runner import Runner, RunRequest
 from grader.spec.names import NO_NAMES, Names
@@ -81,6 +82,7 @@ def run_node(runner: Runner, tmp_path: Path) -> RunNode:
         worlds: Path = Path(),
         pauses: bool = False,
         names: Names = NO_NAMES,
+        mistakes: tuple[Mistake, ...] = (),
         **scenario: Any,
     ) -> Recording:
         folder = tmp_path / str(next(numbers))
@@ -96,6 +98,7 @@ def run_node(runner: Runner, tmp_path: Path) -> RunNode:
             worlds=worlds,
             pauses=pauses,
             names=names,
+            mistakes=mistakes,
         )
         runner.run(request, file)
         return read_recording(file)

@@ -2,7 +2,7 @@
 
 The reference and every variant (a right solution in another style) must get full points; every
 mutant must lose exactly the checks that it names; the starter package, untouched, must get
-almost nothing.
+almost nothing. Mutants are those of mutants.yaml, and the standard ones of the contract.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from grader.assignment.mutant import (
     expected_statuses,
     load_mutants,
 )
+from grader.authoring.mutants.standard import with_standard_mutants
 from grader.batch.grading import Graded, Grading
 from grader.findings.finding import Status
 from grader.grade.model import Grade
@@ -33,6 +34,7 @@ from grader.report.model.facts import RunFacts
 from grader.report.model.grade_part import grade_json
 from grader.report.model.result import make_result
 from grader.report.text.words import counted_points, number
+from grader.run.imposing.mistake import Mistake
 from grader.scratch import Scratch
 from grader.spec.unit import format_duration
 from grader.starter import write_starter
@@ -52,12 +54,19 @@ class Role(str, Enum):
 
 @dataclass(frozen=True)
 class Trial:
-    """One submission to grade, with the outcome that it must have."""
+    """One submission to grade, with the outcome that it must have.
+
+    Attributes:
+        is_derived: It is a standard mutant.
+        mistakes: What the run imposes on the reference.
+    """
 
     role: Role
     id: str
     title: str
     change: Change | None
+    is_derived: bool = False
+    mistakes: tuple[Mistake, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -98,6 +107,10 @@ def trials(loaded: LoadedAssignment, language: Language = PYTHON) -> tuple[Trial
             for change in changes
             if not change.skip_reason
         ),
+        *(
+            Trial(Role.MUTANT, one.mutant.id, one.mutant.title, one.mutant, True, one.mistakes)
+            for one in with_standard_mutants(loaded, mutants)
+        ),
         Trial(Role.STARTER, "starter", "the starter package, untouched", None),
     )
 
@@ -115,7 +128,7 @@ def run_trial(
     submission = folder / "submissions" / trial.id
     if trial.role is Role.STARTER:
         write_starter(loaded, submission, cpp=language is CPP)
-    elif trial.change is None:
+    elif trial.change is None or trial.mistakes:
         submission = reference
     else:
         apply(trial.change, reference, submission)
@@ -125,7 +138,9 @@ def run_trial(
         for name, variable in loaded.assignment.variables.items()
         if variable.match is None
     }
-    graded = grading.grade(submission, folder / "recordings" / trial.id, given=given)
+    graded = grading.imposing(trial.mistakes).grade(
+        submission, folder / "recordings" / trial.id, given=given
+    )
     on_graded(graded)
     actual = {result.id: result.status for result in graded.grade.results}
     if trial.role is Role.STARTER:
@@ -141,6 +156,8 @@ def run_trial(
                 lost = all(expected[root] is Status.FAILED for root in result.waits_for)
                 expected[result.id] = Status.SKIPPED if lost else expected[result.id]
         wrong = deviations(expected, actual)
+        if trial.is_derived and not any(status is Status.FAILED for status in actual.values()):
+            wrong = {trial.id: f"changes nothing here: write `derived: {{{trial.id}: false}}`"}
     return TrialResult(
         trial=trial,
         wrong=wrong,
@@ -222,6 +239,7 @@ class MutationScore:
 
     killed: int
     mutants: int
+    derived: int
     accepted: int
     right: int
     perfect: bool
@@ -234,6 +252,7 @@ def mutation_score(results: list[TrialResult]) -> MutationScore:
     return MutationScore(
         killed=sum(not r.wrong for r in mutants),
         mutants=len(mutants),
+        derived=sum(r.trial.is_derived for r in mutants),
         accepted=sum(not r.wrong for r in right),
         right=len(right),
         perfect=not any(r.wrong for r in results),

@@ -13,8 +13,8 @@ import pytest
 
 from grader import resources, ros
 from grader.assignment.load import list_assignments, load_assignment
+from grader.authoring.mutants.selftest import Role, mutation_score, selftest, trials
 from grader.batch.grading import Grading
-from grader.batch.selftest import Role, mutation_score, selftest, trials
 from grader.batch.type_support import missing_underlays
 from grader.run.host.load import cpu_count
 from grader.run.runner import Runner

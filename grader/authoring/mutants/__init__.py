@@ -1,0 +1,1 @@
+"""Mutants: mistakes that the checks of an assignment must notice."""
