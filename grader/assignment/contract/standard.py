@@ -29,7 +29,6 @@ from grader.findings.words import Words
 from grader.spec.document import Place
 
 ANY = "any"
-_STAY_ALIVE = "rclpy.spin(node) keeps the node running until it is interrupted."
 _NAME_HINT = "The {} argument of create_{} is the name of the topic."
 
 
@@ -102,6 +101,7 @@ class Spot:
             "of_package": f" {self.package}" if len(self.contract.packages) > 1 else "",
             "type": str(getattr(self.part, "type", "")),
             "short": short,
+            "cpp_type": str(getattr(self.part, "type", "")).replace("/", "::"),
             "kind": kind.lower(),
         }
         if self.executable:
@@ -282,7 +282,10 @@ PROGRAM = (
         "node.alive",
         lambda it: {} if it.program.alive else None,
         "{subject} stays alive",
-        Words(_STAY_ALIVE, _STAY_ALIVE.replace("rclpy.", "rclcpp::")),
+        Words(
+            "rclpy.spin(node) keeps the node running until it is interrupted.",
+            "rclcpp::spin(node) keeps the node running until it is interrupted.",
+        ),
         ("starts",),
     ),
     Fact(
@@ -500,7 +503,7 @@ SERVICE = (
         Words(
             "self.create_service({short}, '{name}', self.callback); `ros2 service list -t` shows "
             "it.",
-            'create_service<...::{short}>("{name}", callback); `ros2 service list -t` shows it.',
+            'create_service<{cpp_type}>("{name}", callback); `ros2 service list -t` shows it.',
         ),
         ("node",),
         2,
@@ -515,7 +518,7 @@ ACTION = (
         "{subject} offers the action {name}",
         Words(
             "ActionServer(self, {short}, '{name}', self.execute); `ros2 action list -t` shows it.",
-            'rclcpp_action::create_server<...::{short}>(this, "{name}", ...); `ros2 action list '
+            'rclcpp_action::create_server<{cpp_type}>(this, "{name}", ...); `ros2 action list '
             "-t` shows it.",
         ),
         ("node",),
