@@ -29,12 +29,13 @@ from grader.authoring.mutants import manifest
 from grader.authoring.mutants.manifest import Files, PackageFiles, misspelt
 from grader.errors import AssignmentError, Problem, UsageError
 from grader.run.imposing.mistake import Mistake
+from grader.spec.source import read_source
 
 _OTHER_TYPES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 _OTHER_AXIS = {"x": "y", "y": "x", "z": "x"}
 _MOST_OF_PERIOD, _LONGER = 0.85, 1.5
-_HEARD = ("messages.", "timing.", "executor.", "callbacks.")
-"""Families of checks that fail where no callback is called."""
+_SEEN = ("topic.", "qos.", "node.")
+"""Families of checks of a topic that pass where no callback is called."""
 
 Imposed = tuple[str, str, str]
 """Kind, name and value of a mistake."""
@@ -68,7 +69,7 @@ def with_standard_mutants(loaded: LoadedAssignment, written: Mutants) -> tuple[S
     """The standard mutants that an assignment has, with what its author says of them.
 
     Raises:
-        AssignmentError: The author says something of a mutant that there is not.
+        AssignmentError: The author wrote a mutant with the id of one.
     """
     if not has_standard_mutants(loaded.assignment):
         return ()
@@ -106,9 +107,10 @@ def every_mutant(loaded: LoadedAssignment) -> list[Mutant]:
 
 
 def standard_mutants(loaded: LoadedAssignment, files: Mapping[str, bytes]) -> tuple[Standard, ...]:
-    """All standard mutants of an assignment, for the files of a reference."""
+    """All standard mutants of what the contract asks for, for the files of a reference."""
     drafts: dict[tuple[object, ...], _Draft] = {}
-    for bound in loaded.checks:
+    own = {one.get("id") for one in read_source(loaded.file).data.get("checks") or ()}
+    for bound in (one for one in loaded.checks if one.spec.id not in own):
         for draft in (*_of_package(bound, loaded, files), *_of_run(bound, loaded)):
             key = (draft.kind, *draft.about, draft.mistakes)
             drafts.setdefault(key, draft).loses += draft.loses or [bound.spec.id]
@@ -269,7 +271,7 @@ class _Run:
             if (
                 (one.spec.uses or "").startswith(uses)
                 and scenarios & self._scenarios
-                and (topic is None or about in (topic, None))
+                and (topic in (None, about) or (one.spec.uses or "").startswith("executor."))
             ):
                 yield one
 
@@ -287,8 +289,9 @@ class _Run:
 
     def starved(self, topics: Iterable[str]) -> tuple[str, ...]:
         """The checks that fail where no callback is called."""
-        found = [one.spec.id for topic in topics for one in self.others(_HEARD, topic)]
-        return tuple(dict.fromkeys(found))
+        found = [one.spec for topic in topics for one in self.others(("",), topic)]
+        unheard = (one.id for one in found if not (one.uses or "").startswith(_SEEN))
+        return tuple(dict.fromkeys(unheard))
 
 
 def _name(run: _Run) -> Iterator[_Wrong]:
