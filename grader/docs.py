@@ -48,14 +48,6 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
     "assignment-yaml": {
         "The whole file": model.Assignment,
         "variables": variable.Variable,
-        "contract": contract.Contract,
-        "contract: packages": contract.ContractPackage,
-        "contract: executables": contract.Program,
-        "contract: publishes": contract.Publication,
-        "contract: subscribes": contract.Subscription,
-        "contract: serves, actions": contract.Server,
-        "contract: parameters": contract.Declared,
-        "contract: interfaces": contract.Interface,
         "packages": model.Package,
         "scenarios": model.Scenario,
         "launch": model.Launch,
@@ -67,6 +59,16 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "checks: after, before, while": window.Phase,
         "manual": model.ManualItem,
         "manual: levels": model.Level,
+    },
+    "contract": {
+        "The whole contract": contract.Contract,
+        "packages": contract.ContractPackage,
+        "executables": contract.Program,
+        "publishes": contract.Publication,
+        "subscribes": contract.Subscription,
+        "serves, actions": contract.Server,
+        "parameters": contract.Declared,
+        "interfaces": contract.Interface,
     },
     "stimuli": {
         heading: found
@@ -191,11 +193,14 @@ def checks_markdown() -> dict[str, str]:
     return written
 
 
-def explanations_markdown() -> str:
-    """What rosgrade can tell a student, by symptom."""
+def explanations_markdown() -> dict[str, str]:
+    """What rosgrade can tell a student: causes by symptom, and what is seen at once."""
     symptoms = [(_sentence(symptom), entries) for symptom, entries in explanations().items()]
     symptoms.sort(key=lambda item: item[0])
-    return _rendered("explanations.md", symptoms=symptoms, mistakes=TABLE)
+    return {
+        "explanations.md": _rendered("explanations.md", symptoms=symptoms),
+        "mistakes.md": _rendered("mistakes.md", mistakes=TABLE),
+    }
 
 
 def classes_markdown() -> dict[str, str]:
@@ -337,7 +342,7 @@ def documents() -> dict[str, str]:
     return {
         **assignment_markdown(),
         **checks_markdown(),
-        "explanations.md": explanations_markdown(),
+        **explanations_markdown(),
         **classes_markdown(),
     }
 

@@ -12,7 +12,7 @@ from grader.findings.wording import codes, listing
 from grader.spec.document import Place
 
 MARKER = "<!-- contract -->"
-_HEAD = "| | |\n| --- | --- |"
+_HEAD = "| what | value |\n| --- | --- |"
 
 
 @dataclass(frozen=True)
