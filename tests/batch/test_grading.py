@@ -408,6 +408,9 @@ class Once:
     def __init__(self, graded: Graded) -> None:
         self.graded = [graded]
 
+    def imposing(self, _: object) -> Once:
+        return self
+
     def grade(self, *_: object, **__: object) -> Graded:
         return self.graded.pop()
 
