@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterable
+from functools import partial
 from itertools import count
 
 import pytest
@@ -20,6 +21,7 @@ from grader.run.host.disturbance import (
     DisturbanceMeter,
     Interval,
     Scheduled,
+    Stopwatch,
     Waits,
     beyond,
     interval,
@@ -111,6 +113,21 @@ def test_a_wait_is_a_disturbance_only_as_far_as_others_had_the_cpus(
     third = meter.stop()[3]
     # What others had in the sample before counts as well: the wait may have begun in it.
     assert third.waited_ns == pytest.approx(counted_ms * MS, abs=1000)
+
+
+def test_a_limit_is_not_over_before_it_is_known_what_the_machine_took(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    meter = DisturbanceMeter(lambda: (), PretendedCpus(0.0))
+    meter.start()
+    meter.stop()
+    watch, now_s = Stopwatch(meter), time.monotonic()
+    # The thread that samples gets no CPU: whatever the machine took in these 4 s comes to be known
+    # later. Even so it ends, after eight times as long.
+    for later_s, measured_s in ((4.0, 0.5), (40.0, 5.0)):
+        monkeypatch.setattr(time, "monotonic", partial(float, now_s + later_s))
+        assert watch.elapsed_s == pytest.approx(later_s, abs=0.1)
+        assert watch.measured_s == pytest.approx(measured_s, abs=0.1)
 
 
 @pytest.mark.parametrize(("own_ms", "others_ms"), [(20, 90), (40, 75), (60, 55), (90, 25)])

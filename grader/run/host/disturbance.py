@@ -254,6 +254,11 @@ class DisturbanceMeter:
         """Everything taken so far, in seconds: run delays and lateness."""
         return self._taken_ns / NS
 
+    @property
+    def sampled_s(self) -> float:
+        """When the last sample was taken, as :func:`time.monotonic` has it."""
+        return self._sampled_ns / NS
+
     def _run(self) -> None:
         tick_ns = int(_TICK_S * NS)
         due_ns = time.monotonic_ns() + tick_ns
@@ -286,11 +291,13 @@ class DisturbanceMeter:
             self._read_cpu_times()
             waited_ns = others_share(waited_ns, self._intervals)
             late_ns = others_share(late_ns, self._intervals)
-        before_ns, self._sampled_ns = self._sampled_ns, time.monotonic_ns()
-        waited_ns = uncounted(waited_ns, self._sampled_ns, self._counted)
-        self._counted.append((before_ns, self._sampled_ns, waited_ns))
-        late_ns = beyond(late_ns, waited_ns, self._sampled_ns - before_ns)
+        before_ns, now_ns = self._sampled_ns, time.monotonic_ns()
+        waited_ns = uncounted(waited_ns, now_ns, self._counted)
+        self._counted.append((before_ns, now_ns, waited_ns))
+        late_ns = beyond(late_ns, waited_ns, now_ns - before_ns)
         self._taken_ns += waited_ns + late_ns
+        # Last, so that what was taken until then is known to who reads it.
+        self._sampled_ns = now_ns
         self._samples.append(Disturbance(time.time_ns(), late_ns, waited_ns))
 
     def _read_cpu_times(self) -> None:
@@ -311,5 +318,14 @@ class Stopwatch:
     @property
     def elapsed_s(self) -> float:
         """Undisturbed seconds; at least an eighth of the wall time, so that every wait ends."""
-        wall_s = time.monotonic() - self._wall_s
-        return max(wall_s - (self._meter.stolen_s - self._stolen_s), wall_s / LONGEST_STRETCH)
+        return self._undisturbed_s(time.monotonic())
+
+    @property
+    def measured_s(self) -> float:
+        """The same until the last sample: what the machine took since then is not known yet."""
+        return self._undisturbed_s(self._meter.sampled_s)
+
+    def _undisturbed_s(self, now_s: float) -> float:
+        wall_s = now_s - self._wall_s
+        least_s = (time.monotonic() - self._wall_s) / LONGEST_STRETCH
+        return max(wall_s - (self._meter.stolen_s - self._stolen_s), least_s)

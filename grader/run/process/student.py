@@ -269,7 +269,7 @@ class StudentProcesses:
                 if process.exited_ns is None:
                     process.signal(number, self._meter)
             step = Stopwatch(self._meter)
-            while self.poll() and step.elapsed_s <= limit_s:
+            while self.poll() and step.measured_s <= limit_s:
                 time.sleep(_STOP_TICK_S)
 
     def clean_up(self) -> None:
