@@ -149,7 +149,7 @@ def checks(
 
     console = output_console()
     if explanations:
-        console.print(Markdown(explanations_markdown()))
+        console.print(Markdown("\n".join(explanations_markdown().values())))
         return
     catalogue = all_checks()
     if name is None:
