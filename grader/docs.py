@@ -134,6 +134,8 @@ _CLASSES = {
         *(finding.Evidence, finding.Moment, finding.Plot, finding.Table),
     ),
 }
+# A symptom with more explanations, such as an exception, is on a page of its own.
+_MOST_ENTRIES = 30
 _READABLE = (FunctionType, property, cached_property)
 _TYPES = {
     "string": "text",
@@ -197,8 +199,11 @@ def explanations_markdown() -> dict[str, str]:
     """What rosgrade can tell a student: causes by symptom, and what is seen at once."""
     symptoms = [(_sentence(symptom), entries) for symptom, entries in explanations().items()]
     symptoms.sort(key=lambda item: item[0])
+    errors = [item for item in symptoms if len(item[1]) > _MOST_ENTRIES]
+    others = [item for item in symptoms if item not in errors]
     return {
-        "explanations.md": _rendered("explanations.md", symptoms=symptoms),
+        "explanations.md": _rendered("explanations.md", symptoms=others),
+        "errors.md": _rendered("errors.md", symptoms=errors),
         "mistakes.md": _rendered("mistakes.md", mistakes=TABLE),
     }
 

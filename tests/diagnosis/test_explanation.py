@@ -41,7 +41,7 @@ def test_every_explanation_is_one_plain_sentence(symptom: type, entry: Explanati
 
 
 def test_every_explanation_stands_once_below_its_symptom() -> None:
-    page = explanations_markdown()["explanations.md"]
+    page = "\n".join(explanations_markdown().values())
     for symptom, entry in ALL:
         heading = (symptom.__doc__ or "").partition("\n")[0].rstrip(".")
         section = page.split(f"## {heading}\n")[1].split("\n## ")[0]
