@@ -25,7 +25,7 @@ from pathlib import Path
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.mutant import CPP, PYTHON, Language, reference_of
-from grader.authoring.mutants.selftest import Role, Trial, TrialResult, run_trial, trials
+from grader.authoring.mutants.selftest import Role, Setup, Trial, TrialResult, run_trial, trials
 from grader.batch.grading import Grading
 from grader.report.model.grade_part import differences
 from grader.resources import cache_folder
@@ -65,9 +65,8 @@ class Job:
     def grade(self, folder: Path) -> TrialResult:
         """Grade it into a new folder."""
         reference = reference_of(self.loaded.assignment.id, language=self.language)
-        return run_trial(
-            self.trial, self.loaded, self.grading, reference, folder, language=self.language
-        )
+        setup = Setup(self.loaded, self.grading, reference, self.language)
+        return run_trial(self.trial, setup, folder)
 
 
 def main() -> int:

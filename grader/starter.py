@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader import resources
-from grader.assignment.contract.standard import ANY
+from grader.assignment.contract.standard import ANY, module_of
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.model import Assignment, Package
+from grader.assignment.model import Assignment, CheckSpec, Package, Visibility
 from grader.errors import UsageError
 from grader.report.files import check_folder, write_whole
 
@@ -134,10 +134,9 @@ def in_cpp(package: Package) -> Package:
 
 def programs(package: Package) -> tuple[Program, ...]:
     """The programs of a package; a single one lies in the module that is called like it."""
-    if len(package.executables) == 1:
-        return (Program(package.executables[0], package.name),)
+    alone = len(package.executables) == 1
     return tuple(
-        Program(name, re.sub(r"\W", "_", name.removesuffix(".py"))) for name in package.executables
+        Program(name, module_of(package.name, name, alone=alone)) for name in package.executables
     )
 
 
@@ -161,20 +160,44 @@ def _package(assignment: Assignment, package: Package) -> Iterator[tuple[str, st
 
 
 def _node_name(assignment: Assignment, package: Package, program: Program) -> str:
-    """The name of a program's node: the contract's, or that of its module."""
-    programs = assignment.contract.programs if assignment.contract else {}
-    said = programs.get((package.name, program.executable))
-    name = said.node.rpartition("/")[2] if said else ANY
-    return program.module if name == ANY else name
+    """The name of a program's node: the contract's, or that of its module.
+
+    Without a contract, that which a visible check asks of a program that is launched alone.
+    """
+    if assignment.contract is not None:
+        said = assignment.contract.programs[package.name, program.executable].node
+        return program.module if said == ANY else said.rpartition("/")[2]
+    every = {scenario.id for scenario in assignment.scenarios}
+    alone = {
+        scenario.id
+        for scenario in assignment.scenarios
+        if [(one.package or package.name, one.executable) for one in scenario.launch]
+        == [(package.name, program.executable)]
+    }
+    for spec in _visible(assignment, "node.exists"):
+        if alone and (set(spec.scenarios) or every) <= alone:
+            return str(spec.with_["name"]).rpartition("/")[2]
+    return program.module
+
+
+def _visible(assignment: Assignment, uses: str) -> Iterator[CheckSpec]:
+    """The checks of a kind that a student sees."""
+    for spec in assignment.checks:
+        if (spec.uses or "").startswith(uses) and spec.visibility is Visibility.VISIBLE:
+            yield spec
 
 
 def _interfaces(assignment: Assignment, package: Package) -> Iterator[Interface]:
-    """The interfaces that the contract wants in a package."""
+    """The interfaces of a package: the contract's, or without one those that checks name."""
     contract = assignment.contract
-    said = contract.packages[package.name].interfaces if contract else {}
-    for name in said:
-        kind, _, short = name.partition("/")
-        yield Interface(kind, short)
+    if contract is not None:
+        said = [f"{package.name}/{name}" for name in contract.packages[package.name].interfaces]
+    else:
+        said = [str(one.with_["interface"]) for one in _visible(assignment, "interface.")]
+    for name in dict.fromkeys(said):
+        owner, kind, short = name.split("/")
+        if owner == package.name:
+            yield Interface(kind, short)
 
 
 def rendered(name: str, **values: object) -> str:

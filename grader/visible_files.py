@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from grader.assignment.contract.derive import Derivation
 from grader.assignment.contract.expand import expanded
-from grader.assignment.contract.model import Contract
 from grader.assignment.contract.table import with_table
 from grader.assignment.load import ASSIGNMENT_FILE, LoadedAssignment
 from grader.assignment.model import Assignment, Visibility
@@ -77,29 +75,23 @@ def _visible_data(loaded: LoadedAssignment, part: LoadedAssignment) -> dict[str,
     data = loaded.source.data
     shown = {scenario.id for scenario in part.assignment.scenarios}
     scenarios = expanded(filled(loaded.source, loaded.values)).read(Assignment).scenarios
-    visible = {one.spec.id for one in loaded.checks if one.spec.visibility is Visibility.VISIBLE}
+    # Those of a contract come first, and none of them is hidden.
+    written = data.get("checks") or []
+    bounds = loaded.checks[len(loaded.checks) - len(written) :]
     kept = {
-        **_visible_contract(data, loaded.assignment.contract, visible),
-        "checks": [entry for entry in data.get("checks", ()) if entry["id"] in visible],
+        "checks": [
+            entry
+            for entry, bound in zip(written, bounds, strict=True)
+            if bound.spec.visibility is Visibility.VISIBLE
+        ],
         "scenarios": [
             entry
-            for entry, scenario in zip(data.get("scenarios", []), scenarios, strict=True)
+            for entry, scenario in zip(data.get("scenarios") or [], scenarios, strict=True)
             if shown.intersection(runs_of(scenario))
         ],
         "withheld": {"checks": part.withheld.checks, "points": part.withheld.points},
     }
     return {name: value for name, value in {**data, **kept}.items() if name != "points"}
-
-
-def _visible_contract(
-    data: dict[str, Any], contract: Contract | None, visible: Collection[str]
-) -> dict[str, Any]:
-    """The contract without the hidden ones of its checks; what it says is in the handout anyway."""
-    if contract is None:
-        return {}
-    points = {one: count for one, count in Derivation(contract).points.items() if one in visible}
-    changed = {one: entry for one, entry in contract.checks.items() if one in visible}
-    return {"contract": {**data["contract"], "points": points, "checks": changed}}
 
 
 def _names(data: Any, path: str, loaded: LoadedAssignment) -> bool:

@@ -103,13 +103,18 @@ class Edits(_Place):
             raise ValueError("`replace` and `with` belong together")
         return self
 
+    @property
+    def has_edits(self) -> bool:
+        """Whether anything is different by it."""
+        return bool(self.edits or self.files or self.move or self.replace)
+
     def every_edit(self, file: str | None = None) -> Iterator[tuple[Place, Edit]]:
         """Its edits, and where they stand in it; those that name no file are in the given one."""
         one = self.model_dump(include={"file", "count", "replace"}) | {"with": self.with_}
         single = [((), Edit.model_validate(one))] if self.replace is not None else []
         listed = [(("edits", index), edit) for index, edit in enumerate(self.edits)]
         for place, edit in (*single, *listed):
-            yield place, edit.model_copy(update={"file": edit.file or file})
+            yield place, edit.model_copy(update={"file": edit.file or self.file or file})
 
 
 class Change(Edits):
@@ -308,6 +313,7 @@ def load_mutants(
                 raise AssignmentError(more.file, [Problem(text)])
             found = replace(
                 found,
+                file=more.file,
                 mutants=found.mutants + more.mutants,
                 variants=found.variants + more.variants,
                 derived={**found.derived, **more.derived},
@@ -345,6 +351,9 @@ def _read_mutants(
             edits, inner = _edits_of(change, language, is_own=written is language)
             if edits is None:
                 continue
+            if edits is not change and written is language and change.has_edits:
+                text = f"has edits of its own and under {language.key!r}: write them in one place"
+                problems.append(source.problem((key, index), text))
             named = getattr(content.file, language.key)
             _, found = mutate(edits, files, named)
             problems += [
@@ -367,9 +376,8 @@ def _edits_of(
     own = getattr(change, language.key)
     if own is not None:
         return own, (language.key,)
-    is_of_file = bool(change.edits or change.files or change.move or change.replace)
     is_of_other = change.python is not None or change.cpp is not None
-    return (change if is_own and (is_of_file or not is_of_other) else None), ()
+    return (change if is_own and (change.has_edits or not is_of_other) else None), ()
 
 
 def apply(change: Change, reference: Path, target: Path) -> None:

@@ -146,6 +146,8 @@ def check(
                 found = unmet.found
             except NoSuchField as error:
                 found = Finding.ours(f"the assignment expects what cannot be: {error}")
+            if not isinstance(found, Finding):
+                return found  # An instructor's own check is not typed: judging says what it is.
             named = found.concept or (concept if found.status is Status.FAILED else "")
             return replace(found, expected=found.expected or parameters.asked_for, concept=named)
 

@@ -71,13 +71,14 @@ def misnamed(
         return None
     names = parameters.wrong(own)
     how = f", with `--ros-args -r {' -r '.join(names.rules)}` to correct the name"
+    is_there = thing is Thing.NODE and own.rpartition("/")[2] == asked.rpartition("/")[2]
     failed = mistaken(
-        "other_name",
+        "other_namespace" if is_there else "other_name",
         f"found {code(own)} instead; everything else was judged in a second run"
         + (how if len(names.rules) <= _MOST_RULES else " that corrects the name"),
         shown,
         thing=thing.value,
-        name=_written(thing, asked),
+        name=asked.rpartition("/")[0] or "/" if is_there else _written(thing, asked),
     )
     return replace(failed, names=names)
 

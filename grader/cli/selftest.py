@@ -59,7 +59,7 @@ def selftest(
     from grader import ros
     from grader.assignment.load import list_assignments, load_assignment
     from grader.assignment.mutant import CPP, PYTHON, reference_of
-    from grader.authoring.mutants.selftest import Role, Trial, mutation_score, trials
+    from grader.authoring.mutants.selftest import Role, Setup, Trial, mutation_score, trials
     from grader.authoring.mutants.selftest import selftest as run_selftest
     from grader.batch.grading import Grading
     from grader.batch.reference_run import keep_reference
@@ -91,30 +91,25 @@ def selftest(
     chosen = chosen_sandbox(sandbox, Progress(quiet))
     for name in assignments or list_assignments():
         loaded = load_assignment(name)
+        reference = reference_of(loaded.assignment.id, loaded.folder, language)
         if keep is not None:
             refuse_part(keep, loaded.folder, f"the assignment in {loaded.folder}")
-            reference = reference_of(loaded.assignment.id, loaded.folder, language)
             refuse_part(keep, reference, f"the reference solution in {reference}")
         results: list[TrialResult] = []
         every = trials(loaded, language)
         for missing in {*(only or ())} - {trial.id for trial in every}:
             near = nearest_or_all(missing, [trial.id for trial in every])
             raise UsageError(f"{loaded.assignment.id} has no mutant {missing!r}.{near}")
-        wanted = sum(map(chosen_trial, every))
+        wanted = [*filter(chosen_trial, every)]
         with Runner(ros.find(), sandbox=chosen) as runner, Progress(quiet).shown() as progress:
             grading = Grading(loaded, runner, cache_folder())
-            for result in run_selftest(
-                loaded,
-                grading,
-                jobs=jobs or 2 * cpu_count(),
-                language=language,
-                keep=keep and keep / loaded.assignment.id,
-                chosen=chosen_trial,
-                on_graded=partial(keep_runs, loaded) if record else lambda _: None,
-            ):
+            on_graded = partial(keep_runs, loaded) if record else lambda _: None
+            setup = Setup(loaded, grading, reference, language, on_graded)
+            kept_in = keep and keep / loaded.assignment.id
+            for result in run_selftest(setup, wanted, jobs=jobs or 2 * cpu_count(), keep=kept_in):
                 results.append(result)
                 progress.say(
-                    f"{loaded.assignment.id}: {len(results)} of {wanted} graded: "
+                    f"{loaded.assignment.id}: {len(results)} of {len(wanted)} graded: "
                     f"{result.trial.id}: {'WRONG' if result.wrong else 'ok'}"
                 )
         if record:

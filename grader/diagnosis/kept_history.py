@@ -162,7 +162,7 @@ def offers_less(symptom: TooFewKept) -> Finding | None:
 
 @explanation(TooFewKept)
 def lifespan_over(symptom: TooFewKept) -> Finding | None:
-    """The publisher's lifespan is shorter than what it should keep is old."""
+    """Messages that should be kept are older than the publisher's lifespan."""
     lifespans = [one.qos.lifespan_s for one in symptom.publishers if one.qos.lifespan_s is not None]
     known = len(symptom.before) >= symptom.last
     launched_ns = symptom.recording.launched_ns

@@ -39,7 +39,7 @@ class NoAnswer(NotCalled, concept="executors"):
     """A call or a goal was not answered in time.
 
     Attributes:
-        what: The symptom in words.
+        what: The symptom in words, such as ``the call was not answered``.
         name: Of the service or action.
         while_busy: The cause where the executor is blocked or nothing tells, if not general.
     """
@@ -61,6 +61,11 @@ class NoAnswer(NotCalled, concept="executors"):
     def seen(self) -> str:
         """The symptom in words."""
         return self.what
+
+    @property
+    def unanswered(self) -> str:
+        """The service or action."""
+        return self.name
 
     @property
     def nodes(self) -> Collection[str]:
@@ -99,43 +104,22 @@ class NoAnswer(NotCalled, concept="executors"):
 
 
 def why_late(
-    recording: Recording,
-    kind: Word,
-    name: str,
-    asked_ns: int,
-    answered_ns: int | None,
-    within_s: float,
-    seen: str,
-    mistake: str,
-    evidence: Evidence,
+    symptom: NoAnswer, answered_ns: int | None, mistake: str, evidence: Evidence
 ) -> Finding | None:
     """Why an answer did not come in time, or None if it did.
 
     Args:
-        seen: What did not happen, such as ``the call was not answered``.
         mistake: Where the node is there and the machine took no time.
     """
+    recording, asked_ns = symptom.recording, symptom.asked_ns
     if answered_ns is None:
-        return why_unanswered(recording, seen, kind, name, asked_ns, within_s)
+        return cause_of(symptom)
     took_s = (answered_ns - asked_ns) / NS
-    if took_s <= within_s:
+    if took_s <= symptom.within_s:
         return None
-    seen = f"{seen} for {format_duration(took_s)}"
-    taken = why_taken(recording, seen, asked_ns, answered_ns, within_s)
+    seen = f"{symptom.what} for {format_duration(took_s)}"
+    taken = why_taken(recording, seen, asked_ns, answered_ns, symptom.within_s)
     return taken or mistaken(mistake, seen, evidence)
-
-
-def why_unanswered(
-    recording: Recording,
-    what: str,
-    server: Word,
-    name: str,
-    asked_ns: int,
-    within_s: float,
-    while_busy: Finding | None = None,
-) -> Finding:
-    """Why an answer did not come in time."""
-    return cause_of(NoAnswer(recording, what, server, name, asked_ns, within_s, while_busy))
 
 
 @explanation(NoAnswer)

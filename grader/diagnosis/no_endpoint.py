@@ -178,7 +178,7 @@ def why_not_met(recording: Recording, word: Word, name: str, asked_ns: int) -> F
 def meant_endpoint(
     recording: Recording, word: Word, name: str, type_: str | None = None
 ) -> str | None:
-    """The name of the student's one endpoint or server of the right type that nobody asks for.
+    """The wrong name that the student probably gave: of the only one that has the right type.
 
     Args:
         type_: The right type; by default what the probe has or asks under the name.

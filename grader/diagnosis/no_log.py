@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
-from grader.diagnosis.explanation import cause_of, explanation
+from grader.diagnosis.explanation import explanation
 from grader.diagnosis.no_messages import why_few, why_not_delivered
 from grader.diagnosis.process.not_called import (
     CalledLate,
@@ -35,7 +35,7 @@ from grader.measure.printed import (
     quote,
     shown,
 )
-from grader.recording.model import NS, Endpoint, Kind, LogLine, Recording
+from grader.recording.model import NS, Endpoint, Kind, LogLine
 from grader.spec.expression import Expression
 from grader.spec.unit import format_duration
 from grader.submission.record import SourceError
@@ -129,21 +129,6 @@ class NotLogged(CalledLate):
         moment = Moment("other values logged", self.recording.since_launch_s(line.time_ns))
         log = [one.text for one in self.near if one != line][: _LOG_LINES - 1]
         return Evidence(moments=(moment,), places=self.places, log=(*log, line.text))
-
-
-def why_not_logged(
-    recording: Recording,
-    topic: str,
-    wanted: Sequence[Wanted],
-    found: Sequence[Echo],
-    *,
-    needed: int,
-    decimals: int,
-    within_ns: int,
-    own: bool,
-) -> Finding:
-    """Why fewer messages than needed were followed by log lines with their values."""
-    return cause_of(NotLogged(recording, topic, wanted, found, needed, decimals, within_ns, own))
 
 
 @explanation(NotLogged)

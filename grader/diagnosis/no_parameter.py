@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.no_answer import why_late, why_unanswered
+from grader.diagnosis.no_answer import NoAnswer, why_late
 from grader.diagnosis.no_endpoint import SERVICE
 from grader.diagnosis.no_node import why_not_node, written_nodes
 from grader.diagnosis.process.process_exit import why_ended
@@ -116,9 +116,9 @@ def why_not_taken(recording: Recording, names: Iterable[str]) -> Finding | None:
 
 
 def why_for_no_node(recording: Recording) -> Finding | None:
-    """Why a parameter file gives nothing to a node of a launch file that has values from no other.
+    """The parameter file of a launch that is for a node of nearly the right name, or None.
 
-    None where each node has some, and where all files are for nodes that do not run.
+    Only where a node has values from no file.
     """
     submission = recording.submission
     programs = {name for package in submission.packages for name in package.executables}
@@ -135,11 +135,10 @@ def why_for_no_node(recording: Recording) -> Finding | None:
     for path, key, line in entries:
         base = key.rpartition("/")[2]
         like = nearest(base, lacking)
-        # What is for another program may be right: that does not run here.
-        is_unlike = like is None and (base in programs or len(entries) > 1)
-        if is_unlike or any(_addresses(key, node) for node in nodes):
+        # What is for quite another name may be right: for a program that does not run here.
+        if like is None or any(_addresses(key, node) for node in nodes):
             continue
-        right = lacking[like] if like else next(iter(lacking.values()))
+        right = lacking[like]
         place = SourceError(path, line, f"its values are for {key}")
         return Finding(
             f"{code(path)} gives values to {code(key)}, and there is no such node: found "
@@ -169,7 +168,8 @@ def why_services_silent(recording: Recording, calls: Iterable[Call]) -> Finding 
     service = code(lost.service.rpartition("/")[2])
     if not lost.error:
         what = f"the node's parameter service {service} did not answer"
-        return why_unanswered(recording, what, SERVICE, lost.service, lost.requested_ns, _ANSWER_S)
+        asked = (lost.service, lost.requested_ns, _ANSWER_S)
+        return cause_of(NoAnswer(recording, what, SERVICE, *asked))
     if lost.error != NO_SERVER:
         return Finding.ours(f"{service} could not be asked: {lost.error}")
     return Finding(
@@ -192,11 +192,11 @@ def why_not_asked(recording: Recording, node: str, what: str) -> Finding:
         if call.service.rpartition("/")[0] == node and call.request and not call.error
     ]
     for last in [] if ended else calls[-1:]:
-        server, asked_ns, end_ns = last.service, last.requested_ns, last.answered_ns
+        server, asked_ns = last.service, last.requested_ns
         seen = f"the node's parameter service {code(server.rpartition('/')[2])} did not answer"
         shown = evidence_at(recording, "asked", asked_ns)
-        asked = (recording, SERVICE, server, asked_ns, end_ns, _ANSWER_S)
-        ended = why_late(*asked, seen, "slow_node", shown)
+        silence = NoAnswer(recording, seen, SERVICE, server, asked_ns, _ANSWER_S)
+        ended = why_late(silence, last.answered_ns, "slow_node", shown)
     return ended.after(what) if ended else Finding.undecided(f"{what} by the probe")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.no_answer import why_late, why_raised, why_taken, why_unanswered
+from grader.diagnosis.no_answer import NoAnswer, why_late, why_raised, why_taken
 from grader.diagnosis.no_endpoint import ACTION
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.fields import the_goal
@@ -65,8 +65,8 @@ def why_not_canceled(
     if goal.status != "canceled" or end_ns is None:
         return cause_of(NotCanceled(recording, goal, within_s, evidence))
     seen = f"{the_goal(goal)} was not canceled"
-    asked = (recording, ACTION, goal.action, asked_ns, end_ns, within_s)
-    return why_late(*asked, seen, "canceled_late", evidence)
+    silence = NoAnswer(recording, seen, ACTION, goal.action, asked_ns, within_s)
+    return why_late(silence, end_ns, "canceled_late", evidence)
 
 
 @explanation(NotCanceled)
@@ -105,7 +105,7 @@ def executor_busy_with_the_goal(symptom: NotCanceled) -> Finding | None:
     if goal.result_ns is not None:
         return busy
     asked_ns, within_s = goal.canceled_ns or 0, symptom.within_s
-    return why_unanswered(recording, seen, ACTION, goal.action, asked_ns, within_s, busy)
+    return cause_of(NoAnswer(recording, seen, ACTION, goal.action, asked_ns, within_s, busy))
 
 
 @explanation(NotCanceled, general=True)

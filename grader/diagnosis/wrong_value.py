@@ -13,7 +13,7 @@ from typing import Any
 from grader.diagnosis.explanation import Symptom, explanation
 from grader.findings.value import Difference, same
 from grader.findings.wording import value_text
-from grader.findings.words import Words, worded
+from grader.findings.words import worded
 
 # How many times too large -> what that is. People type 57.3 and 3.14: three digits must do.
 _FACTORS = {
@@ -24,7 +24,6 @@ _FACTORS = {
     **{0.1**n: f"is {10**n} times too small: look at the units" for n in (1, 2, 3)},
 }
 _FACTOR_TOLERANCE = 2e-3
-MISREAD = Words("an integer, a text or a numpy.float32", "an integer or a text")
 # Python 3.11 has the number of digits of a negative integer with a minus.
 _LEAST_NEGATIVE = (1 << 64) - (1 << 8)
 
@@ -81,9 +80,15 @@ def integer_in_a_float_field(symptom: WrongValue) -> str | None:
     bad = next((one for one in symptom.numbers if was_integer(one.observed)), None)
     if bad is None:
         return None
+    return misread_words(bad.field)
+
+
+def misread_words(field: str) -> str:
+    """What is wrong with a float field that has no number of the program's."""
     return worded(
-        python=f"{bad.field} is a float field, but {MISREAD} was put into it, which ROS misreads",
-        cpp=f"{bad.field} has what lay in memory: a variable was never given a value",
+        python=f"{field} is a float field, but an integer, a text or a numpy.float32 was put into "
+        "it, which ROS misreads",
+        cpp=f"{field} has what lay in memory: a variable was never given a value",
     )
 
 

@@ -110,7 +110,8 @@ def fields_hint(what: str, value: Mapping[str, Any], wrong: Sequence[str]) -> st
             f"Set the fields of the {what} in the callback{returned}. Now every field has the "
             "value of a new one: 0, false or ''."
         )
-    which = worded(python="that it returns", cpp="that it is given")
+    given = "that it is given" if what == "response" else "that it makes"
+    which = worded(python="that it returns", cpp=given)
     return f"Look where the callback sets {codes(wrong)} of the {what} {which}."
 
 

@@ -62,11 +62,14 @@ SLEEP = Words("time.sleep()", "std::this_thread::sleep_for()")
 MATH = Words("math.", "std::")
 INPUT = Words("input()", "std::cin")
 LOG = Words("self.get_logger().info('...')", 'RCLCPP_INFO(get_logger(), "...")')
-ARROW = Words(".", "->")
-A_PROFILE = Words("a QoSProfile", "an rclcpp::QoS")
 REENTRANT = Words("ReentrantCallbackGroup", "Reentrant callback group")
 EXCLUSIVE = Words("MutuallyExclusiveCallbackGroup", "MutuallyExclusive callback group")
 SILENT_EXCEPT = Words("`except: pass`", "empty `catch (...)`")
+TERMS = {name: term for name, term in vars().items() if isinstance(term, Words)} | {
+    "ARROW": Words(".", "->"),
+    "A_PROFILE": Words("a QoSProfile", "an rclcpp::QoS"),
+}
+"""Terms by the name that they have in the tables of hints."""
 
 
 def group_class(declared: str) -> str:

@@ -8,7 +8,8 @@ from typing import Any
 
 from grader.checks.lifecycle.lifecycle import transition, why_not_managed
 from grader.checks.window import Phase, Window
-from grader.diagnosis.no_answer import why_unanswered
+from grader.diagnosis.explanation import cause_of
+from grader.diagnosis.no_answer import NoAnswer
 from grader.diagnosis.no_endpoint import SERVICE
 from grader.diagnosis.no_messages import why_not_sent, why_silent
 from grader.diagnosis.process.process_exit import why_ended
@@ -84,8 +85,8 @@ def _why_not(recording: Recording, phase: Phase) -> Finding:
             return Finding.undecided(f"{seen}, but the probe received none of its events")
         bad = [one for one, result in zip(changes, results, strict=True) if result is not True]
         if bad and bad[0].answered_ns is None:
-            asked = (SERVICE, bad[0].service, bad[0].requested_ns, _ANSWER_S)
-            return why_unanswered(recording, seen, *asked)
+            asked = (bad[0].service, bad[0].requested_ns, _ANSWER_S)
+            return cause_of(NoAnswer(recording, seen, SERVICE, *asked))
         if bad:
             success = worded("TransitionCallbackReturn.SUCCESS", "CallbackReturn::SUCCESS")
             hint = (

@@ -160,7 +160,7 @@ def test_a_row_of_the_handout_tells_all_of_a_parameter(write: Write) -> None:
         (
             "scenarios:\n",
             "  checks: {qos: {points: 3}}\nscenarios:\n",
-            "18: contract.checks.qos.points: a standard check keeps its 'points'",
+            "18: contract.checks.qos.points: its points stand under 'points'",
         ),
         (
             "scenarios:\n",
@@ -177,6 +177,29 @@ def test_a_row_of_the_handout_tells_all_of_a_parameter(write: Write) -> None:
             "  checks: {period: {with: {spread: much}}}\nscenarios:\n",
             "18: contract.checks.period.with.spread: ",
         ),
+        (
+            "scenarios:\n",
+            "  checks: {period: {visibility: hidden}}\nscenarios:\n",
+            "18: contract.checks.period.visibility: the contract is what students are told",
+        ),
+        (
+            "scenarios:\n",
+            "  checks: {ends: {hint: Look}}\nscenarios:\n",
+            "18: contract.checks.ends: the contract judges no check 'ends'.",
+        ),
+        ("builds: 1", "builds: -1", "17: contract.points.builds: "),
+        (
+            "period: 100 ms",
+            "period: {spread: 20 %}",
+            "13: contract.packages.bot.executables.drive.",
+        ),
+        (
+            "      executables:\n",
+            "      interfaces: {msg/A: {definition: x}}\n      executables:\n",
+            "6: contract.packages.bot: CMake generates interfaces",
+        ),
+        ("scenarios:\n", "checks: {a: b}\nscenarios:\n", "18: checks: expected a list"),
+        ("  - {id: run", "  run: {id: run", "18: scenarios: expected a list"),
         ("depth", "", ""),
         ("node: driver", "nodes: driver", "11: contract.packages.bot.executables.drive.nodes: "),
         (
@@ -235,15 +258,48 @@ def test_a_chosen_name_may_stand_in_a_contract(write: Write) -> None:
     assert loaded.entries["builds"]["with"] == {"package": "bot{n}"}
 
 
-def test_students_get_a_contract_without_the_hidden_checks(write: Write) -> None:
-    hidden = "  checks: {period: {visibility: hidden}, qos: {hint: Look}}\nscenarios:\n"
-    place = write(GOOD.replace("scenarios:\n", hidden))
+def test_a_program_waits_for_no_check_of_another_one(write: Write) -> None:
+    second = """        echo:
+          responsive: {within: 1 s}
+          serves: {/ask: {type: std_srvs/srv/Trigger}}
+"""
+    text = GOOD.replace(
+        "  points: {", f"{second}  points: {{echo_alive: 1, responsive: 1, service: 1, "
+    )
+    text = text.replace("until: {m", "launch: [{executable: drive}, {executable: echo}], until: {m")
+    checks = load_assignment(write(text.replace("period: 2", "drive_alive: 1, period: 2"))).checks
+    requires = {one.spec.id: one.spec.requires for one in checks}
+    assert requires["period"] == ("type", "drive_alive")
+    assert requires["responsive"] == ("echo_alive",)
+    assert requires["service"] == ("builds",)
+
+
+def test_two_topics_of_a_program_have_titles_of_their_own(write: Write) -> None:
+    other = "            /b: {type: geometry_msgs/msg/Twist, reliability: reliable}\n"
+    text = GOOD.replace("            /cmd_vel:\n", f"{other}            /cmd_vel:\n")
+    text = text.replace("topic: 1, type: 1, qos: 1", "b_qos: 1, cmd_vel_qos: 1")
+    titles = {one.spec.id: one.title for one in load_assignment(write(text)).checks}
+    assert titles["b_qos"] == "The publisher on /b is reliable"
+    assert titles["cmd_vel_qos"] == "The publisher on /cmd_vel is reliable"
+
+
+def test_a_part_whose_name_is_chosen_needs_ids_where_there_are_several(write: Write) -> None:
+    text = GOOD.replace(
+        "    bot:\n", '    "bot{n}_msgs": {build_type: ament_cmake}\n    "bot{n}":\n'
+    )
+    text = text.replace("contract:\n", "variables: {n: {match: 'bot{n}', example: 7}}\ncontract:\n")
+    assert found(write(text))[0].startswith("7: contract.packages.bot{n}_msgs: its name is chosen")
+
+
+def test_students_get_the_contract_and_no_hidden_check(write: Write) -> None:
+    secret = "checks:\n  - {id: secret, uses: node.alive, points: 1, visibility: hidden}\n"
+    place = write(GOOD.replace("scenarios:\n", f"{secret}scenarios:\n"))
     (place / "README.md").write_text("# Drive\n\n<!-- contract -->\n")
     loaded = load_assignment(place)
     files = visible_files(loaded)
     assert "| node | `driver` |" in files["README.md"].decode()
-    copy = write(files["assignment.yaml"].decode())
-    part = load_assignment(copy)
-    assert [one.spec.id for one in part.checks] == ["builds", "topic", "type", "qos"]
-    assert part.withheld.points == 2.0
+    assert "secret" not in files["assignment.yaml"].decode()
+    part = load_assignment(write(files["assignment.yaml"].decode()))
+    assert [one.spec.id for one in part.checks] == ["builds", "topic", "type", "qos", "period"]
+    assert part.withheld.points == 1.0
     assert make_handout(part).total == make_handout(loaded).total

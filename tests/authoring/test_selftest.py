@@ -13,7 +13,8 @@ import pytest
 
 from grader import resources, ros
 from grader.assignment.load import list_assignments, load_assignment
-from grader.authoring.mutants.selftest import Role, mutation_score, selftest, trials
+from grader.assignment.mutant import reference_of
+from grader.authoring.mutants.selftest import Role, Setup, mutation_score, selftest, trials
 from grader.batch.grading import Grading
 from grader.batch.type_support import missing_underlays
 from grader.run.host.load import cpu_count
@@ -55,11 +56,10 @@ def test_the_mutation_score_is_perfect(name: str, runner: Runner) -> None:
     robot = any(scenario.world for scenario in scenarios)
     many = robot or len(every) * len(scenarios) > MOST_RUNS
     step = EVERY if many else EVERY_OF_EXAMPLE if name in EXAMPLES else 1
-    kept = {trial.id for trial in (*every[::step], every[-1])}
+    kept = {trial.id: trial for trial in (*every[::step], every[-1])}.values()
     grading = Grading(loaded, runner, resources.cache_folder())
-    results = list(
-        selftest(loaded, grading, jobs=2 * cpu_count(), chosen=lambda trial: trial.id in kept)
-    )
+    setup = Setup(loaded, grading, reference_of(loaded.assignment.id, loaded.folder))
+    results = list(selftest(setup, kept, jobs=2 * cpu_count()))
     wrong = {
         result.trial.id: (result.mistake, *result.findings) for result in results if result.wrong
     }

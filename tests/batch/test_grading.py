@@ -19,7 +19,7 @@ import pytest
 
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
-from grader.authoring.mutants.selftest import Role, Trial, mutation_score, run_trial
+from grader.authoring.mutants.selftest import Role, Setup, Trial, mutation_score, run_trial
 from grader.batch import grading as grading_module
 from grader.batch.class_files import find_reports
 from grader.batch.class_regrading import regrade_class
@@ -421,14 +421,13 @@ def test_of_a_trial_only_what_is_printed_is_kept(
     once = Once(grade(recording(stop_s=2.5))[0])
     told: list[weakref.ref[Graded]] = []
     trial = Trial(Role.REFERENCE, "reference", "the reference solution", None)
-    result = run_trial(
-        trial,
+    setup = Setup(
         lesson,
         once,  # type: ignore[arg-type]
         tmp_path,
-        tmp_path,
-        lambda graded: told.append(weakref.ref(graded)),
+        on_graded=lambda graded: told.append(weakref.ref(graded)),
     )
+    result = run_trial(trial, setup, tmp_path)
     gc.collect()
     assert [graded() for graded in told] == [None]
     assert (result.lost, result.graded, result.repeated) == (("ends",), True, False)
@@ -441,7 +440,8 @@ def test_an_untouched_starter_that_gets_many_points_is_judged_wrongly(
 ) -> None:
     once = Once(grade(recording(stop_s=2.5))[0])
     trial = Trial(Role.STARTER, "starter", "the starter package, untouched", None)
-    result = run_trial(trial, lesson, once, tmp_path, tmp_path)  # type: ignore[arg-type]
+    setup = Setup(lesson, once, tmp_path)  # type: ignore[arg-type]
+    result = run_trial(trial, setup, tmp_path)
     assert result.mistake.startswith(
         "points: 1 point of 2, and a starter package may have 15% at most"
     )

@@ -207,10 +207,10 @@ class TestDrives:
         [
             # What rclpy makes of the integer 1, in Python 3.11 and in 3.12, of numpy.float32(0.1)
             # and of numpy.float32(-0.1).
-            (1, "a numpy.float32 was put into `linear.x`"),
-            (8, "a numpy.float32 was put into `linear.x`"),
-            (0x3DCCCCCD, "a numpy.float32 was put into `linear.x`"),
-            (0xBDCCCCCD, "a numpy.float32 was put into `linear.x`"),
+            (1, "`linear.x` is a float field, but an integer, a text or a numpy.float32"),
+            (8, "`linear.x` is a float field, but an integer, a text or a numpy.float32"),
+            (0x3DCCCCCD, "`linear.x` is a float field, but an integer, a text or a numpy.float32"),
+            (0xBDCCCCCD, "`linear.x` is a float field, but an integer, a text or a numpy.float32"),
         ],
     )
     def test_a_speed_that_is_no_float(self, bits, words):

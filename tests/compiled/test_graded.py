@@ -12,7 +12,7 @@ import pytest
 from grader import resources, ros
 from grader.assignment.load import load_assignment
 from grader.assignment.mutant import CPP, PYTHON
-from grader.authoring.mutants.selftest import Role, TrialResult, selftest, trials
+from grader.authoring.mutants.selftest import Role, Setup, TrialResult, selftest, trials
 from grader.batch.grading import Graded, Grading
 from grader.findings.finding import Status
 from grader.run.host.load import cpu_count
@@ -89,16 +89,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
             imposed = [one for one in every if one.mistakes][:: 3 if name in IMPOSED else 100]
             # The starter package is one on rclcpp.
             kept = [one for one in every if not one.is_derived and one.role is not Role.STARTER]
-            return list(
-                selftest(
-                    loaded,
-                    grading,
-                    jobs=cpu_count(),
-                    language=CPP,
-                    chosen=[*kept, *imposed].__contains__,
-                    on_graded=note,
-                )
-            )
+            setup = Setup(loaded, grading, lesson / CPP.reference, CPP, note)
+            return list(selftest(setup, [*kept, *imposed], jobs=cpu_count()))
 
         verdicts = dict(zip(SOLUTIONS, pool.map(graded, SOLUTIONS), strict=True))
         return Results(verdicts, observed)

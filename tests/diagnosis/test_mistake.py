@@ -11,8 +11,7 @@ import pytest
 
 from grader import resources
 from grader.diagnosis.mistake import TABLE, mistaken, remedy
-from grader.findings import words
-from grader.findings.words import Words, speaking
+from grader.findings.words import TERMS, Words, speaking
 from grader.submission.record import CPP
 
 MISTAKES = {name: one for about in TABLE.values() for name, one in about.items()}
@@ -38,7 +37,7 @@ def wanted(hint: str | Words) -> set[str]:
     texts = [hint] if isinstance(hint, str) else [hint.python, hint.cpp]
     found = [Template.pattern.findall(text) for text in texts]
     names = {one[1] or one[2] for some in found for one in some}
-    return {name for name in names if not hasattr(words, name)}
+    return {name for name in names if name not in TERMS}
 
 
 def test_every_mistake_that_a_check_names_is_in_the_table() -> None:

@@ -20,8 +20,9 @@ from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import NoParameters, Subject
 from grader.diagnosis.explanation import explanations
 from grader.diagnosis.mistake import TABLE, remedy
+from grader.diagnosis.process import exceptions
 from grader.findings.finding import Finding, Status
-from grader.findings.words import SPIN_NODE, speaking
+from grader.findings.words import SPIN_NODE, Words, speaking
 from grader.grade import grade
 from grader.grade.model import CheckResult
 from grader.submission.record import CPP, PYTHON, PackageRecord, SourceFile
@@ -134,6 +135,12 @@ def test_mistakes_have_no_word_of_python_for_students_of_cpp() -> None:
             if one.only != PYTHON and (found := _OF_PYTHON.search(remedy(name)))
         ]
     assert not left, "\n".join(left)
+
+
+def test_exceptions_of_both_languages_have_no_word_of_python_for_students_of_cpp() -> None:
+    hints = [row.hint for row in exceptions.TABLE.exceptions if isinstance(row.hint, Words)]
+    with speaking(CPP):
+        assert hints and not list(filter(_OF_PYTHON.search, map(str, hints)))
 
 
 def test_hints_of_the_lessons_have_no_word_of_python_for_students_of_cpp() -> None:

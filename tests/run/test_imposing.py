@@ -99,6 +99,7 @@ def test_only_selftest_orders_mistakes() -> None:
     callers = {
         file.relative_to(resources.root()).as_posix()
         for file in (resources.root() / "grader").rglob("*.py")
-        if ".imposing(" in file.read_text(encoding="utf-8")
+        if re.search(r"\.imposing\(|\bMistake\(", file.read_text(encoding="utf-8"))
     }
-    assert callers == {"grader/authoring/mutants/selftest.py"}
+    authoring = "grader/authoring/mutants"
+    assert callers == {f"{authoring}/selftest.py", f"{authoring}/standard.py"}

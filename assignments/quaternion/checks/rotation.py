@@ -16,7 +16,8 @@ from grader.findings.first_seen import first_seen
 from grader.measure.numbering import published
 from grader.checks.need import PUBLISHED, Recorded
 from grader.findings.wording import code, counted, listing
-from grader.diagnosis.wrong_value import MISREAD, was_integer
+from grader.diagnosis.mistake import remedy
+from grader.diagnosis.wrong_value import misread_words, was_integer
 from grader.diagnosis.no_messages import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_answer import why_raised
@@ -256,13 +257,8 @@ def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> 
     misread = [v for case in wrong for v in case.answers[0].row if was_integer(v)]
     if misread:
         return (
-            f"{MISREAD} was put into a float field, which ROS misreads",
-            worded(
-                python="A number in a message must be a float: write 1.0 instead of 1, 0.0 instead "
-                "of 0, and float(value) of what is another type, such as numpy.float32.",
-                cpp="A number in a message is a double: a division of integers cuts off what "
-                "follows the point, so write 1.0 / 2 instead of 1 / 2.",
-            ),
+            misread_words("a number of the answer"),
+            remedy("float_field"),
         )
     infinite = [case for case in wrong if not case.answers[0].finite]
     if 2 * len(infinite) >= len(wrong):

@@ -17,6 +17,13 @@ from grader.spec.document import Place
 from grader.spec.nearest_name import nearest_or_all
 
 _STEP = 0.05
+"""Points of which all shares but one are multiples."""
+_OTHER = "a standard check keeps it: write another check among 'checks'"
+_KEPT = {
+    **dict.fromkeys(("id", "uses", "python"), _OTHER),
+    "points": "its points stand under 'points'",
+    "visibility": "the contract is what students are told: write a hidden check among 'checks'",
+}
 
 
 @dataclass(frozen=True)
@@ -96,19 +103,21 @@ class Derivation:
                     f"two checks of the contract would have the id {one.id!r}: give one of their "
                     f"parts 'ids', such as 'ids: {{{one.fact.name}: my_{one.fact.name}}}'",
                 )
-        for key, named in (("points", self.points), ("checks", self.contract.checks)):
+            elif "{" in one.spot.name and one.id.startswith(_in_ids(one.spot.name)):
+                text = "its name is chosen by students, so its ids need one: write 'ids: my_part'"
+                yield one.place, text
+        for key, named, known, verb in (
+            ("points", self.points, ids, "has"),
+            ("checks", self.contract.checks, self.points, "judges"),
+        ):
             for name in named:
-                if name not in ids:
-                    advice = nearest_or_all(name, sorted(ids), "Its checks are")
-                    yield ("contract", key, name), f"the contract has no check {name!r}.{advice}"
+                if name not in known:
+                    advice = nearest_or_all(name, sorted(known), "Its checks are")
+                    yield ("contract", key, name), f"the contract {verb} no check {name!r}.{advice}"
         for name, changed in self.contract.checks.items():
-            for wrong in ("id", "uses", "python", "points"):
+            for wrong, where in _KEPT.items():
                 if wrong in changed:
-                    where = "under 'points'" if wrong == "points" else "among 'checks'"
-                    yield (
-                        ("contract", "checks", name, wrong),
-                        f"a standard check keeps its {wrong!r}: write another one {where}",
-                    )
+                    yield ("contract", "checks", name, wrong), where
         for spot, _ in spots(self.contract):
             yield from self._unknown_ids(spot)
 
@@ -130,18 +139,16 @@ class Derivation:
                 yield from self._required(other)
 
     def _before(self, one: Derived) -> Iterator[Derived]:
-        """What a check requires, left out or not; what the contract does not say is stood for."""
+        """What a check requires, judged or not; for a fact not stated, what that requires."""
         for name in one.fact.requires:
             yield from self._nearest(name, one.spot)
 
     def _nearest(self, name: str, spot: Spot) -> Iterable[Derived]:
         here = [other for other in self.every if other.fact.name == name]
+        inside = [one for one in here if one.spot.place[: len(spot.place)] == spot.place]
         for level in (spot, *spot.around):
             same = [other for other in here if other.spot.place == level.place]
-            inside = [
-                other for other in here if other.spot.place[: len(level.place)] == level.place
-            ]
-            if same or inside:
+            if same or (level is spot and inside):
                 return same or inside
         if name == "generated":
             needed = spot.of_package.depends
@@ -171,9 +178,14 @@ def _id(spot: Spot, fact: Fact, several: bool, written: Collection[str]) -> str:
     prefixes = [level.part.ids for level in (spot, *spot.around) if isinstance(level.part.ids, str)]
     prefix = next(filter(None, prefixes), "")
     if not prefix and several:
-        prefix = re.sub(r"\W+", "_", spot.name.rpartition("/")[2]).lower()
+        prefix = _in_ids(spot.name)
     made = f"{prefix}_{fact.name}" if prefix else fact.name
     return f"{made}_{fact.name}" if made in written else made
+
+
+def _in_ids(name: str) -> str:
+    """The name of a part as it stands in ids."""
+    return re.sub(r"\W+", "_", name.rpartition("/")[2]).lower()
 
 
 def _shared(total: float, every: Collection[Derived]) -> dict[str, float]:

@@ -28,7 +28,7 @@ def expanded(source: Source) -> Source:
     if contract is None:
         raise AssignmentError(source.file, problems)
     derivation = Derivation(contract)
-    found = [*derivation.problems(), *_twice(source, derivation)]
+    found = [*derivation.problems(), *_misfits(source, derivation)]
     if found:
         problems = [source.problem(place, text) for place, text in found]
         raise AssignmentError(source.file, in_order(problems))
@@ -60,13 +60,17 @@ def plain(source: Source) -> dict[str, Any]:
     return {name: data[name] for name in names if name != KEY}
 
 
-def _twice(source: Source, derivation: Derivation) -> Iterator[tuple[Place, str]]:
+def _misfits(source: Source, derivation: Derivation) -> Iterator[tuple[Place, str]]:
+    """What in the rest of the document does not go with the contract."""
+    for key in ("checks", "scenarios"):
+        if not isinstance(source.data.get(key) or [], list):
+            yield (key,), "expected a list: each entry begins with '- '"
     if "packages" in source.data:
         yield ("packages",), "the packages stand in the contract: leave 'packages' out"
     ids = {one.id for one in derivation.kept}
     authors = source.data.get("checks")
     for index, entry in enumerate(authors if isinstance(authors, list) else ()):
-        if isinstance(entry, dict) and entry.get("id") in ids:
+        if isinstance(entry, dict) and isinstance(entry.get("id"), str) and entry["id"] in ids:
             text = (
                 f"{entry['id']!r} comes from the contract already: write what differs under "
                 f"'contract: checks: {entry['id']}', or take its points away there"
@@ -85,7 +89,7 @@ class _Written:
         self.origins: dict[Place, Place] = {}
 
     def stand_for(self, place: Place, value: Any, origin: Place) -> None:
-        """Note that a part which is made stands for one that is written."""
+        """Give a part that is made the line of the part of the contract that it comes from."""
         self.origins[place] = origin
         self.lines.update(dict.fromkeys(_places(place, value), self.source.line(origin) or 1))
 
@@ -136,7 +140,8 @@ class _Written:
                 {"executable": executable, **({"package": package} if several else {})}
             ]
         launched = entry.get("launch", made.get("launch"))
-        names = [one.get("executable") for one in launched or [] if isinstance(one, dict)]
+        launched = launched if isinstance(launched, list) else []
+        names = [one.get("executable") for one in launched if isinstance(one, dict)]
         topics = {
             topic: (published.type, (*self._PACKAGES, package, "executables", name))
             for (package, name), program in programs.items()
@@ -144,7 +149,7 @@ class _Written:
             for topic, published in program.publishes.items()
         }
         if "world" in entry:
-            topics.pop(Topics().command.topic, None)
+            topics.pop(_command_topic(entry), None)
         place: Place = ("scenarios", index)
         for key, value in made.items():
             self.stand_for((*place, key), value, self._PACKAGES)
@@ -158,6 +163,14 @@ class _Written:
                 origin = (*program_place, "publishes", topic)
                 self.stand_for(record, made["record"][number], origin)
         return {**entry, **made}
+
+
+def _command_topic(scenario: dict[str, Any]) -> str:
+    """The topic of the robot's commands, which its world records."""
+    command: Any = scenario.get("topics") or {}
+    for key in ("command", "topic"):
+        command = command.get(key) if isinstance(command, dict) else None
+    return command if isinstance(command, str) else Topics().command.topic
 
 
 def _places(place: Place, value: Any) -> Iterator[Place]:

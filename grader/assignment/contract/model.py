@@ -6,7 +6,7 @@ had written them, and a mistake is told at its line in the contract.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -58,6 +58,12 @@ class Publication(Connection):
         "`timing.period`, such as `{period: 300 ms, spread: 20 %}`.",
     )
     timer: bool = Field(False, description="Whether the callback of a timer must publish them.")
+
+    @model_validator(mode="after")
+    def _has_period(self) -> Publication:
+        if isinstance(self.period, dict) and "period" not in self.period:
+            raise ValueError("a period with other parameters is {period: 300 ms, spread: 20 %}")
+        return self
 
 
 class Subscription(Connection):
@@ -129,6 +135,12 @@ class ContractPackage(Part):
         description="Interfaces that it defines, by kind and name, such as `msg/BotStatus`.",
     )
 
+    @model_validator(mode="after")
+    def _generates(self) -> ContractPackage:
+        if self.interfaces and self.build_type != ("ament_cmake",):
+            raise ValueError("CMake generates interfaces: write 'build_type: ament_cmake'")
+        return self
+
 
 class Contract(Model):
     """What the ROS graph of a right submission looks like.
@@ -141,7 +153,7 @@ class Contract(Model):
     packages: dict[str, ContractPackage] = Field(
         min_length=1, description="Packages that students hand in, by name."
     )
-    points: float | dict[str, float] = Field(
+    points: float | dict[str, Annotated[float, Field(ge=0)]] = Field(
         description="Points by the id of the check; what is not named is not judged. Or one "
         "number for all of them, which is shared out by their weight."
     )

@@ -88,12 +88,10 @@ class Spot:
     def words(self) -> Mapping[str, str]:
         """What stands in the places of titles and hints."""
         several = len(self.contract.programs) > 1
-        kind = "Subscription" if isinstance(self.part, Subscription) else "Publisher"
         short = str(getattr(self.part, "type", "")).rpartition("/")[2]
         found = {
             "package": self.package,
             "executable": self.executable,
-            "module": self.package,
             "name": self.name,
             "whose": f"of {self.executable} " if several and self.executable else "",
             "subject": self.executable if several and self.executable else "The node",
@@ -102,16 +100,16 @@ class Spot:
             "type": str(getattr(self.part, "type", "")),
             "short": short,
             "cpp_type": str(getattr(self.part, "type", "")).replace("/", "::"),
-            "kind": kind.lower(),
         }
         if self.executable:
-            if len(self.of_package.executables) > 1:
-                found["module"] = re.sub(r"\W", "_", self.executable.removesuffix(".py"))
+            alone = len(self.of_package.executables) == 1
+            found["module"] = module_of(self.package, self.executable, alone=alone)
             found["node"], found["ends"] = self.program.node, str(self.program.ends)
         if isinstance(self.part, Connection):
             found["qos"] = listing(value.replace("_", " ") for value in self.part.qos.values())
             found["depth"] = str(self.part.depth)
         if isinstance(self.part, Publication):
+            found["on"] = f" on {self.name}" if len(self.program.publishes) > 1 else ""
             found["count"] = (
                 "one message" if self.part.count == 1 else f"{self.part.count} messages"
             )
@@ -126,6 +124,11 @@ class Spot:
                 f"{self.name}.{self.name.split('/')[0]}",
             )
         return found
+
+
+def module_of(package: str, executable: str, *, alone: bool) -> str:
+    """The module of a program: called like its package if it is the only one in it."""
+    return package if alone else re.sub(r"\W", "_", executable.removesuffix(".py"))
 
 
 def period_of(part: Publication) -> dict[str, Any]:
@@ -294,7 +297,7 @@ PROGRAM = (
         lambda it: {"within": it.program.ends} if it.program.ends else None,
         "{subject} ends by itself within {ends} of Ctrl+C",
         Words(
-            "Ctrl+C makes rclpy.spin() return. Do not catch KeyboardInterrupt and continue.",
+            "Ctrl+C ends rclpy.spin() with a KeyboardInterrupt. Do not catch it and go on.",
             "Ctrl+C makes rclcpp::spin() return. Do not start another loop after it, and install "
             "no handler of SIGINT.",
         ),
@@ -332,7 +335,7 @@ PUBLICATION = (
         "qos",
         "qos.offered",
         _qos,
-        "The publisher is {qos}",
+        "The publisher{on} is {qos}",
         Words(
             "Give a queue size instead of a QoSProfile. Then you get the default, which is right "
             "here.",
@@ -345,7 +348,7 @@ PUBLICATION = (
         "depth",
         "qos.depth",
         _depth,
-        "The queue of the publisher holds {depth} messages",
+        "The queue of the publisher{on} holds {depth} messages",
         Words(
             "The third argument of create_publisher is the queue size.",
             "The second argument of create_publisher is the queue size.",
@@ -356,7 +359,7 @@ PUBLICATION = (
         "sent",
         "messages.count",
         _sent,
-        "Messages arrive",
+        "Messages arrive{on}",
         Words(
             "Call self.publisher.publish(message) in the callback of the timer. Call "
             "rclpy.spin(node), which calls the callback.",
@@ -372,7 +375,7 @@ PUBLICATION = (
         lambda it: (
             {"topic": it.name, "exactly": count} if (count := _publication(it).count) else None
         ),
-        "Exactly {count} {are} published",
+        "Exactly {count} {are} published{on}",
         "Publish neither in a loop nor in a timer that goes on.",
         ("sent",),
         4,
@@ -383,7 +386,7 @@ PUBLICATION = (
         lambda it: (
             {"topic": it.name, "value": value} if (value := _publication(it).value) else None
         ),
-        "Every message has {value}",
+        "Every message{on} has {value}",
         "Set the fields before you publish; all others keep their default of 0.",
         ("sent",),
         4,
@@ -396,7 +399,7 @@ PUBLICATION = (
             if period_of(_publication(it))
             else None
         ),
-        "A message comes every {period}",
+        "A message comes every {period}{on}",
         "`ros2 topic hz {name}` shows the rate.",
         ("sent", "alive"),
         8,
@@ -405,7 +408,7 @@ PUBLICATION = (
         "timer",
         "executor.timer",
         lambda it: {"topic": it.name} if _publication(it).timer else None,
-        "A timer calls the callback, not a thread or a loop",
+        "A timer calls the callback{on}, not a thread or a loop",
         Words(
             "Create a timer with self.create_timer(period_in_seconds, self.timer_callback), and "
             "publish in its callback.",

@@ -8,7 +8,7 @@ from typing import Any
 
 from grader.assignment.contract.model import Connection, Contract, Declared, Program
 from grader.assignment.contract.standard import ANY, leaves, period_of
-from grader.findings.wording import codes, listing
+from grader.findings.wording import codes, listing, value_text
 from grader.spec.document import Place
 
 MARKER = "<!-- contract -->"
@@ -90,7 +90,12 @@ def _program(executable: str, program: Program, place: Place) -> Iterator[Row]:
     if program.alive:
         yield Row("runs", f"until Ctrl+C{ends}", place, ("alive", "ends"))
     if program.responsive:
-        answers = f"within {program.responsive.get('within', 'a second')}"
+        limits = [
+            f"{text} {program.responsive[key]}"
+            for key, text in {"within": "within", "typically": "as a rule within"}.items()
+            if key in program.responsive
+        ]
+        answers = ", ".join(limits) or "while its callbacks run"
         yield Row("answers services", answers, place, ("responsive",))
 
 
@@ -116,5 +121,5 @@ def _connection(topic: str, part: Connection) -> str:
 
 
 def _written(value: Any) -> str:
-    """A value as the author wrote it."""
-    return str(value)
+    """A value as YAML has it; a text without quotes."""
+    return value if isinstance(value, str) else value_text(value)

@@ -152,8 +152,9 @@ def _used(root: ElementTree.Element) -> list[ElementTree.Element]:
     """The elements of the first dependency, of a client library where there is no other."""
     depends = [one for one in root if one.tag in ("depend", "exec_depend", "build_depend")]
     names = [(one.text or "").strip() for one in depends]
-    first = next((name for name in names if name not in _CLIENT_LIBRARIES), *names[:1])
-    return [one for one, name in zip(depends, names, strict=True) if name == first]
+    others = [name for name in names if name not in _CLIENT_LIBRARIES]
+    firsts = (others or names)[:1]
+    return [one for one, name in zip(depends, names, strict=True) if name in firsts]
 
 
 def _remove(root: ElementTree.Element) -> None:

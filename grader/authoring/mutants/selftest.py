@@ -8,7 +8,7 @@ almost nothing. Mutants are those of mutants.yaml, and the standard ones of the 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from enum import Enum
@@ -115,33 +115,41 @@ def trials(loaded: LoadedAssignment, language: Language = PYTHON) -> tuple[Trial
     )
 
 
-def run_trial(
-    trial: Trial,
-    loaded: LoadedAssignment,
-    grading: Grading,
-    reference: Path,
-    folder: Path,
-    on_graded: Callable[[Graded], None] = lambda _: None,
-    language: Language = PYTHON,
-) -> TrialResult:
+@dataclass(frozen=True)
+class Setup:
+    """What the trials of an assignment are graded with.
+
+    Attributes:
+        reference: The folder of the solution that mutants and variants are made from.
+        on_graded: Gets each grade with its recordings, which are not kept.
+    """
+
+    loaded: LoadedAssignment
+    grading: Grading
+    reference: Path
+    language: Language = PYTHON
+    on_graded: Callable[[Graded], None] = lambda _: None
+
+
+def run_trial(trial: Trial, setup: Setup, folder: Path) -> TrialResult:
     """Grade one trial."""
-    submission = folder / "submissions" / trial.id
+    loaded, submission = setup.loaded, folder / "submissions" / trial.id
     if trial.role is Role.STARTER:
-        write_starter(loaded, submission, cpp=language is CPP)
+        write_starter(loaded, submission, cpp=setup.language is CPP)
     elif trial.change is None or trial.mistakes:
-        submission = reference
+        submission = setup.reference
     else:
-        apply(trial.change, reference, submission)
+        apply(trial.change, setup.reference, submission)
     # There is no roster, and the reference has the author's examples.
     given = {
         name: loaded.values[name]
         for name, variable in loaded.assignment.variables.items()
         if variable.match is None
     }
-    graded = grading.imposing(trial.mistakes).grade(
+    graded = setup.grading.imposing(trial.mistakes).grade(
         submission, folder / "recordings" / trial.id, given=given
     )
-    on_graded(graded)
+    setup.on_graded(graded)
     actual = {result.id: result.status for result in graded.grade.results}
     if trial.role is Role.STARTER:
         wrong = _wrong_with_starter(graded.grade)
@@ -151,7 +159,7 @@ def run_trial(
         put_right = [result.id for result in graded.grade.results if result.put_right]
         expected = expected_statuses(loaded.assignment, trial.change, put_right)
         for result in graded.grade.results:
-            # Undeclared parameters may make it fail, or may not.
+            # Where the node does not declare a parameter, a check may fail by that, or may not.
             if result.status is Status.SKIPPED and set(result.waits_for) <= expected.keys():
                 lost = all(expected[root] is Status.FAILED for root in result.waits_for)
                 expected[result.id] = Status.SKIPPED if lost else expected[result.id]
@@ -197,21 +205,13 @@ def _findings(graded: Graded, check: str) -> Iterator[str]:
 
 
 def selftest(
-    loaded: LoadedAssignment,
-    grading: Grading,
-    *,
-    jobs: int,
-    language: Language = PYTHON,
-    keep: Path | None = None,
-    chosen: Callable[[Trial], bool] = lambda _: True,
-    on_graded: Callable[[Graded], None] = lambda _: None,
+    setup: Setup, every: Iterable[Trial], *, jobs: int, keep: Path | None = None
 ) -> Iterator[TrialResult]:
-    """Run every trial of an assignment."""
-    base = load_mutants(loaded.assignment, loaded.folder, language=language).reference
+    """Run trials of an assignment."""
     with Scratch("selftest") as folder:
 
         def work(trial: Trial) -> TrialResult:
-            result = run_trial(trial, loaded, grading, base, folder, on_graded, language)
+            result = run_trial(trial, setup, folder)
             if keep is not None and result.wrong:
                 shutil.rmtree(keep / trial.id, ignore_errors=True)
                 for part in ("submissions", "recordings"):
@@ -220,16 +220,15 @@ def selftest(
                         shutil.copytree(made, keep / trial.id / part, symlinks=True)
             return result
 
-        every = trials(loaded, language)
         with ThreadPoolExecutor(max_workers=jobs) as pool:
-            futures = [pool.submit(work, trial) for trial in every if chosen(trial)]
+            futures = [pool.submit(work, trial) for trial in every]
             try:
                 for future in as_completed(futures):
                     yield future.result()
             except BaseException:
                 for future in futures:
                     future.cancel()
-                grading.close()
+                setup.grading.close()
                 raise
 
 

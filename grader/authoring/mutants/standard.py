@@ -8,12 +8,16 @@ can be the reference.
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from grader.assignment.binding import BoundCheck
+from grader.assignment.contract.standard import leaves
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.mutant import (
     LANGUAGES,
@@ -29,11 +33,14 @@ from grader.authoring.mutants import manifest
 from grader.authoring.mutants.manifest import Files, PackageFiles, misspelt
 from grader.errors import AssignmentError, Problem, UsageError
 from grader.run.imposing.mistake import Mistake
-from grader.spec.source import read_source
+from grader.spec.nearest_name import nearest_or_all
 
 _OTHER_TYPES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 _OTHER_AXIS = {"x": "y", "y": "x", "z": "x"}
-_MOST_OF_PERIOD, _LONGER = 0.85, 1.5
+_MOST_OF_PERIOD = 0.85
+"""Share of the period for which a callback sleeps that leaves the executor little time."""
+_LONGER = 1.5
+"""How many times as long as the longest answer that is allowed a callback sleeps."""
 _SEEN = ("topic.", "qos.", "node.")
 """Families of checks of a topic that pass where no callback is called."""
 
@@ -43,7 +50,7 @@ Imposed = tuple[str, str, str]
 
 @dataclass(frozen=True)
 class Standard:
-    """A mutant that nobody wrote.
+    """A standard mutant: a usual mistake, made from what the contract asks for.
 
     Attributes:
         mistakes: What a run imposes on the reference; the mutant has no edits then.
@@ -93,6 +100,8 @@ def with_standard_mutants(loaded: LoadedAssignment, written: Mutants) -> tuple[S
 def every_mutant(loaded: LoadedAssignment) -> list[Mutant]:
     """All mutants of an assignment, in each language that it has a reference for."""
     found: list[Mutant] = []
+    derived: set[str] = set()
+    said: dict[str, Path] = {}
     for language in LANGUAGES:
         if not (loaded.folder / language.mutants).exists():
             try:
@@ -103,13 +112,22 @@ def every_mutant(loaded: LoadedAssignment) -> list[Mutant]:
                 continue
         written = load_mutants(loaded.assignment, loaded.folder, language=language)
         found += [*written.mutants, *(one.mutant for one in with_standard_mutants(loaded, written))]
+        derived |= {
+            one.mutant.id for one in standard_mutants(loaded, read_files(written.reference))
+        }
+        said |= dict.fromkeys(written.derived, written.file)
+    for name in said.keys() - derived:
+        advice = nearest_or_all(name, sorted(derived), "The standard mutants are")
+        problem = Problem(f"no standard mutant is called {name!r}.{advice}", where="derived")
+        raise AssignmentError(said[name], [problem])
     return found
 
 
 def standard_mutants(loaded: LoadedAssignment, files: Mapping[str, bytes]) -> tuple[Standard, ...]:
     """All standard mutants of what the contract asks for, for the files of a reference."""
     drafts: dict[tuple[object, ...], _Draft] = {}
-    own = {one.get("id") for one in read_source(loaded.file).data.get("checks") or ()}
+    written = loaded.source.data.get("checks") if loaded.source else ()
+    own = {one.get("id") for one in written or ()}
     for bound in (one for one in loaded.checks if one.spec.id not in own):
         for draft in (*_of_package(bound, loaded, files), *_of_run(bound, loaded)):
             key = (draft.kind, *draft.about, draft.mistakes)
@@ -209,16 +227,31 @@ def _package(
 ) -> tuple[str, PackageFiles | None]:
     """The folder of a package in a reference, and its files."""
     for path, content in files.items():
+        if path.rpartition("/")[2] != "package.xml":
+            continue
         tag = re.search(rb"<name>\s*([^<\s]+)\s*</name>", content)
-        if path.rpartition("/")[2] == "package.xml" and tag and tag[1].decode() == name:
+        if tag and tag[1].decode() == name:
             folder = path.removesuffix("package.xml")
             inside = {one: data for one, data in files.items() if one.startswith(folder)}
             texts = {
                 one.removeprefix(folder): data.decode("utf-8", "replace")
                 for one, data in inside.items()
             }
+            for file in ("package.xml", "setup.py"):
+                _refuse_broken(f"{folder}{file}", texts.get(file, ""))
             return folder, PackageFiles(name, texts, executables)
     return "", None
+
+
+def _refuse_broken(path: str, text: str) -> None:
+    """Refuse a file of a reference that cannot be read, so that no mistake can be made in it."""
+    try:
+        if path.endswith(".py"):
+            ast.parse(text)
+        else:
+            ElementTree.fromstring(text)
+    except (SyntaxError, ElementTree.ParseError) as error:
+        raise AssignmentError(Path("reference", path), [Problem(str(error))]) from error
 
 
 # What a program does
@@ -386,11 +419,11 @@ def _count(run: _Run) -> Iterator[_Wrong]:
 
 def _equal(run: _Run) -> Iterator[_Wrong]:
     topic = run.given.topic
-    leaves = list(_leaves(run.given.value))
-    for path, _ in leaves[:1]:
+    fields = [one for one in leaves(run.given.value) if isinstance(one[1], (bool, int, float, str))]
+    for path, _ in [one for one in fields if one[1] != ""][:1]:
         wrong = (("field", topic, path),)
         yield _Wrong("wrong_value", f"{path} has another value", topic, wrong)
-    for path, value in leaves:
+    for path, value in fields:
         outer, _, last = path.rpartition(".")
         if value and outer and last in _OTHER_AXIS:
             other = f"{outer}.{_OTHER_AXIS[last]}"
@@ -399,19 +432,12 @@ def _equal(run: _Run) -> Iterator[_Wrong]:
             break
 
 
-def _leaves(value: Mapping[str, Any], outer: str = "") -> Iterator[tuple[str, Any]]:
-    for name, inner in value.items():
-        if isinstance(inner, Mapping):
-            yield from _leaves(inner, f"{outer}{name}.")
-        elif isinstance(inner, (bool, int, float)) or (isinstance(inner, str) and inner):
-            yield f"{outer}{name}", inner
-
-
 def _period(run: _Run) -> Iterator[_Wrong]:
     topic = run.given.topic
     slow, fast = (("period", "timers", "10"),), (("period", "timers", "0.001"),)
-    yield _Wrong("period_ten_times", "The period is ten times as long", topic, slow)
-    yield _Wrong("period_a_thousandth", "The period is a thousandth", topic, fast)
+    # All timers of the program, and so all topics with a period.
+    yield _Wrong("period_ten_times", "The period is ten times as long", "", slow)
+    yield _Wrong("period_a_thousandth", "The period is a thousandth", "", fast)
     title = "Nothing is published any more after five messages"
     yield _Wrong("falls_silent", title, topic, (("most", topic, "5"),))
     twice = (("twice", topic, "each"),)

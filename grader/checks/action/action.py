@@ -24,8 +24,9 @@ from grader.checks.requests import (
     timeline,
     why_other_fields,
 )
+from grader.diagnosis.explanation import cause_of
 from grader.diagnosis.mistake import mistaken, remedy
-from grader.diagnosis.no_answer import why_late, why_raised, why_unanswered
+from grader.diagnosis.no_answer import NoAnswer, why_late, why_raised
 from grader.diagnosis.no_endpoint import ACTION
 from grader.findings.fields import FieldTolerance, the_goal, words
 from grader.findings.finding import Evidence, Finding
@@ -92,7 +93,8 @@ def answered_goals(
     for goal in found:
         if goal.accepted is None:
             what = f"{the_goal(goal)} was neither accepted nor rejected"
-            stop_if(why_unanswered(recording, what, ACTION, goal.action, goal.sent_ns, _ANSWER_S))
+            silence = NoAnswer(recording, what, ACTION, goal.action, goal.sent_ns, _ANSWER_S)
+            stop_if(cause_of(silence))
     return found
 
 
@@ -311,9 +313,9 @@ def _why_other_status(recording: Recording, goal: Goal, parameters: Result) -> F
 
 
 def _why_no_result(recording: Recording, goal: Goal, within_s: float) -> Finding | None:
-    seen, mistake = f"the result of {the_goal(goal)} did not come", "slow_goal"
-    sent_ns, end_ns, shown = goal.sent_ns, goal.result_ns, evidence(recording, goal)
-    return why_late(recording, ACTION, goal.action, sent_ns, end_ns, within_s, seen, mistake, shown)
+    seen = f"the result of {the_goal(goal)} did not come"
+    silence = NoAnswer(recording, seen, ACTION, goal.action, goal.sent_ns, within_s)
+    return why_late(silence, goal.result_ns, "slow_goal", evidence(recording, goal))
 
 
 def _why_other_result(recording: Recording, goal: Goal, parameters: Result) -> Finding | None:

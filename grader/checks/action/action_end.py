@@ -8,7 +8,7 @@ from grader.checks.action.action import OfGoals, answered_goals, evidence, why_r
 from grader.checks.check import Subject, check, stop_if, stop_if_any
 from grader.checks.need import Act, Stimulated
 from grader.diagnosis.mistake import mistaken
-from grader.diagnosis.no_answer import why_late
+from grader.diagnosis.no_answer import NoAnswer, why_late
 from grader.diagnosis.no_endpoint import ACTION
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.unended_goal import ended_alone, why_no_end, why_not_canceled
@@ -112,4 +112,5 @@ def _why_goes_on(recording: Recording, old: Goal, new: Goal, within_s: float) ->
     if old.status == "succeeded":
         return mistaken(mistake, f"{the_goal(old)} was worked on to its end, and succeeded", shown)
     seen = f"after the new goal was sent, {the_goal(old)} did not end"
-    return why_late(recording, ACTION, old.action, sent_ns, end_ns, within_s, seen, mistake, shown)
+    silence = NoAnswer(recording, seen, ACTION, old.action, sent_ns, within_s)
+    return why_late(silence, end_ns, mistake, shown)

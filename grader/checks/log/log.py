@@ -10,8 +10,9 @@ from pydantic import Field
 
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.need import SentOrOwn
+from grader.diagnosis.explanation import cause_of
 from grader.diagnosis.mistake import mistaken
-from grader.diagnosis.no_log import why_not_logged
+from grader.diagnosis.no_log import NotLogged
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.not_called import Uncalled, slow_callbacks
 from grader.findings.finding import Evidence, Finding, Moment
@@ -125,7 +126,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     wanted = wanted_values(messages, parameters.fields, ready_ns, sooner_ns)
     found = echoes(recording, wanted, parameters.decimals, within_ns)
     if len(found) < parameters.at_least:
-        return why_not_logged(
+        symptom = NotLogged(
             recording,
             parameters.topic,
             wanted,
@@ -135,6 +136,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
             within_ns=within_ns,
             own=parameters.own,
         )
+        return cause_of(symptom)
     stop_if(_too_seldom(recording, parameters, wanted, found))
     lines = [line for echo in found for line in echo.lines]
     last_s = recording.since_launch_s(lines[-1].time_ns)

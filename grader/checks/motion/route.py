@@ -97,7 +97,7 @@ def visits(recording: Recording, parameters: Visits) -> Finding:
         return Finding.as_asked(f"all of them on {metres(way_m(recording.truth))}", evidence)
     cause = _why_missed(recording, parameters, moments, evidence.moments)
     credit = len(moments) / len(parameters.places)
-    return Finding(cause.observed, cause.hint, cause.evidence, credit=credit)
+    return replace(cause, credit=credit)
 
 
 def _why_missed(

@@ -21,7 +21,7 @@ from grader.checks.check import (
 from grader.checks.need import Act, Doubt, Stimulated
 from grader.checks.requests import Offered, is_offered, judged_requests, why_other_fields
 from grader.diagnosis.mistake import mistaken
-from grader.diagnosis.no_answer import why_late
+from grader.diagnosis.no_answer import NoAnswer, why_late
 from grader.diagnosis.no_endpoint import SERVICE
 from grader.findings.fields import FieldTolerance, brief, words
 from grader.findings.finding import Evidence, Finding, Moment, Table
@@ -121,10 +121,9 @@ def judged_calls(
 def why_slow(recording: Recording, calls: tuple[Call, ...], within_s: float) -> Finding | None:
     """Why one of some calls was not answered in time, or None if all were."""
     worst = max(calls, key=_took_s)
-    sent_ns, end_ns, server = worst.requested_ns, worst.answered_ns, worst.service
-    seen = f"{_which(calls, worst)} to {code(server)} was not answered"
-    mistake, shown = "slow_callback", _evidence(recording, calls)
-    return why_late(recording, SERVICE, server, sent_ns, end_ns, within_s, seen, mistake, shown)
+    seen = f"{_which(calls, worst)} to {code(worst.service)} was not answered"
+    silence = NoAnswer(recording, seen, SERVICE, worst.service, worst.requested_ns, within_s)
+    return why_late(silence, worst.answered_ns, "slow_callback", _evidence(recording, calls))
 
 
 def _which(calls: tuple[Call, ...], call: Call) -> str:

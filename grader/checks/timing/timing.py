@@ -152,7 +152,8 @@ def period(recording: Recording, parameters: Period) -> Finding:
         )
     cause = cause_of(WrongRhythm(recording, parameters.topic, measured, verdict, limits))
     observed += f": {cause.observed}" if cause.observed else ""
-    return Finding(observed, cause.hint, replace(evidence, places=cause.evidence.places))
+    shown = replace(evidence, places=cause.evidence.places)
+    return replace(cause, observed=observed, evidence=shown)
 
 
 def _is_declared(recording: Recording, verdict: PeriodVerdict, limits: PeriodLimits) -> bool:

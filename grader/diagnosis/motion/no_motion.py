@@ -10,7 +10,7 @@ from grader.diagnosis.mistake import remedy
 from grader.diagnosis.no_messages import NoMessages, why_refused, why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
-from grader.diagnosis.wrong_value import MISREAD, was_integer
+from grader.diagnosis.wrong_value import misread_words, was_integer
 from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import evidence_at
 from grader.findings.reference import Goal, UnknownValue
@@ -181,8 +181,7 @@ def integer_in_command(symptom: NotMoved) -> Finding | None:
     for field, number in (("linear.x", twist.linear_m_s), ("angular.z", twist.angular_rad_s)):
         if was_integer(number):
             return Finding(
-                f"{_STILL}: {MISREAD} was put into {code(field)}, a float field, "
-                "which ROS misreads",
+                f"{_STILL}: {misread_words(code(field))}",
                 remedy("float_field"),
                 symptom.evidence,
             )

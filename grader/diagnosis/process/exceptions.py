@@ -13,6 +13,7 @@ from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
 from grader.diagnosis.process.failure import Failure, Frame
 from grader.diagnosis.process.raised import READ_MESSAGE, student_place
 from grader.findings.wording import code, listing
+from grader.findings.words import Words
 from grader.recording.model import Recording
 from grader.spec.source import Model, read_source
 from grader.submission.record import CPP, PYTHON, PackageRecord, SubmissionRecord
@@ -51,7 +52,7 @@ class Row(Model):
     message: str = ""
     raised_in: str = ""
     source: str = ""
-    hint: str
+    hint: str | Words
 
     def __call__(self, symptom: Raised) -> str | None:
         """The hint, if the exception is that of the mistake."""
@@ -66,7 +67,7 @@ class Row(Model):
         names = {key: text for key, text in found.groupdict().items() if text}
         if not re.search(Template(self.source).safe_substitute(names), last.source):
             return None
-        return Template(self.hint).safe_substitute(names)
+        return Template(str(self.hint)).safe_substitute(names)
 
 
 class Table(Model):

@@ -13,6 +13,7 @@ from grader.findings.first_seen import until_the_end
 from grader.findings.wording import codes
 from grader.findings.words import SPIN, SPIN_NODE
 from grader.measure import declarations
+from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Call, Process, Recording
 from grader.spec.unit import format_duration
 
@@ -52,6 +53,11 @@ class NotCalled(Symptom[Finding], concept="executors"):
     def processes(self) -> Sequence[Process]:
         """Those that may never have spun."""
         return self.recording.processes
+
+    @property
+    def unanswered(self) -> str:
+        """The service or action whose answer is missing; it is no second proof of that."""
+        return ""
 
     @property
     def since_ns(self) -> int:
@@ -110,11 +116,13 @@ def never_spun(symptom: NotCalled) -> Finding | None:
             "Add the node to the executor that spins, executor.add_node(node), or call "
             f"{SPIN_NODE}.",
             Evidence(moments=(until_the_end(recording, "no executor had the node"),)),
+            concept="executors",
         )
     cause = Finding(
         f"{symptom.seen}: {SPIN} was never called, so no callback runs",
         f"Call {SPIN_NODE} in main(). Nothing before it may wait or loop for ever.",
         Evidence(moments=(until_the_end(recording, f"{SPIN} was still not called"),)),
+        concept="executors",
     )
     return at_its_place(cause, symptom.seen, where_it_stands(recording, process))
 
@@ -127,7 +135,7 @@ def blocked_executor(symptom: NotCalled) -> Finding | None:
     recording = symptom.recording
     calls = [
         call
-        for call in _calls(recording, symptom.nodes)
+        for call in _calls(symptom)
         if left_s(recording, call.requested_ns, recording.stop_ns) >= _ANSWER_S
     ]
     call = next((call for call in calls if call.answered_ns is None), None)
@@ -140,6 +148,7 @@ def blocked_executor(symptom: NotCalled) -> Finding | None:
         "node's parameter service does not answer either",
         remedy("blocked"),
         Evidence(moments=(Moment("first call that was not answered", since_s),)),
+        concept="executors",
     )
     stand = where_it_stands(recording, process.name) if process is not None else None
     return at_its_place(cause, symptom.seen, stand or unkept_future(recording))
@@ -151,7 +160,7 @@ def slow_callbacks(symptom: CalledLate) -> Finding | None:
     recording = symptom.recording
     waits = [
         (call, left_s(recording, call.requested_ns, call.answered_ns or recording.stop_ns))
-        for call in _calls(recording, symptom.nodes)
+        for call in _calls(symptom)
     ]
     # The longest but one: a single answer may have been lost on its way.
     call, wait_s = sorted(waits, key=lambda item: item[1])[-2] if len(waits) > 1 else (None, 0.0)
@@ -163,6 +172,7 @@ def slow_callbacks(symptom: CalledLate) -> Finding | None:
         f"service waited {format_duration(wait_s)} or more",
         remedy("blocked"),
         Evidence(moments=(moment,)),
+        concept="executors",
     )
     return at_its_place(cause, symptom.late, slow_callback(recording))
 
@@ -175,10 +185,8 @@ def at_its_place(cause: Finding, seen: str, stand: Stand | None) -> Finding:
     return replace(cause, observed=f"{seen}: {stand.words}", hint=stand.hint, evidence=evidence)
 
 
-def _calls(recording: Recording, nodes: Collection[str]) -> list[Call]:
-    """Calls to services of the nodes that found a server."""
-    return [
-        call
-        for call in recording.calls
-        if call.service.rpartition("/")[0] in nodes and not call.error
-    ]
+def _calls(symptom: NotCalled) -> list[Call]:
+    """Calls to the services that rclpy and rclcpp make for the nodes, which found a server."""
+    made = {name for node in symptom.nodes for name in executor_services(node)}
+    made.discard(symptom.unanswered)
+    return [call for call in symptom.recording.calls if call.service in made and not call.error]

@@ -361,9 +361,9 @@ def raised(symptom: ProcessExit) -> Finding | None:
 
 
 def offence(recording: Recording) -> Finding | None:
-    """A forbidden action of the processes, also where they ended before it was seen."""
+    """What the sandbox ends processes for, also where it was seen only after their end."""
     for breach in recording.breaches:
-        if not breach.allowed:
+        if breach.ended:
             moment = Moment(breach.what, recording.since_launch_s(breach.time_ns))
             return Finding(str(breach), str(TABLE.hints[breach.what]), Evidence(moments=(moment,)))
     return None

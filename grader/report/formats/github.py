@@ -66,7 +66,7 @@ def outputs(result: Result, delimiter: str = "") -> str:
     points, ``failed`` without, ``error`` where there is no grade) and ``summary``.
 
     Args:
-        delimiter: What ends a value; by default one that nobody can know.
+        delimiter: The line that ends a value; random by default, so that no value can hold it.
     """
     delimiter = delimiter or f"rosgrade_{secrets.token_hex(16)}"
     ended = "passed" if result.known_score == result.known_max_score else "failed"

@@ -3,7 +3,7 @@
  * It is preloaded before the tracer of compiled programs, so that functions of rcl's C API that are
  * defined here get what the program says, and give the tracer what a wrong program would have said.
  * The mistakes stand in the file beside it: a line for each, with the program, the kind, a name and
- * a value between tabs. mutation/sitecustomize.py imposes the same on programs of Python.
+ * a value between tabs. imposing/sitecustomize.py imposes the same on programs of Python.
  */
 
 #define _GNU_SOURCE

@@ -203,9 +203,9 @@ class TestZero:
             ([0, 0, 0, math.cos(0.5)], "length 0.8776"),
             ([0, 0, 0, 0], "length 0"),
             # What rclpy makes of Quaternion(x=0, y=0, z=0, w=1).
-            ([0, 0, 0, 5e-324], "a numpy.float32 was put into a float field"),
+            ([0, 0, 0, 5e-324], "but an integer, a text or a numpy.float32 was put into it"),
             # And of numpy.float32(0.7071) in a field.
-            ([5.239e-315, 0, 0, 0], "a numpy.float32 was put into a float field"),
+            ([5.239e-315, 0, 0, 0], "but an integer, a text or a numpy.float32 was put into it"),
             ([HALF, 0, 0, HALF], "instead of no rotation or no answer"),
         ],
     )
