@@ -7,10 +7,10 @@ help: ## show this list
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 10
 
 setup: ## make .venv with everything in it; does nothing when it is up to date
-	@$(PYTHON) -m grader.bootstrap
+	@$(PYTHON) -m grader.machine.bootstrap
 
 demo: setup ## grade the reference solution, then a broken one
-	@$(run) -m grader.demo
+	@$(run) -m grader.dev.demo
 
 test: lint ## lint, type-check and run every test
 	@$(run) -m pytest -q -rs -n 3 --dist loadfile --no-loadscope-reorder
@@ -31,17 +31,17 @@ lock: setup ## regenerate requirements.lock; UPGRADE=1 to newer versions
 		$(if $(UPGRADE),--upgrade) --output-file requirements.lock >/dev/null
 
 bench: setup ## measure rosgrade's own overhead
-	@$(run) -m grader.bench
+	@$(run) -m grader.dev.bench
 
 soak: setup ## grade a class of 200 (or N=...) under load (LOAD=30), and look for a grade that changes
-	@$(run) -m grader.soak $(if $(N),--students $(N)) $(if $(LOAD),--load $(LOAD))
+	@$(run) -m grader.dev.soak $(if $(N),--students $(N)) $(if $(LOAD),--load $(LOAD))
 
 wheels: setup ## build both wheels in dist/: rosgrade, and the solutions for instructors
 	@$(run) -m hatchling build -t wheel
 	@cd reference && ../$(run) -m hatchling build -t wheel -d ../dist
 
 docs: setup ## regenerate docs/, and build the site in build/site
-	@$(run) -m grader.docs
+	@$(run) -m grader.dev.docs
 	@NO_MKDOCS_2_WARNING=1 ROSGRADE_REPOSITORY=$${ROSGRADE_REPOSITORY-$$(git config remote.origin.url | \
 		sed -n 's|^git@\([^:]*\):|https://\1/|; s|\.git$$||; /^https:/p')} $(run) -m mkdocs build --strict --quiet
 

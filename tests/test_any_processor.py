@@ -28,7 +28,7 @@ def test_no_source_names_a_processor_but_to_say_where_wheels_are() -> None:
         for line in file.read_text(encoding="utf-8").splitlines()
         if PROCESSOR.search(line) and "base64" not in line
     ]
-    assert named == [f"grader/bootstrap.py: {WHEELS}"]
+    assert named == [f"grader/machine/bootstrap.py: {WHEELS}"]
 
 
 @pytest.mark.parametrize("options", [{}, {"one_session": True}, {"guarded": True}])

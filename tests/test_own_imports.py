@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from grader import ros
+from grader.machine import ros
 from grader.run.cell.discovery_probe import discovery_time_s
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -12,7 +12,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from grader import resources, ros
 from grader.assignment.binding import BoundCheck
 from grader.assignment.model import Assignment
 from grader.assignment.stimuli.message import Find, part_of
@@ -20,6 +19,7 @@ from grader.assignment.variable import Values, fill_interface, fill_text
 from grader.checks.check import NamedFields
 from grader.errors import GraderFault, Problem
 from grader.findings.value import NoSuchField, expected_leaves, tolerance_of, unreachable, value_at
+from grader.machine import resources, ros
 from grader.recording.interface import FEEDBACK, FLOATS, TEXTS, feedback_definition, fields_of
 from grader.spec.document import Place
 from grader.spec.name import INTERFACE

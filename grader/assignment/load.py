@@ -10,7 +10,6 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from grader import resources
 from grader.assignment import rules, simulation
 from grader.assignment.binding import BoundCheck, bind
 from grader.assignment.contract.expand import expanded
@@ -22,6 +21,7 @@ from grader.assignment.variable import Values, filled, read_variables
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.errors import AssignmentError, Problem, UsageError
+from grader.machine import resources
 from grader.spec.nearest_name import nearest_or_all
 from grader.spec.source import Source, in_order, read_source
 from grader.submission.underlay.definition import find_underlay

@@ -17,10 +17,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from grader import resources
 from grader.assignment.model import Assignment
 from grader.errors import AssignmentError, Problem, UsageError
 from grader.findings.finding import Status
+from grader.machine import resources
 from grader.spec.document import Place
 from grader.spec.name import Id
 from grader.spec.nearest_name import nearest_or_all

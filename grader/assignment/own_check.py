@@ -29,10 +29,10 @@ from typing import Any, get_type_hints
 from pydantic import create_model
 from pydantic.errors import PydanticUserError
 
-from grader import resources
 from grader.checks.catalogue import CATALOGUE, gather
 from grader.checks.check import Check, Parameters, Subject
 from grader.findings.finding import Finding
+from grader.machine import resources
 from grader.spec.nearest_name import did_you_mean, nearest_or_all
 
 FOLDER = "checks"

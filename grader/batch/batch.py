@@ -13,13 +13,14 @@ from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
 from grader.batch.executor import BatchExecutor, ExecutorLost
-from grader.batch.files import write_graded
-from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.batch.handed_in import HandedIn
-from grader.batch.last_attempt import EARLIER
 from grader.batch.ledger import Entry, Ledger, TakenFrom
-from grader.batch.regrading import find, regrade, regrade_command
+from grader.batch.used_assignment import regrade_command
 from grader.errors import GraderFault, RosgradeError, UsageError, machine_fault
+from grader.grading.files import write_graded
+from grader.grading.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
+from grader.grading.last_attempt import EARLIER
+from grader.grading.regrading import find, regrade
 from grader.recording.model import to_json
 from grader.report.files import write_whole
 from grader.report.model.facts import Clock

@@ -8,9 +8,9 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any, Protocol
 
-from grader.batch.grading import Grading
 from grader.batch.worker import Given, Order, Parcel, grade_into, grade_remotely, unpack
 from grader.errors import GraderFault, RosgradeError, UsageError
+from grader.grading.grading import Grading
 
 _CONNECT_S = 15
 _ANSWER_S = _CONNECT_S + 5.0

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from grader.batch.batch import copy_result, with_teams
 from grader.batch.handed_in import NOTHING, HandedIn
 from grader.batch.ledger import Entry, Ledger
-from grader.batch.regrading import load_used, refuse_changed
+from grader.batch.used_assignment import load_used, refuse_changed
 from grader.course.load import Course, written
 from grader.findings.wording import listing
 from grader.spec.nearest_name import did_you_mean

@@ -12,13 +12,12 @@ import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, fields, replace
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import TypeVar
 
-from grader.batch.files import RESULT_FILE
-from grader.batch.last_attempt import EARLIER
 from grader.errors import RosgradeError, UsageError, machine_fault
+from grader.grading.files import RESULT_FILE
+from grader.grading.last_attempt import EARLIER, keep_earlier
 from grader.report.files import check_folder, file_version, folder_name, sync, write_whole
 from grader.report.model.class_result import for_class
 from grader.report.model.result import read_result
@@ -257,11 +256,3 @@ class Ledger:
             raise UsageError(f"{self.out}: is not the folder of a batch") from error
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise UsageError(f"{file}: is damaged: {error}; run the batch again") from error
-
-
-def keep_earlier(file: Path, content: str | None = None) -> None:
-    """Keep a file with grades, or a shorter content of it, when another is about to replace it."""
-    if file.is_file():
-        stamp = datetime.fromtimestamp(file.stat().st_mtime, timezone.utc)
-        kept = file.parent / EARLIER / f"{file.stem}-{stamp:%Y%m%dT%H%M%S.%fZ}{file.suffix}"
-        write_whole(kept, file.read_bytes() if content is None else content)

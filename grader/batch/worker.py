@@ -12,18 +12,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
-from grader.batch.files import write_graded
-from grader.batch.grading import RECORDINGS_FOLDER, Grading
 from grader.errors import GraderFault, SubmissionError
+from grader.grading.files import write_graded
+from grader.grading.grading import RECORDINGS_FOLDER, Grading
+from grader.machine import ros
+from grader.machine.resources import cache_folder
+from grader.machine.scratch import Scratch
 from grader.report.model.facts import Clock
-from grader.resources import cache_folder
 from grader.run.admission import Admission
 from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose
-from grader.scratch import Scratch
 from grader.submission.intake.locate import opened
 from grader.submission.kept_source import SOURCE_FOLDER
 from grader.submission.prepare import Prepared, refused

@@ -19,7 +19,7 @@ class Subject(str, Enum):
     """What a check looks at."""
 
     SUBMISSION = "submission"
-    """Packages as handed in and built: a :class:`~grader.submission.record.SubmissionRecord`."""
+    """Packages as handed in and built: a :class:`~grader.recording.submission.SubmissionRecord`."""
     RECORDING = "recording"
     """One run: a :class:`~grader.recording.model.Recording`."""
 

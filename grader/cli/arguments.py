@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from grader import resources
 from grader.errors import UsageError
+from grader.machine import resources
 
 _ARCHIVES = (".zip", ".tar", ".gz", ".tgz", ".rar", ".7z")
 _MANIFESTS = ("package.xml", "*/package.xml", "*/*/package.xml", "*/*/*/package.xml")

@@ -46,7 +46,7 @@ def show(
     from grader.errors import UsageError
     from grader.report.files import refuse_inputs, write_whole
     from grader.report.html.handout import Handout, make_handout, render_handout
-    from grader.ros2_command import absence_note
+    from grader.submission.underlay.ros2_command import absence_note
 
     if out is not None and not html:
         raise UsageError("--out is for the page: add --html")

@@ -16,8 +16,8 @@ from grader.cli.options import Quiet, SandboxChoice, Seed, assignment_places
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
 from grader.errors import UsageError
+from grader.machine.scratch import Scratch
 from grader.sandbox.choice import Choice
-from grader.scratch import Scratch
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -72,17 +72,17 @@ def batch(
     with 0 if every submission was graded, with good or bad grades, and with 3 if one was not.
     """
     from grader.assignment.load import load_assignment
-    from grader.batch.adjusting import ClassAdjustments, course_of
     from grader.batch.batch import Batch
-    from grader.batch.class_files import GRADES_FILE, all_standing, class_rows, write_class
     from grader.batch.executor import DaskExecutor, ExecutorLost, LocalExecutor
     from grader.batch.groups import strangers
     from grader.batch.intake import take_in, take_in_roster
     from grader.batch.ledger import Ledger, TakenFrom
-    from grader.batch.regrading import in_use, load_used
-    from grader.batch.rendering import bring_up_to_date
     from grader.batch.roster import read_roster
+    from grader.batch.used_assignment import in_use, load_used
     from grader.batch.worker import Order, make_grading
+    from grader.gradebook.adjusting import ClassAdjustments, course_of
+    from grader.gradebook.class_files import GRADES_FILE, all_standing, class_rows, write_class
+    from grader.gradebook.rendering import bring_up_to_date
     from grader.report.files import check_folder, refuse_inputs, refuse_part
     from grader.run.admission import Admission
 
@@ -208,7 +208,7 @@ def _said(done: Done) -> str:
 
 
 def _summary(done: Sequence[Done], wall_s: float) -> str:
-    from grader.batch.class_files import class_rows, copies
+    from grader.gradebook.class_files import class_rows, copies
     from grader.report.model.class_row import RowStatus
 
     rows = class_rows(done)

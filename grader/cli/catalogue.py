@@ -43,8 +43,8 @@ def validate(
     from grader.assignment.lint_warnings import lint_warnings
     from grader.assignment.load import load_assignment
     from grader.authoring.mutants.standard import every_mutant
-    from grader.batch.type_support import missing_underlays
     from grader.course.load import COURSE_FILE, load_course
+    from grader.grading.type_support import missing_underlays
     from grader.sandbox.python_tree import not_installed
     from grader.spec.document import write_yaml
 
@@ -143,7 +143,7 @@ def checks(
     from rich.table import Table
 
     from grader.assignment.own_check import all_checks
-    from grader.docs import check_markdown, explanations_markdown
+    from grader.authoring.documentation import check_markdown, explanations_markdown
     from grader.errors import UsageError
     from grader.spec.nearest_name import did_you_mean
 

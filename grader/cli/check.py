@@ -41,12 +41,12 @@ from grader.cli.options import (
 )
 from grader.cli.screen.console import open_page, output_console, say
 from grader.cli.screen.progress import Progress, syntax_errors
-from grader.resources import cache_folder
+from grader.machine.resources import cache_folder
 from grader.sandbox.choice import Choice
 
 if TYPE_CHECKING:
     from grader.recording.model import Recording
-    from grader.submission.record import SubmissionRecord
+    from grader.recording.submission import SubmissionRecord
 
 FULL_POINTS, POINTS_LOST, NOT_GRADED = 0, 1, 3
 
@@ -86,7 +86,7 @@ def check(
 
     Ends with 0 for full points, 1 if points were lost, 3 if it could not be graded.
     """
-    from grader import ros
+    from grader.machine import ros
     from grader.report.files import refuse_inputs
     from grader.report.model.facts import Clock
     from grader.run.runner import Runner
@@ -112,8 +112,8 @@ def check(
             # Imported while the cell gets ready.
             from grader.assignment.load import load_assignment
             from grader.assignment.selection import select, visible_part
-            from grader.batch.files import claim
-            from grader.batch.grading import RECORDINGS_FOLDER, Grading
+            from grader.grading.files import claim
+            from grader.grading.grading import RECORDINGS_FOLDER, Grading
             from grader.report.files import check_folder
             from grader.submission.intake.locate import check_path
             from grader.submission.kept_source import SOURCE_FOLDER, read_source
@@ -138,8 +138,8 @@ def check(
                     on_output=partial(progress.output, "build"),
                     source_folder=report / SOURCE_FOLDER,
                 )
-            from grader.batch.attempts import with_history
-            from grader.batch.files import keep_install, write_graded
+            from grader.grading.attempts import with_history
+            from grader.grading.files import keep_install, write_graded
             from grader.report.text.terminal import print_grade
 
         except KeyboardInterrupt:
@@ -147,7 +147,7 @@ def check(
             raise
         finally:
             runner.close()
-        from grader.ros2_command import absence_note
+        from grader.submission.underlay.ros2_command import absence_note
 
         history = partial(with_history, report)
         result = write_graded(graded, report, clock, json_file, history, submission)
@@ -187,7 +187,7 @@ def _while_it_starts(narrate: Narrate) -> Narrate:
 
 
 def _get_ready() -> None:
-    for module in ("grader.batch.attempts", "grader.report.text.terminal", "rich.syntax"):
+    for module in ("grader.grading.attempts", "grader.report.text.terminal", "rich.syntax"):
         import_module(module)
     from grader.recording import mcap_reader
     from grader.report.html import page

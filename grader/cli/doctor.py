@@ -15,7 +15,7 @@ def doctor() -> None:
     """
     from rich.table import Table
 
-    from grader.prerequisites import diagnose
+    from grader.grading.prerequisites import diagnose
 
     console = output_console()
     table = Table("", "PART", "FOUND", box=None, pad_edge=False)

@@ -38,8 +38,8 @@ app = typer.Typer(
 @app.command()
 def gradescope(assignment: AssignmentName, out: Folder = Path()) -> None:
     """Write the autograder zip for Gradescope."""
-    from grader import export
     from grader.assignment.load import load_assignment
+    from grader.authoring import export
 
     say(f"Upload to Gradescope: {export.gradescope(load_assignment(assignment), out)}")
 
@@ -55,8 +55,8 @@ def github(
     tag: Tag = "",
 ) -> None:
     """Write the workflow for the template repository of an assignment."""
-    from grader import export
     from grader.assignment.load import load_assignment
+    from grader.authoring import export
 
     say(f"Commit and push: {export.github(load_assignment(assignment), out, action, tag)}")
 
@@ -64,8 +64,8 @@ def github(
 @app.command()
 def classroom50(assignment: AssignmentName, out: Folder = Path()) -> None:
     """Write the autograder folder for a Classroom 50 classroom."""
-    from grader import export
     from grader.assignment.load import load_assignment
+    from grader.authoring import export
 
     folder = export.classroom50(load_assignment(assignment), out)
     say(f"Copy its content to CLASSROOM/autograders/ASSIGNMENT/: {folder}")
@@ -86,7 +86,7 @@ def course(
     GitHub workflow, a devcontainer, and a README.
     """
     from grader.assignment.load import load_assignment
-    from grader.course_kit import write_kit
+    from grader.authoring.course_kit import write_kit
 
     kit = write_kit([load_assignment(name) for name in assignments], out, title, tag)
     say(f"Give this folder to your students, for example as a template repository: {kit}")
@@ -98,7 +98,7 @@ def csv(out: Results, output: File = Path("grades.csv")) -> None:
 
     For the folder of a batch, it has the columns and the rows of its grades.csv.
     """
-    from grader.batch.class_files import read_class
+    from grader.gradebook.class_files import read_class
     from grader.report.files import refuse_inputs, write_whole
     from grader.report.formats.gradebook import grades_csv
 
@@ -129,8 +129,8 @@ def canvas(
 
     Ends with 1 if a student has no score in it, and says who and why.
     """
-    from grader.batch.class_files import read_class
     from grader.errors import UsageError
+    from grader.gradebook.class_files import read_class
     from grader.report.files import refuse_inputs, write_whole
     from grader.report.formats.gradebook import canvas_csv, read_canvas
 
@@ -159,7 +159,7 @@ def _write_comments(file: Path, out: Path, scored: Sequence[str]) -> list[str]:
     Returns:
         Who gets none, and why.
     """
-    from grader.batch.feedback import class_feedback
+    from grader.gradebook.feedback import class_feedback
     from grader.report.files import write_whole
     from grader.report.formats.canvas_comments import carrier, upload_zip
 
@@ -191,8 +191,8 @@ def mail(
     mail.mbox is for a mail program, mail.csv for mail merge. The addresses come from the roster
     with which the class was graded. Ends with 1 if a student gets no message, and says who and why.
     """
-    from grader.batch.feedback import class_feedback, letters
     from grader.errors import UsageError
+    from grader.gradebook.feedback import class_feedback, letters
     from grader.report.files import refuse_inputs, write_whole
     from grader.report.formats.mail import address, mail_csv, write_mbox
 
@@ -215,7 +215,7 @@ def feedback(out: ClassFolder, folder: Folder = Path("feedback")) -> None:
 
     Ends with 1 if a student gets none, and says who and why.
     """
-    from grader.batch.feedback import class_feedback, write_files
+    from grader.gradebook.feedback import class_feedback, write_files
     from grader.report.files import refuse_part
 
     refuse_part(folder, out / "submissions", f"the results in {out}")
@@ -234,8 +234,8 @@ def _end(problems: Sequence[str]) -> None:
 
 
 def _read_of(out: Path) -> list[Path]:
-    from grader.batch.class_files import find_reports
-    from grader.batch.files import RESULT_FILE
     from grader.batch.ledger import BATCH_FILE
+    from grader.gradebook.class_files import find_reports
+    from grader.grading.files import RESULT_FILE
 
     return [out / BATCH_FILE, *(folder / RESULT_FILE for folder in find_reports(out))]

@@ -12,10 +12,10 @@ def similar(out: ClassFolder, assignment: UsedAssignment = None) -> None:
 
     Finds copies that were renamed, reordered and reformatted. The page is for the instructor only.
     """
-    from grader.batch.instructor import write_similarity
     from grader.batch.ledger import Ledger
-    from grader.batch.regrading import load_used
+    from grader.batch.used_assignment import load_used
     from grader.findings.wording import counted
+    from grader.gradebook.instructor import write_similarity
 
     ledger = Ledger(out)
     file, found = write_similarity(load_used(ledger, assignment, "similar"), ledger)
@@ -27,10 +27,10 @@ def questions(out: ClassFolder, assignment: UsedAssignment = None, quiet: Quiet 
 
     They are made by rules from the recordings and the source. The page is for the instructor only.
     """
-    from grader.batch.instructor import write_questions
     from grader.batch.ledger import Ledger
-    from grader.batch.regrading import load_used
+    from grader.batch.used_assignment import load_used
     from grader.findings.wording import counted
+    from grader.gradebook.instructor import write_questions
 
     ledger = Ledger(out)
     loaded = load_used(ledger, assignment, "questions")

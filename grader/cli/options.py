@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from grader import resources
 from grader.cli.arguments import assignment_argument
 from grader.cli.screen.progress import Progress
 from grader.errors import UsageError
+from grader.machine import resources
 from grader.report.files import STANDARD_OUTPUT
 from grader.sandbox.choice import Choice
 
@@ -114,7 +114,7 @@ def chosen_names(loaded: LoadedAssignment, chosen: list[str] | None) -> LoadedAs
 
 def chosen_sandbox(choice: Choice, progress: Progress) -> Sandbox | None:
     """The sandbox that was asked for; says which it is, and what of the shell it leaves out."""
-    from grader.ros import find, is_sourced
+    from grader.machine.ros import find, is_sourced
     from grader.sandbox.trial import choose
 
     sandbox, notice = choose(choice, resources.cache_folder())

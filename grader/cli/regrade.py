@@ -51,10 +51,10 @@ def regrade(
 
 def _one(path: Path, assignment: str | None, *, write: bool) -> None:
     from grader.assignment.load import load_assignment
-    from grader.batch.attempts import with_history
-    from grader.batch.files import REPORT_FILE, write_graded
-    from grader.batch.regrading import compare, find, refuse_other, stored_assignment
-    from grader.batch.regrading import regrade as judge_again
+    from grader.grading.attempts import with_history
+    from grader.grading.files import REPORT_FILE, write_graded
+    from grader.grading.regrading import compare, find, refuse_other, stored_assignment
+    from grader.grading.regrading import regrade as judge_again
     from grader.report.model.facts import Clock, RunFacts
     from grader.report.model.result import make_result
     from grader.report.text.terminal import print_grade
@@ -87,9 +87,9 @@ def _one(path: Path, assignment: str | None, *, write: bool) -> None:
 
 
 def _class(batch: Ledger, assignment: str | None, quiet: bool, *, write: bool) -> None:
-    from grader.batch.class_files import GRADES_FILE, class_rows
-    from grader.batch.class_regrading import regrade_class, write_regraded
-    from grader.batch.regrading import load_used
+    from grader.batch.used_assignment import load_used
+    from grader.gradebook.class_files import GRADES_FILE, class_rows
+    from grader.gradebook.class_regrading import regrade_class, write_regraded
 
     began_s = time.monotonic()
     rows = []

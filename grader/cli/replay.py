@@ -10,7 +10,7 @@ import typer
 from grader.cli.arguments import recording_argument
 from grader.cli.options import Quiet
 from grader.cli.screen.progress import Progress
-from grader.resources import cache_folder
+from grader.machine.resources import cache_folder
 
 
 def replay(
@@ -37,13 +37,13 @@ def replay(
     """
     from dataclasses import replace
 
-    from grader import ros
     from grader.assignment.load import load_assignment
-    from grader.batch.regrading import find, stored_assignment
-    from grader.batch.type_support import TypeSupport
     from grader.errors import UsageError
     from grader.grade.judge import why_not_run
     from grader.grade.naming import named
+    from grader.grading.regrading import find, stored_assignment
+    from grader.grading.type_support import TypeSupport
+    from grader.machine import ros
     from grader.recording.mcap_reader import read_recording
     from grader.run.replay import replay as replay_recording
     from grader.run.replay import replay_scenario

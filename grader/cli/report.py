@@ -35,14 +35,14 @@ def report(
     The options of the formats work for one report. For a class, this writes every report, the
     gradebook and the overview, with everything that you wrote in `rosgrade review`.
     """
-    from grader.batch.adjusting import ClassAdjustments, course_of
-    from grader.batch.class_files import all_standing, find_reports, write_class
-    from grader.batch.files import REPORT_FILE, RESULT_FILE
-    from grader.batch.grading import RECORDINGS_FOLDER
     from grader.batch.groups import regroup
     from grader.batch.ledger import Ledger
-    from grader.batch.rendering import bring_up_to_date, render_again
     from grader.errors import UsageError
+    from grader.gradebook.adjusting import ClassAdjustments, course_of
+    from grader.gradebook.class_files import all_standing, find_reports, write_class
+    from grader.gradebook.rendering import bring_up_to_date, render_again
+    from grader.grading.files import REPORT_FILE, RESULT_FILE
+    from grader.grading.grading import RECORDINGS_FOLDER
     from grader.report.files import refuse_inputs
 
     ledger = Ledger.around(out)

@@ -11,7 +11,7 @@ import typer
 from grader.cli.options import Quiet, SandboxChoice, chosen_sandbox
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
-from grader.resources import cache_folder
+from grader.machine.resources import cache_folder
 from grader.sandbox.choice import Choice
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from grader.assignment.load import LoadedAssignment
     from grader.authoring.mutants.selftest import TrialResult
-    from grader.batch.grading import Graded
+    from grader.grading.grading import Graded
 
 
 def selftest(
@@ -56,16 +56,16 @@ def selftest(
     checks that it names. The unchanged starter package must get at most 15 % of the points. Ends
     with 0 only if all of this is true.
     """
-    from grader import ros
     from grader.assignment.load import list_assignments, load_assignment
     from grader.assignment.mutant import CPP, PYTHON, reference_of
     from grader.authoring.mutants.selftest import Role, Setup, Trial, mutation_score, trials
     from grader.authoring.mutants.selftest import selftest as run_selftest
-    from grader.batch.grading import Grading
-    from grader.batch.reference_run import keep_reference
     from grader.errors import UsageError
+    from grader.grading.grading import Grading
+    from grader.grading.reference_run import keep_reference
+    from grader.machine import ros
+    from grader.machine.load import cpu_count
     from grader.report.files import refuse_part
-    from grader.run.host.load import cpu_count
     from grader.run.runner import Runner
     from grader.spec.nearest_name import nearest_or_all
     from grader.submission.underlay.definition import find_underlay

@@ -28,11 +28,11 @@ def start(
 
     You write what it does. Existing files are never overwritten.
     """
-    from grader import ros
     from grader.assignment.load import load_assignment
     from grader.assignment.selection import with_values
-    from grader.prerequisites import remedy_for_cpp
-    from grader.starter import write_starter
+    from grader.authoring.starter import write_starter
+    from grader.grading.prerequisites import remedy_for_cpp
+    from grader.machine import ros
 
     if cpp:
         try:
@@ -77,7 +77,7 @@ def new(
     mistakes that must lose points. Change it step by step. Existing files are never
     overwritten.
     """
-    from grader.scaffold import write_assignment
+    from grader.authoring.scaffold import write_assignment
 
     # A name alone is its own last part, and leaves the folder as it is.
     place = folder / name

@@ -13,7 +13,7 @@ from grader.cli.options import Quiet, SandboxChoice, chosen_sandbox
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
 from grader.errors import UsageError
-from grader.resources import cache_folder
+from grader.machine.resources import cache_folder
 from grader.sandbox.choice import Choice
 
 app = typer.Typer(
@@ -51,11 +51,11 @@ def add(
     Every submission of an assignment that names them in `underlays` can use them. A package that
     ROS already has is not built. After an interruption, the command continues where it stopped.
     """
-    from grader import ros
     from grader.assignment.load import load_assignment
-    from grader.batch.type_support import wanted_underlays
-    from grader.ros2_command import write_command
+    from grader.grading.type_support import wanted_underlays
+    from grader.machine import ros
     from grader.submission.underlay.definition import find_underlay
+    from grader.submission.underlay.ros2_command import write_command
     from grader.submission.underlay.store import UnderlayStore
 
     found = [find_underlay(given) for given in what or ()]
@@ -80,7 +80,7 @@ def list_command() -> None:
     """List the named sets, and what is built for this ROS installation."""
     from rich.table import Table
 
-    from grader import ros
+    from grader.machine import ros
     from grader.submission.underlay.definition import find_underlay, named_sets
     from grader.submission.underlay.store import UnderlayStore
 
@@ -108,9 +108,9 @@ def remove(
     names: Annotated[list[str], typer.Argument(metavar="NAME", help="As `list` shows it.")],
 ) -> None:
     """Remove underlays from this machine; their sources stay."""
-    from grader import ros
-    from grader.ros2_command import write_command
+    from grader.machine import ros
     from grader.spec.nearest_name import nearest_or_all
+    from grader.submission.underlay.ros2_command import write_command
     from grader.submission.underlay.store import UnderlayStore
 
     installation = ros.find()

@@ -30,7 +30,7 @@ from grader.cli.options import (
 )
 from grader.cli.screen.console import open_page, output_console, print_error, say
 from grader.cli.screen.progress import Progress, syntax_errors
-from grader.resources import cache_folder
+from grader.machine.resources import cache_folder
 from grader.sandbox.choice import Choice
 
 if TYPE_CHECKING:
@@ -39,13 +39,13 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from grader.assignment.load import LoadedAssignment
-    from grader.batch.grading import Graded, Grading
     from grader.errors import RosgradeError
+    from grader.grading.grading import Graded, Grading
     from grader.recording.model import Recording
+    from grader.recording.submission import SubmissionRecord
     from grader.report.model.result_model import Result
     from grader.run.runner import Runner
     from grader.server.watch import ReportPage
-    from grader.submission.record import SubmissionRecord
 
 
 def watch(
@@ -73,10 +73,10 @@ def watch(
     changed since the last grade. The report page updates itself. A save during a run starts the run
     again. The files of the assignment are watched too.
     """
-    from grader import ros
     from grader.assignment.load import load_assignment
     from grader.assignment.selection import select, visible_part
-    from grader.batch.files import claim
+    from grader.grading.files import claim
+    from grader.machine import ros
     from grader.report.files import check_folder, refuse_inputs
     from grader.run.runner import Runner
     from grader.server.watch import ReportPage
@@ -133,8 +133,8 @@ class _Work:
     before: Result | None = None
 
     def begin(self) -> None:
-        from grader.batch.grading import Grading
         from grader.errors import RosgradeError
+        from grader.grading.grading import Grading
         from grader.report.text.last_save import failed_scenarios
 
         self.runner.get_ready()
@@ -153,7 +153,7 @@ class _Work:
         )
 
     def grade(self) -> Graded:
-        from grader.batch.grading import RECORDINGS_FOLDER
+        from grader.grading.grading import RECORDINGS_FOLDER
         from grader.submission.kept_source import SOURCE_FOLDER
 
         assert self.grading is not None
@@ -190,7 +190,7 @@ class _Work:
 
     def amended(self, result: Result) -> Result:
         """A result with earlier attempts, and hints that are counted if the author wants it."""
-        from grader.batch.attempts import with_history
+        from grader.grading.attempts import with_history
 
         result = with_history(self.report, result)
         counts = (result.hints_opened or {}) if self.loaded.assignment.count_hints else None
@@ -205,8 +205,8 @@ class _Work:
 
 
 def _follow(work: _Work, page: ReportPage, console: Console) -> None:
-    from grader.batch.files import write_graded
-    from grader.batch.watching import Ended, Step, Watching
+    from grader.grading.files import write_graded
+    from grader.grading.watching import Ended, Step, Watching
     from grader.report.model.facts import Clock
     from grader.report.text.explanation import score
     from grader.report.text.last_save import what_changed

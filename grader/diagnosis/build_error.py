@@ -8,8 +8,8 @@ from pathlib import Path
 from string import Template
 
 from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
+from grader.recording.submission import CPP, EMPTY, PYTHON, PackageRecord, SourceError
 from grader.spec.source import Model, read_source
-from grader.submission.record import CPP, EMPTY, PYTHON, PackageRecord, SourceError
 
 
 @dataclass(frozen=True)

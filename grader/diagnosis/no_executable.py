@@ -9,8 +9,8 @@ from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes
 from grader.findings.words import worded
+from grader.recording.submission import CPP, PYTHON, PackageRecord, SourceError, SubmissionRecord
 from grader.spec.nearest_name import nearest
-from grader.submission.record import CPP, PYTHON, PackageRecord, SourceError, SubmissionRecord
 
 
 @dataclass(frozen=True)

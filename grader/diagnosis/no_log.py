@@ -36,9 +36,9 @@ from grader.measure.printed import (
     shown,
 )
 from grader.recording.model import NS, Endpoint, Kind, LogLine
+from grader.recording.submission import SourceError
 from grader.spec.expression import Expression
 from grader.spec.unit import format_duration
-from grader.submission.record import SourceError
 
 _LOG_LINES = 5
 # Messages that show the same: a single number may be like another by chance.

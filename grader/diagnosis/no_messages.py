@@ -17,8 +17,8 @@ from grader.findings.words import type_in_code, worded
 from grader.measure.compatibility import compatibility_table, refusals, sides
 from grader.measure.declarations import timers, was_held_up
 from grader.recording.model import NS, Endpoint, Kind, Owner, Qos, Recording
+from grader.recording.submission import CPP
 from grader.spec.unit import format_duration
-from grader.submission.record import CPP
 
 # As rclcpp_lifecycle logs it, with the topic in quotes.
 _INACTIVE = "but the publisher is not activated"

@@ -19,8 +19,8 @@ from grader.measure.parameter_calls import calls_to, descriptor, undeclared
 from grader.measure.parameter_calls import names as declared
 from grader.recording.interaction import NO_SERVER
 from grader.recording.model import Call, Recording
+from grader.recording.submission import SourceError
 from grader.spec.nearest_name import nearest
-from grader.submission.record import SourceError
 
 _ANSWER_S = 1.0
 _LAUNCH_FILES = (".py", ".xml", ".yaml", ".yml")

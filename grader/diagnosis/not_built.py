@@ -5,12 +5,19 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
-from grader.bootstrap import COMPILERS
 from grader.diagnosis.build_error import EMPTY_HINT, BuildError
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.findings.finding import Evidence, Finding, Status
 from grader.findings.wording import code, codes
 from grader.findings.words import worded
+from grader.machine.bootstrap import COMPILERS
+from grader.recording.submission import (
+    EMPTY,
+    BuildRecord,
+    PackageRecord,
+    SourceError,
+    SubmissionRecord,
+)
 from grader.spec.name import package_name
 from grader.spec.names import Thing
 from grader.spec.nearest_name import nearest
@@ -18,13 +25,6 @@ from grader.submission.build.build_log import modules_not_found, not_found
 from grader.submission.build.ros_damage import damage_in
 from grader.submission.build.toolchain import apt_package
 from grader.submission.intake.paths import is_within
-from grader.submission.record import (
-    EMPTY,
-    BuildRecord,
-    PackageRecord,
-    SourceError,
-    SubmissionRecord,
-)
 from grader.submission.underlay.definition import ways_to_get
 
 _LOG_LINES = 15

@@ -11,9 +11,9 @@ from grader.diagnosis.not_built import existing_package, why_no_package, why_not
 from grader.findings.finding import Evidence, Finding, Status
 from grader.findings.wording import code, codes
 from grader.recording.interface import DefinitionError, sections_of
+from grader.recording.submission import Definition, PackageRecord, SourceError, SubmissionRecord
 from grader.spec.nearest_name import nearest
 from grader.submission.read.cmake import CMakeCommand, read_commands
-from grader.submission.record import Definition, PackageRecord, SourceError, SubmissionRecord
 
 GROUP = "rosidl_interface_packages"
 GENERATORS = "rosidl_default_generators"

@@ -9,10 +9,10 @@ from grader.diagnosis.mistake import remedy
 from grader.diagnosis.process.exceptions import import_of
 from grader.findings.finding import Evidence, Finding, Table
 from grader.findings.wording import code, codes
+from grader.recording.submission import EMPTY, Import, PackageRecord, SourceError, SubmissionRecord
 from grader.spec.nearest_name import nearest
 from grader.submission.read.dependencies import meant
 from grader.submission.read.includes import CODE
-from grader.submission.record import EMPTY, Import, PackageRecord, SourceError, SubmissionRecord
 
 # Tags that make a package be there when the code runs or is built (REP-149).
 _COUNTING = frozenset(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+from grader.recording.submission import SourceError
 from grader.spec.names import NO_NAMES, Names
 from grader.spec.unit import format_duration
-from grader.submission.record import SourceError
 
 
 class Status(str, Enum):

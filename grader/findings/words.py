@@ -13,7 +13,7 @@ from contextvars import ContextVar
 
 from pydantic.dataclasses import dataclass
 
-from grader.submission.record import CPP, PYTHON
+from grader.recording.submission import CPP, PYTHON
 
 _SPOKEN = ContextVar("language", default=PYTHON)
 

@@ -10,7 +10,7 @@ from grader.findings.finding import Status
 from grader.grade.judge import grade
 from grader.grade.model import CheckResult
 from grader.recording.model import Recording
-from grader.submission.record import SubmissionRecord
+from grader.recording.submission import SubmissionRecord
 
 
 def judge_early(

@@ -29,7 +29,7 @@ from grader.grade.origins import with_origins
 from grader.grade.runtime_imports import with_runtime_imports
 from grader.grade.windowed import judged_in
 from grader.recording.model import Ending, Recording
-from grader.submission.record import CPP, SubmissionRecord
+from grader.recording.submission import CPP, SubmissionRecord
 
 if TYPE_CHECKING:
     # Reading YAML is not needed to judge; a worker of a batch starts without it.

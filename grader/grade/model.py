@@ -9,8 +9,8 @@ from typing import Any
 
 from grader.assignment.model import NOTHING_WITHHELD, Assignment, Visibility, Withheld
 from grader.findings.finding import Finding, Status
+from grader.recording.submission import SubmissionRecord
 from grader.spec.names import Names, Thing
-from grader.submission.record import SubmissionRecord
 
 STEP = Decimal("0.01")
 """What partial credit is rounded to; sums are exact: 0.1 + 0.2 is 0.3."""

@@ -21,11 +21,11 @@ from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes
 from grader.findings.words import worded
 from grader.recording.model import Recording
+from grader.recording.submission import PackageRecord, SourceError, SubmissionRecord
 from grader.spec.name import INTERFACE
 from grader.spec.names import Names, Thing, WrongName
 from grader.spec.nearest_name import meant, nearest
 from grader.submission.read.cmake import read_commands
-from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
 
 if TYPE_CHECKING:
     from grader.assignment.load import LoadedAssignment

@@ -13,7 +13,7 @@ from grader.checks.check import Parameters
 from grader.diagnosis.process.raised import submission_path
 from grader.findings.finding import Finding
 from grader.recording.model import Declaration, Recording
-from grader.submission.record import SourceError
+from grader.recording.submission import SourceError
 
 _MOST = 3
 _LONGEST_NAME = 200

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from grader.diagnosis.process.raised import submission_path
 from grader.recording.model import Recording
+from grader.recording.submission import Import, PackageRecord, SubmissionRecord
 from grader.submission.read.rosdistro import PACKAGES
-from grader.submission.record import Import, PackageRecord, SubmissionRecord
 
 
 def with_runtime_imports(

@@ -32,8 +32,8 @@ from grader.recording.mcap_writer import (
     RawMessage,
 )
 from grader.recording.model import Message, Recording
+from grader.recording.submission import SubmissionRecord, record_of
 from grader.spec.names import old_names
-from grader.submission.record import SubmissionRecord, record_of
 
 # Types of the primitive fields, and of an array of bytes.
 _PLAIN = frozenset({bool, int, float, str, bytes})

@@ -19,8 +19,8 @@ from typing import Any
 from grader.recording.event import Breach, Disturbance, Intervention, Pause, Wait
 from grader.recording.interaction import Asked, Goal, Service
 from grader.recording.simulated import Incident, Scene, Truth
+from grader.recording.submission import SubmissionRecord
 from grader.spec.names import NO_NAMES, Names
-from grader.submission.record import SubmissionRecord
 
 NS = 1_000_000_000
 

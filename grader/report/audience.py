@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from grader.report.model.result_model import Result
 from grader.report.model.student import for_student
-from grader.safe_text import clean
+from grader.spec.safe_text import clean
 
 F = TypeVar("F", bound=Callable[..., Any])
 

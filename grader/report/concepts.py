@@ -12,7 +12,7 @@ from functools import cache
 
 from markupsafe import Markup
 
-from grader import resources
+from grader.machine import resources
 
 FOLDER = resources.root() / "docs" / "concepts"
 STYLE, SCRIPT = "../docs/concepts/concepts.css", "../docs/concepts/concepts.js"

@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from grader.run.host.load import Load, cpu_count
+from grader.machine.load import Load, cpu_count
 from grader.sandbox.limits import raise_open_files
 
 _CELLS_PER_CPU = 24

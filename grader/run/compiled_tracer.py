@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 from grader.errors import GraderFault
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
 from grader.run.environment import TRACER
 
 IN_SANDBOX = Path("/opt/rosgrade_rcl.so")

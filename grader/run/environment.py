@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import grader
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
 from grader.run.process.process_sandbox import HOME
 
 _HERE = Path(__file__).resolve().parent

@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from grader.errors import UsageError
+from grader.machine.ros import RosInstallation
+from grader.machine.scratch import Scratch
 from grader.recording.mcap_reader import read_inputs, read_recording
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import NS, Ending, Kind, Owner, Qos, Recording
-from grader.ros import RosInstallation
 from grader.run.runner import Runner, RunRequest
-from grader.safe_text import clean, one_line
-from grader.scratch import Scratch
+from grader.spec.safe_text import clean, one_line
 
 if TYPE_CHECKING:
     from grader.assignment.model import Assignment, Scenario

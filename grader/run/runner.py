@@ -14,24 +14,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from grader.errors import GraderFault
+from grader.machine.load import cpu_count
+from grader.machine.resources import cache_folder
+from grader.machine.ros import RosInstallation
 from grader.recording.interface import definition_finder
 from grader.recording.mcap_writer import write_recording
 from grader.recording.model import to_json
-from grader.resources import cache_folder
-from grader.ros import RosInstallation
+from grader.recording.submission import SubmissionRecord
 from grader.run.admission import Admission
 from grader.run.cell.cell_process import SCRATCH, CellProcess
 from grader.run.cell.middleware_hang import MiddlewareHung, hung_recording
 from grader.run.cell.prefork_server import SIMULATOR_MODULE, PreforkServer
 from grader.run.compiled_tracer import compiled_tracer, has_compiled_programs
 from grader.run.environment import RMW, student_environment
-from grader.run.host.load import cpu_count
 from grader.run.imposing.mistake import Mistake, with_mistakes
 from grader.run.order import CellOrder, ProcessCommand, RunLimits, SimulatorOrder, Topic, Until
 from grader.run.sandboxed_order import sandboxed
 from grader.sandbox.python_tree import unlisted
 from grader.spec.names import NO_NAMES, Names, Thing
-from grader.submission.record import SubmissionRecord
 
 if TYPE_CHECKING:
     from grader.assignment.model import Assignment, Launch, Scenario

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
 from grader.run.compiled_tracer import IN_SANDBOX
 from grader.run.environment import TRACER, TRACER_IN_SANDBOX, sandboxed_environment
 from grader.run.imposing.mistake import IN_SANDBOX as MUTATION_IN_SANDBOX

@@ -22,8 +22,8 @@ from importlib import metadata
 from pathlib import Path
 
 from grader.errors import GraderFault
+from grader.machine.tree import listing
 from grader.spec.nearest_name import did_you_mean
-from grader.tree import listing
 
 VERSION = 3
 

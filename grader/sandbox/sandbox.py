@@ -16,7 +16,7 @@ from pathlib import Path
 import grader
 import sim
 from grader.errors import GraderFault
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.limits import BUILD, SandboxLimits, size_words

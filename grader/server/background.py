@@ -7,10 +7,10 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 
 from grader.assignment.load import LoadedAssignment
-from grader.batch.class_files import all_standing, write_class
-from grader.batch.class_regrading import Regraded, regrade_class, write_regraded
-from grader.batch.rendering import bring_up_to_date
 from grader.errors import RosgradeError
+from grader.gradebook.class_files import all_standing, write_class
+from grader.gradebook.class_regrading import Regraded, regrade_class, write_regraded
+from grader.gradebook.rendering import bring_up_to_date
 from grader.server.reviewed_class import ReviewedClass
 
 

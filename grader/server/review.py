@@ -15,10 +15,10 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
-from grader.batch.class_files import INSTRUCTOR_FOLDER
-from grader.batch.edited_assignment import load_before, new_place, with_text
 from grader.errors import RosgradeError, UsageError
 from grader.findings.finding import Status
+from grader.gradebook.class_files import INSTRUCTOR_FOLDER
+from grader.gradebook.edited_assignment import load_before, new_place, with_text
 from grader.report.files import folder_name
 from grader.report.html.overview import render_overview
 from grader.report.html.page import environment, render_page

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
-from grader.batch.adjusting import ClassAdjustments
 from grader.batch.batch import Done
-from grader.batch.class_files import class_rows, standing
-from grader.batch.files import RESULT_FILE
 from grader.batch.ledger import BATCH_FILE, Entry, Ledger
-from grader.batch.regrading import load_used
+from grader.batch.used_assignment import load_used
 from grader.errors import RosgradeError, UsageError
+from grader.gradebook.adjusting import ClassAdjustments
+from grader.gradebook.class_files import class_rows, standing
+from grader.grading.files import RESULT_FILE
 from grader.report.files import file_version, folder_name
 from grader.report.model.class_row import ClassRow
 from grader.report.model.cluster import Cluster, clusters

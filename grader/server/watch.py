@@ -17,7 +17,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
-from grader.batch.files import RESULT_FILE
+from grader.grading.files import RESULT_FILE
 from grader.report.files import write_whole
 from grader.report.model.result import read_result, result_json
 from grader.report.model.result_model import Result

@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.errors import SubmissionError
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
+from grader.machine.tree import listing
+from grader.recording.submission import SubmissionRecord
 from grader.submission.build.build import Builder, once_more
 from grader.submission.build.build_cache import BuildCache
 from grader.submission.build.build_error_location import Sources
@@ -29,9 +31,7 @@ from grader.submission.read.document import read_headings
 from grader.submission.read.package import Package, read_package, record_packages
 from grader.submission.read.parameter_file import read_parameter_files
 from grader.submission.read.source import Allowance
-from grader.submission.record import SubmissionRecord
 from grader.submission.underlay.store import UnderlayStore
-from grader.tree import listing
 
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox

@@ -14,7 +14,7 @@ from grader.checks.check import Check, NoParameters, Parameters, Subject
 from grader.checks.need import Recorded, Submitted
 from grader.errors import AssignmentError, GraderFault
 from grader.findings.finding import Finding
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
 from grader.spec.name import InterfaceName, TopicName
 from grader.spec.quantity import Duration
 from tests.assignment.lessons import GOOD
@@ -131,6 +131,6 @@ def ros_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., N
                 raise GraderFault("no ROS 2 found")
             return RosInstallation("wheels", Path("python"), (prefix,))
 
-        monkeypatch.setattr("grader.ros.find", find)
+        monkeypatch.setattr("grader.machine.ros.find", find)
 
     return install

@@ -8,7 +8,6 @@ from xml.etree import ElementTree
 
 import pytest
 
-from grader import resources
 from grader.assignment.load import LoadedAssignment, list_assignments, load_assignment
 from grader.assignment.mutant import (
     CPP,
@@ -21,6 +20,7 @@ from grader.assignment.mutant import (
 )
 from grader.authoring.mutants.standard import with_standard_mutants
 from grader.checks.check import Subject
+from grader.machine import resources
 
 PUBLISHERS = ("simple_publisher", "timed_publisher")
 

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from grader.assignment.contract.expand import expanded, plain
 from grader.assignment.load import load_assignment
+from grader.authoring.visible_files import visible_files
 from grader.errors import AssignmentError
 from grader.report.html.handout import make_handout
 from grader.spec.document import write_yaml
 from grader.spec.source import parse_source
-from grader.visible_files import visible_files
 
 GOOD = """\
 rosgrade: 1

@@ -8,13 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from grader import docs, resources
 from grader.assignment.own_check import all_checks, load_own_check
+from grader.authoring import documentation
 from grader.checks.check import Check
+from grader.dev import docs
 from grader.findings.finding import Evidence, Finding
+from grader.machine import resources
 from grader.recording.interaction import Goal
 from grader.recording.model import Endpoint, Message, Recording
 from grader.recording.simulated import Scene, Truth
+
+PAGE = documentation.assignment_markdown()["assignment-yaml.md"]
 
 
 def test_the_files_in_docs_are_up_to_date(capsys: pytest.CaptureFixture[str]) -> None:
@@ -26,7 +30,7 @@ def test_a_stale_or_missing_file_is_reported_and_mended(
 ) -> None:
     arguments = ["--folder", str(tmp_path)]
     assert docs.main(["--check", *arguments]) == 1
-    assert f"{tmp_path / 'checks.md'} is stale: run python -m grader.docs" in (
+    assert f"{tmp_path / 'checks.md'} is stale: run python -m grader.dev.docs" in (
         capsys.readouterr().err
     )
     assert not list(tmp_path.iterdir())
@@ -37,7 +41,7 @@ def test_a_stale_or_missing_file_is_reported_and_mended(
 
 
 def test_every_check_is_described_with_all_its_parameters() -> None:
-    text = "\n".join(docs.checks_markdown().values())
+    text = "\n".join(documentation.checks_markdown().values())
     for check in all_checks().values():
         section = text.split(f"## {check.name}\n")[1].split("\n## ")[0]
         for name, field in check.parameters.model_fields.items():
@@ -45,7 +49,7 @@ def test_every_check_is_described_with_all_its_parameters() -> None:
 
 
 def test_links_lead_to_headings() -> None:
-    pages = docs.assignment_markdown()
+    pages = documentation.assignment_markdown()
     headings = {
         f"{name}#{re.sub(r'[^a-z0-9_ -]', '', line.lstrip('# ').lower()).replace(' ', '-')}"
         for name, text in pages.items()
@@ -58,7 +62,7 @@ def test_links_lead_to_headings() -> None:
 
 
 def test_a_link_to_a_check_still_leads_to_it() -> None:
-    pages = docs.checks_markdown()
+    pages = documentation.checks_markdown()
     for check in all_checks().values():
         anchor = check.name.replace(".", "").lower()
         found = re.search(rf'<a id="{anchor}"></a>\[.*?\]\(([^)#]*)#{anchor}\)', pages["checks.md"])
@@ -69,7 +73,7 @@ def test_a_value_is_described_in_the_words_of_yaml(catalogue: dict[str, Check]) 
     text = docs.check_markdown(catalogue["timing.period"])
     assert "| `topic` | topic, such as `/cmd_vel` | required |  |" in text
     assert "| `period` | time, such as `300 ms` | required |" in text
-    text = docs.assignment_markdown()["assignment-yaml.md"]
+    text = PAGE
     assert "| `discovery` | time, such as `300 ms` | `10 s` |" in text
     assert "| `ament_python`, `ament_cmake`, or a list of both | `[ament_python]` |" in text
     assert "| `launch` | list of [launch](assignment-yaml.md#launch) | required |" in text
@@ -77,7 +81,9 @@ def test_a_value_is_described_in_the_words_of_yaml(catalogue: dict[str, Check]) 
 
 def test_the_example_of_an_own_check_works(tmp_path: Path) -> None:
     (code,) = re.findall(
-        r"```python\n(.*?)```", docs.assignment_markdown()["assignment-yaml.md"], flags=re.DOTALL
+        r"```python\n(.*?)```",
+        PAGE,
+        flags=re.DOTALL,
     )
     (tmp_path / "checks.py").write_text(code)
     check = load_own_check("checks.py:drives_straight", tmp_path)
@@ -95,9 +101,7 @@ def test_the_example_of_an_own_check_works(tmp_path: Path) -> None:
 
 def test_the_example_in_the_documentation_is_the_shipped_assignment() -> None:
     file = resources.assignments() / "timed_publisher" / "assignment.yaml"
-    assert (
-        file.read_text(encoding="utf-8").strip() in docs.assignment_markdown()["assignment-yaml.md"]
-    )
+    assert file.read_text(encoding="utf-8").strip() in PAGE
 
 
 def test_the_page_of_the_recording_describes_every_part_of_it() -> None:
@@ -110,6 +114,6 @@ def test_the_page_of_the_recording_describes_every_part_of_it() -> None:
 
 def test_every_table_of_keys_has_rows() -> None:
     header = "| key | value | default | meaning |\n| --- | --- | --- | --- |\n"
-    for name, text in docs.documents().items():
+    for name, text in documentation.documents().items():
         for part in text.split(header)[1:]:
             assert part.startswith("| `"), f"{name}: an empty table"

@@ -301,7 +301,7 @@ def test_a_file_of_another_name_may_have_any_id(write: Write, catalogue: Catalog
 def lesson(write: Write, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The YAML of the only assignment that rosgrade has."""
     file = write() / "assignment.yaml"
-    monkeypatch.setattr("grader.resources.assignments", lambda: file.parent.parent)
+    monkeypatch.setattr("grader.machine.resources.assignments", lambda: file.parent.parent)
     return file
 
 

@@ -33,11 +33,11 @@ from annotated_types import Len
 from markdown_it import MarkdownIt
 from pydantic import BaseModel, ConfigDict
 
-from grader import resources
 from grader.assignment.contract.derive import Derivation
 from grader.assignment.contract.model import Contract
 from grader.assignment.contract.table import rows
 from grader.assignment.load import LoadedAssignment, list_assignments, load_assignment
+from grader.machine import resources
 from grader.report.html.handout import make_handout
 
 TABLES = Path(__file__).with_name("promises")

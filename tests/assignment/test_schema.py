@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from grader import resources
 from grader.assignment.load import load_assignment
 from grader.assignment.mutant import PYTHON
 from grader.assignment.schema import assignment_schema, mutants_schema
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check
 from grader.errors import AssignmentError
+from grader.machine import resources
 from grader.spec.source import parse_source, read_source
 from tests.assignment.lessons import GOOD, HEAD
 from tests.assignment.validator import valid

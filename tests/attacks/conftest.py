@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from grader import ros
+from grader.machine import ros
 from grader.assignment.load import load_assignment
-from grader.batch.grading import Grading
+from grader.grading.grading import Grading
 from grader.run.runner import Runner
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox

@@ -16,12 +16,12 @@ from typing import Any
 
 import pytest
 
-from grader import ros
+from grader.machine import ros
 from grader.assignment.load import load_assignment
 from grader.batch.batch import Batch, Done
 from grader.batch.executor import LocalExecutor
-from grader.batch.files import REPORT_FILE
-from grader.batch.grading import Grading
+from grader.grading.files import REPORT_FILE
+from grader.grading.grading import Grading
 from grader.batch.intake import take_in
 from grader.batch.ledger import Ledger
 from grader.findings.finding import Status

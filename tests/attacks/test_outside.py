@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.batch.grading import Grading
+from grader.grading.grading import Grading
 from grader.run.process.descendants import descendants
 from grader.run.process.process_sandbox import WORKSPACE
 from tests.attacks.submissions import write_submission

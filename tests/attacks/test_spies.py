@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.batch.grading import Grading
+from grader.grading.grading import Grading
 from grader.findings.finding import Status
 from tests.attacks.conftest import Targets
 from tests.attacks.submissions import write_submission

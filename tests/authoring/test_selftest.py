@@ -11,13 +11,13 @@ from collections.abc import Iterator
 
 import pytest
 
-from grader import resources, ros
 from grader.assignment.load import list_assignments, load_assignment
 from grader.assignment.mutant import reference_of
 from grader.authoring.mutants.selftest import Role, Setup, mutation_score, selftest, trials
-from grader.batch.grading import Grading
-from grader.batch.type_support import missing_underlays
-from grader.run.host.load import cpu_count
+from grader.grading.grading import Grading
+from grader.grading.type_support import missing_underlays
+from grader.machine import resources, ros
+from grader.machine.load import cpu_count
 from grader.run.runner import Runner
 
 LEAST_MUTANTS = 12

@@ -14,20 +14,20 @@ from pathlib import Path
 
 import pytest
 
-from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.variable import Variable
 from grader.batch.batch import Batch, Done
-from grader.batch.class_files import NO_RESULT, all_standing, class_rows, copies, find_reports
 from grader.batch.executor import BatchExecutor, ExecutorLost, LocalExecutor
-from grader.batch.files import RESULT_FILE
-from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
 from grader.batch.handed_in import HandedIn
 from grader.batch.intake import take_in
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.roster import parse_roster
 from grader.errors import GraderFault, UsageError
 from grader.findings.finding import Status
+from grader.gradebook.class_files import NO_RESULT, all_standing, class_rows, copies, find_reports
+from grader.grading.files import RESULT_FILE
+from grader.grading.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
+from grader.machine import ros
 from grader.report.model.result import make_result
 from grader.run.runner import Runner
 from grader.submission.kept_source import SOURCE_FOLDER, read_source

@@ -16,20 +16,21 @@ from pathlib import Path
 import pytest
 
 from grader.assignment.load import LoadedAssignment, load_assignment
-from grader.batch.adjusting import course_of
 from grader.batch.batch import Batch, Done
-from grader.batch.class_files import read_class, standing, write_class
-from grader.batch.class_regrading import regrade_class
-from grader.batch.files import REPORT_FILE, RESULT_FILE, STUDENT_FILE, write_graded
-from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.batch.groups import regroup, strangers
 from grader.batch.intake import take_in
 from grader.batch.ledger import Entry, Ledger
-from grader.batch.regrading import find, regrade
-from grader.batch.rendering import bring_up_to_date
 from grader.batch.roster import parse_roster
 from grader.errors import UsageError
+from grader.gradebook.adjusting import course_of
+from grader.gradebook.class_files import read_class, standing, write_class
+from grader.gradebook.class_regrading import regrade_class
+from grader.gradebook.rendering import bring_up_to_date
+from grader.grading.files import REPORT_FILE, RESULT_FILE, STUDENT_FILE, write_graded
+from grader.grading.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
+from grader.grading.regrading import find, regrade
 from grader.recording.model import to_json
+from grader.recording.submission import PackageRecord, SubmissionRecord
 from grader.report.files import write_whole
 from grader.report.model.class_row import ClassRow
 from grader.report.model.facts import Clock
@@ -38,7 +39,6 @@ from grader.review.model import Given, StudentReview
 from grader.review.store import ReviewStore
 from grader.submission.intake.locate import opened
 from grader.submission.prepare import fingerprint
-from grader.submission.record import PackageRecord, SubmissionRecord
 
 YAML = """\
 rosgrade: 1

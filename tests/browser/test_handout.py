@@ -10,8 +10,8 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, expect
 
 from grader.assignment.load import load_assignment
-from grader.batch.files import RESULT_FILE
 from grader.findings.finding import Finding
+from grader.grading.files import RESULT_FILE
 from grader.report.html.handout import make_handout, render_handout
 from grader.report.model.result import read_result, result_json
 from grader.server.watch import ReportPage

@@ -7,10 +7,10 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
 from grader.assignment.load import load_assignment
-from grader.batch.instructor import write_questions, write_similarity
-from grader.resources import assignments
-from tests.batch.test_instructor import NODE, OTHER, graded
-from tests.similarity.copies import renamed
+from grader.gradebook.instructor import write_questions, write_similarity
+from grader.machine.resources import assignments
+from tests.gradebook.similarity.copies import renamed
+from tests.gradebook.test_instructor import NODE, OTHER, graded
 
 pytestmark = pytest.mark.slow
 WRITE = {"similarity": write_similarity, "questions": write_questions}

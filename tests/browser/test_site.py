@@ -16,7 +16,7 @@ import pytest
 from axe_playwright_python.base import AXE_SCRIPT
 from playwright.sync_api import Browser, Page, expect
 
-from grader import resources
+from grader.machine import resources
 
 pytestmark = pytest.mark.slow
 REPOSITORY = "https://github.com/example/rosgrade"

@@ -3,7 +3,7 @@
 import pytest
 
 from grader.findings.finding import Status
-from grader.submission.record import BagRecord, BagTopic
+from grader.recording.submission import BagRecord, BagTopic
 from tests.checks.builder import failing, judge, package, submission
 
 TWIST = "geometry_msgs/msg/Twist"

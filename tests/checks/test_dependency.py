@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from grader.findings.finding import Status
 from grader.grade.runtime_imports import with_runtime_imports
-from grader.submission.record import Dependency, Import, SourceError, SourceFile
+from grader.recording.submission import Dependency, Import, SourceError, SourceFile
 from tests.checks.builder import (
     INSTALLED,
     SOURCE,

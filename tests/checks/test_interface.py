@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from grader.findings.finding import Finding, Status
-from grader.submission.record import BuildRecord, Definition, Dependency, PackageRecord
+from grader.recording.submission import BuildRecord, Definition, Dependency, PackageRecord
 from tests.checks import builder
 from tests.checks.builder import failing, judge, package, submission
 

@@ -7,7 +7,7 @@ import pytest
 from grader.findings.finding import Status
 from grader.recording.event import Breach, Intervention, Wait
 from grader.recording.model import Ending, Kind, Owner
-from grader.submission.record import BuildRecord, SourceError, SourceFile, SourceFunction
+from grader.recording.submission import BuildRecord, SourceError, SourceFile, SourceFunction
 from tests.checks.builder import (
     BOT,
     INSTALLED,

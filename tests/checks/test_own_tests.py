@@ -3,9 +3,9 @@
 import pytest
 
 from grader.findings.finding import Status
+from grader.recording.submission import BuildRecord, PytestRecord
 from grader.submission.build.bounded import Outcome
 from grader.submission.build.own_tests import pytest_record
-from grader.submission.record import BuildRecord, PytestRecord
 from tests.checks.builder import failing, judge, submission
 
 NAME = "bot_publisher"

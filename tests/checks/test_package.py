@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from grader.findings.finding import Status
-from grader.submission.record import BuildRecord, Dependency, SourceError
+from grader.recording.submission import BuildRecord, Dependency, SourceError
 from tests.checks.builder import failing, judge, package, submission
 
 NAME = "bot_publisher"

@@ -5,8 +5,8 @@ import ast
 import pytest
 
 from grader.findings.finding import Status
+from grader.recording.submission import Lint, LintFinding, SourceError
 from grader.submission.read.outline import outline
-from grader.submission.record import Lint, LintFinding, SourceError
 from tests.checks.builder import failing, judge, package, submission
 
 PACKAGE = {"package": "bot_publisher"}

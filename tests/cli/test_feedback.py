@@ -16,8 +16,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.batch.files import RESULT_FILE
 from grader.batch.ledger import Entry, Ledger
+from grader.grading.files import RESULT_FILE
 from grader.report.formats.canvas_comments import carrier, upload_zip
 from grader.report.model.result import result_json
 from grader.report.model.result_model import AdjustmentPart

@@ -11,22 +11,22 @@ from pathlib import Path
 import pytest
 
 from grader.assignment.load import LoadedAssignment, load_assignment
-from grader.batch.class_files import standing, write_class
-from grader.batch.files import write_graded
-from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.batch.ledger import Entry, Ledger
 from grader.grade import grade
+from grader.gradebook.class_files import standing, write_class
+from grader.grading.files import write_graded
+from grader.grading.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.recording.mcap_writer import write_recording
 from grader.recording.model import to_json
+from grader.recording.submission import SubmissionRecord
 from grader.report.model.cause import cause
 from grader.report.model.facts import Clock
 from grader.report.model.result import read_result
 from grader.review.model import ClassReview, Comment, Forgiven, ManualScore, StudentReview
 from grader.review.store import ReviewStore
 from grader.submission.prepare import Prepared
-from grader.submission.record import SubmissionRecord
-from tests.batch.test_grading import recording
 from tests.cli.conftest import ROOT, Rosgrade
+from tests.grading.test_grading import recording
 
 YAML = """\
 rosgrade: 1

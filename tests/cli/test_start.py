@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader import ros
+from grader.machine import ros
 from tests.cli.conftest import Rosgrade
 
 

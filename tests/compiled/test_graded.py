@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import pytest
 
-from grader import resources, ros
 from grader.assignment.load import load_assignment
 from grader.assignment.mutant import CPP, PYTHON
 from grader.authoring.mutants.selftest import Role, Setup, TrialResult, selftest, trials
-from grader.batch.grading import Graded, Grading
 from grader.findings.finding import Status
-from grader.run.host.load import cpu_count
+from grader.grading.grading import Graded, Grading
+from grader.machine import resources, ros
+from grader.machine.load import cpu_count
 from grader.run.runner import Runner
 from tests.compiled.packages import MUTANTS, node, write_package
 

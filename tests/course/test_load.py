@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from grader import resources
 from grader.course.load import Course, load_course
 from grader.course.model import CourseFile
 from grader.errors import AssignmentError, UsageError
+from grader.machine import resources
 from grader.spec.document import parse_yaml
 
 WHOLE = """\

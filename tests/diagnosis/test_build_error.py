@@ -6,7 +6,7 @@ import pytest
 
 from grader.diagnosis.build_error import TABLE, BuildError, Row
 from grader.diagnosis.explanation import cause_of, explanations
-from grader.submission.record import EMPTY, SourceError
+from grader.recording.submission import EMPTY, SourceError
 from tests.checks.builder import package
 
 

@@ -10,7 +10,7 @@ import pytest
 from grader.findings.words import speaking
 from grader.measure.declarations import hides_calls, is_compiled
 from grader.recording.model import Declaration, Kind
-from grader.submission.record import CPP
+from grader.recording.submission import CPP
 from tests.checks.builder import (
     BOT,
     declarations,

@@ -18,7 +18,7 @@ from grader.diagnosis.explanation import Symptom, explanations
 from grader.diagnosis.process.exceptions import Row
 from grader.recording.event import Breach
 from grader.recording.model import Ending, Kind, Recording
-from grader.submission.record import (
+from grader.recording.submission import (
     BuildRecord,
     SourceClass,
     SourceError,

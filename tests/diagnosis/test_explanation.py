@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
+from grader.authoring.documentation import explanations_markdown
 from grader.diagnosis.explanation import Explanation, cause_of, explanations, in_order
 from grader.diagnosis.no_messages import FewMessages, NoMessages
 from grader.diagnosis.process.exceptions import CPP_ROWS, TABLE, Raised, Row
 from grader.diagnosis.process.failure import Failure, Frame
 from grader.diagnosis.process.process_exit import why_it_exited
-from grader.docs import explanations_markdown
-from grader.submission.record import SourceFile
+from grader.recording.submission import SourceFile
 from tests.checks.builder import (
     INSTALLED,
     SOURCE,

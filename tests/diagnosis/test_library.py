@@ -9,7 +9,7 @@ import pytest
 from grader.diagnosis.process import missing_library
 from grader.diagnosis.process.failure import Failure
 from grader.recording.model import Ending, Recording
-from grader.submission.record import PackageRecord, SourceFile, SubmissionRecord
+from grader.recording.submission import PackageRecord, SourceFile, SubmissionRecord
 
 
 def lacking_package(message: str, recording: Recording) -> str | None:

@@ -9,10 +9,10 @@ from string import Template
 
 import pytest
 
-from grader import resources
 from grader.diagnosis.mistake import TABLE, mistaken, remedy
 from grader.findings.words import TERMS, Words, speaking
-from grader.submission.record import CPP
+from grader.machine import resources
+from grader.recording.submission import CPP
 
 MISTAKES = {name: one for about in TABLE.values() for name, one in about.items()}
 

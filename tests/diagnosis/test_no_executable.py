@@ -3,7 +3,7 @@
 import pytest
 
 from grader.diagnosis.no_executable import why_no_executable
-from grader.submission.record import SourceError
+from grader.recording.submission import SourceError
 from tests.checks.builder import package, submission
 
 FOLDER = "$base/lib/bot_publisher"

@@ -6,8 +6,8 @@ import pytest
 
 from grader.diagnosis.no_parameter import why_not_taken
 from grader.findings.finding import Status
+from grader.recording.submission import ParameterFile
 from grader.submission.read.parameter_file import nodes_in
-from grader.submission.record import ParameterFile
 from tests.checks.builder import failing, judge, node, package, process, recording, submission
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from grader.findings.finding import Status
 from grader.recording.model import Declaration, Kind, Recording
-from grader.submission.record import BuildRecord, SourceFile, SourceFunction
+from grader.recording.submission import BuildRecord, SourceFile, SourceFunction
 from tests.checks.builder import (
     INSTALLED,
     SOURCE,

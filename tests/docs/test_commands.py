@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 import typer.main
 
-from grader import resources
 from grader.cli.app import app
+from grader.machine import resources
 
 ROOT = resources.root()
 INDENTED = re.compile(r"^ {4,}(rosgrade .*)$", re.MULTILINE)

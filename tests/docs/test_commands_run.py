@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pytest
 
-from grader import resources
 from grader.assignment.load import load_assignment
 from grader.assignment.mutant import apply, load_mutants
-from grader.demo import ASSIGNMENT, BROKEN
+from grader.dev.demo import ASSIGNMENT, BROKEN
+from grader.machine import resources
 
 ROOT = resources.root()
 # They are followed step by step in tests of their own.

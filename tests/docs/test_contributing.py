@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from grader import resources
+from grader.machine import resources
 
 ROOT = resources.root()
 PAGE = (ROOT / "docs" / "contributing.md").read_text(encoding="utf-8")
@@ -113,7 +113,7 @@ def test_a_new_stimulus_is_valid_described_and_played(copy: Path) -> None:
     assert '"Let time pass, so that' in rosgrade(copy, "schema")
     python(
         copy,
-        "from grader.docs import assignment_markdown\n"
+        "from grader.authoring.documentation import assignment_markdown\n"
         "from grader.run.stimuli.player import PLAYS\n"
         "assert '## wait' in assignment_markdown()['stimuli.md']\n"
         "assert 'Wait' in [model.__name__ for model in PLAYS]\n",

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from grader import resources
+from grader.machine import resources
 from tests.recording.written import write_robot_run
 
 PAGE = resources.PACKAGE.parent / "docs" / "other-tools.md"

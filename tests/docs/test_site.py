@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from grader import resources
 from grader.assignment.contract.table import rows
 from grader.assignment.load import list_assignments, load_assignment
+from grader.machine import resources
 
 ROOT = resources.root()
 # The site takes five seconds of a processor, which others may hold.

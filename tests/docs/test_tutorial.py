@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader import resources
+from grader.machine import resources
 from tests.docs.tutorial import Command, WriteFile, run, steps
 
 PAGE = resources.root() / "docs" / "tutorial.md"

@@ -14,7 +14,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader import resources
 from grader.assignment.load import list_assignments, load_assignment
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import NoParameters, Subject
@@ -25,7 +24,8 @@ from grader.findings.finding import Finding, Status
 from grader.findings.words import SPIN_NODE, Words, speaking
 from grader.grade import grade
 from grader.grade.model import CheckResult
-from grader.submission.record import CPP, PYTHON, PackageRecord, SourceFile
+from grader.machine import resources
+from grader.recording.submission import CPP, PYTHON, PackageRecord, SourceFile
 from tests.checks.builder import endpoint, judge, output, package, recording, submission
 from tests.grade.sample import FAIL, Told, make_loaded, make_recording, make_submission
 

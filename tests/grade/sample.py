@@ -13,7 +13,7 @@ from grader.assignment.model import Assignment, CheckSpec, Launch, Package, Scen
 from grader.checks.check import Check, NoParameters, Parameters, Subject
 from grader.findings.finding import Finding
 from grader.recording.model import NS, Ending, Process, Recording
-from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
+from grader.recording.submission import BuildRecord, PackageRecord, SubmissionRecord
 
 LAUNCHED_NS = 1_760_000_000 * NS
 PASS = Finding.passed("a node /bot_publisher", "/bot_publisher")

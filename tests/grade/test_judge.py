@@ -12,10 +12,10 @@ from grader.grade import grade
 from grader.recording.event import Disturbance
 from grader.recording.model import NS, Call, Ending, Node, Owner
 from grader.recording.simulated import Truth
+from grader.recording.submission import BuildRecord, Import, PackageRecord, SourceError
 from grader.report.model.facts import RunFacts
 from grader.report.model.result import make_result
 from grader.spec.names import Names, Thing, WrongName
-from grader.submission.record import BuildRecord, Import, PackageRecord, SourceError
 from tests.grade.sample import (
     FAIL,
     LAUNCHED_NS,

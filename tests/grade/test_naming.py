@@ -18,7 +18,7 @@ from grader.grade import Grade, grade
 from grader.grade.naming import named
 from grader.recording.interaction import Service
 from grader.recording.model import Recording
-from grader.submission.record import BuildRecord, Definition, PackageRecord, SubmissionRecord
+from grader.recording.submission import BuildRecord, Definition, PackageRecord, SubmissionRecord
 from tests.checks.builder import recording
 
 TOGGLE = "std_srvs/srv/SetBool"

@@ -15,7 +15,7 @@ from grader.checks.topic.topic import Topic
 from grader.findings.finding import Evidence, Finding
 from grader.grade.origins import with_origins
 from grader.recording.model import Recording
-from grader.submission.record import PackageRecord, SourceError
+from grader.recording.submission import PackageRecord, SourceError
 from tests.checks.builder import declared
 from tests.grade.sample import make_recording, make_submission
 from tests.report.gallery import ahead_until

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader import ros
+from grader.machine import ros
 from grader.recording.interface import (
     Constant,
     DefinitionError,

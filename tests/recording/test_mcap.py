@@ -32,7 +32,7 @@ from grader.recording.model import (
     Recording,
 )
 from grader.recording.simulated import Incident, Scene, Truth
-from grader.submission.record import (
+from grader.recording.submission import (
     BuildRecord,
     Lint,
     LintFinding,

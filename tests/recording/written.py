@@ -10,7 +10,7 @@ from grader.recording.mcap_reader import read_recording
 from grader.recording.mcap_writer import RawMessage, write_recording
 from grader.recording.model import NS, Ending, LogLine, Recording
 from grader.recording.simulated import Truth
-from grader.submission.record import SubmissionRecord
+from grader.recording.submission import SubmissionRecord
 
 BEGAN_NS = 1_700_000_000 * NS
 TWIST = """\

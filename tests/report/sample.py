@@ -15,13 +15,13 @@ from grader.findings.finding import Evidence, Finding, Moment, Plot, Table
 from grader.grade import Grade, grade
 from grader.recording.event import Breach, Disturbance
 from grader.recording.model import NS, Call, LogLine, Message, Node, Owner, Process, Recording
+from grader.recording.submission import BuildRecord, SourceError, SubmissionRecord
 from grader.report.html.replay import Replay
 from grader.report.html.report import render_report
 from grader.report.model.facts import RunFacts
 from grader.report.model.result import make_result
 from grader.report.model.result_model import AdjustmentPart, AttemptPart, CommentPart, Result
 from grader.report.text.terminal import print_grade
-from grader.submission.record import BuildRecord, SourceError, SubmissionRecord
 from tests.grade.sample import (
     LAUNCHED_NS,
     Told,

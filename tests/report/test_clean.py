@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.safe_text import clean, encodable, one_line
+from grader.spec.safe_text import clean, encodable, one_line
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ import re
 import pytest
 
 from grader.findings.finding import Evidence, Finding
+from grader.recording.submission import SourceError
 from grader.report.formats import github
-from grader.submission.record import SourceError
 from tests.grade.sample import FAIL, Told
 from tests.report.sample import (
     everywhere,

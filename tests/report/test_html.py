@@ -11,8 +11,8 @@ from itertools import pairwise
 import pytest
 from jinja2 import DictLoader, Environment
 
-from grader import resources
 from grader.findings.finding import Finding
+from grader.machine import resources
 from grader.recording.event import Breach
 from grader.recording.model import Ending, LogLine
 from grader.report.formats import github, gradescope, junit

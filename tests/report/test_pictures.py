@@ -15,6 +15,7 @@ from grader.assignment.model import CheckSpec
 from grader.findings.finding import Case, Cases, Comparison, Plot, Span
 from grader.recording.event import Breach, Intervention
 from grader.recording.model import Qos
+from grader.recording.submission import BuildRecord, SourceError
 from grader.report.drawing.callbacks import draw_callbacks
 from grader.report.drawing.cases import draw_cases
 from grader.report.drawing.motion import draw_motion, phases
@@ -26,7 +27,6 @@ from grader.report.html.comparison import SIGNS, align
 from grader.report.html.qos_table import pairs
 from grader.report.html.report import Gallery, build_lines
 from grader.report.model.target import targets
-from grader.submission.record import BuildRecord, SourceError
 from sim.motion import Pose
 from tests.checks.builder import drive, endpoint, node, on_odometry, output, reader, recording
 from tests.report.gallery import CALLS, CASES, DEFINITION, ahead_until

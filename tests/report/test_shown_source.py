@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from grader.findings.finding import Evidence, Finding
+from grader.recording.submission import SourceError
 from grader.report.model.excerpt import excerpt
-from grader.submission.record import SourceError
 from tests.grade.sample import Told
 from tests.report.page import Page
 from tests.report.sample import PLACE, judged, lost_points

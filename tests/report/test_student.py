@@ -18,6 +18,7 @@ from grader.checks.check import Subject
 from grader.errors import GraderFault
 from grader.findings.finding import Evidence, Finding, Moment, Plot, Table
 from grader.grade import grade
+from grader.recording.submission import SourceError
 from grader.report import formats
 from grader.report.audience import RENDERERS, Audience
 from grader.report.formats import gradescope
@@ -28,7 +29,6 @@ from grader.report.model.class_row import ClassRow
 from grader.report.model.result import result_json
 from grader.report.model.student import for_student
 from grader.report.text.explanation import headline
-from grader.submission.record import SourceError
 from tests.grade.sample import FAIL, Told, make_loaded, make_submission
 from tests.report.sample import Sample, judged, make_facts, make_run
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from grader import resources
+from grader.machine import resources
 
 TEXT = 4.5
 GRAPHICS = 3.0

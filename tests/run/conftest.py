@@ -10,15 +10,15 @@ from typing import Any
 
 import pytest
 
-from grader import ros
 from grader.assignment.model import Assignment
+from grader.machine import ros
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording
+from grader.recording.submission import SubmissionRecord
 from grader.run.imposing.mistake import Mistake
 from grader.run.process.descendants import command_line
 from grader.run.runner import Runner, RunRequest
 from grader.spec.names import NO_NAMES, Names
-from grader.submission.record import SubmissionRecord
 
 PACKAGE, EXECUTABLE = "bot_publisher", "bot_pub"
 SUBMISSION = SubmissionRecord(id="test", sha256="0" * 64)

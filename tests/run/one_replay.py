@@ -6,7 +6,7 @@ import signal
 import sys
 from pathlib import Path
 
-from grader import ros
+from grader.machine import ros
 from grader.recording.mcap_reader import read_recording
 from grader.run.replay import replay, replay_scenario
 from grader.run.runner import RunRequest

@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from grader import ros
+from grader.machine import ros
 from grader.recording.mcap_reader import read_recording
 from grader.run.runner import Runner, RunRequest
 from tests.run import nodes

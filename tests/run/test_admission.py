@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from grader.machine import load
+from grader.machine.load import Load, cpu_count
 from grader.run.admission import Admission
-from grader.run.host import load
-from grader.run.host.load import Load, cpu_count
 
 LIMIT_S = 10.0
 

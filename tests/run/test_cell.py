@@ -15,10 +15,10 @@ from uuid import uuid4
 
 import pytest
 
-from grader import ros
 from grader.checks.doubt import is_doubtful
 from grader.errors import GraderFault
 from grader.findings.finding import Status
+from grader.machine import ros
 from grader.measure import declarations
 from grader.recording.model import NS, Ending, Kind, Owner, Recording
 from grader.run.environment import cell_environment

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from grader import ros
+from grader.machine import ros
 from grader.run.compiled_tracer import compiled_tracer, has_compiled_programs
 
 _PRINTS = """

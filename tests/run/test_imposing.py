@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from grader import resources
+from grader.machine import resources
 from grader.run.imposing.mistake import Mistake
 from grader.run.runner import RunRequest
 from grader.spec.names import Names, Thing, WrongName

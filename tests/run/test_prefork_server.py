@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from grader import ros
 from grader.errors import GraderFault
+from grader.machine import ros
 from grader.recording.mcap_reader import read_recording
 from grader.run.cell.cell_process import CellProcess
 from grader.run.cell.prefork_server import PreforkServer

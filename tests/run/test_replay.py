@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from grader import ros
 from grader.errors import UsageError
+from grader.machine import ros
+from grader.machine.scratch import PREFIX
 from grader.recording.mcap_reader import read_inputs, read_recording
 from grader.recording.model import NS
 from grader.run.replay import replay_scenario
 from grader.run.runner import Runner, RunRequest
-from grader.scratch import PREFIX
 from tests.recording.written import write_robot_run
 from tests.run.conftest import SUBMISSION, assignment, install, running
 from tests.run.nodes import HEADER

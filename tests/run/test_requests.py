@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader import ros
 from grader.errors import GraderFault
 from grader.findings.finding import Status
+from grader.machine import ros
+from grader.machine.ros import RosInstallation
 from grader.recording.model import Ending
-from grader.ros import RosInstallation
 from grader.run.runner import launch_file_program
 from grader.run.stimuli.parameters import next_call_s
 from tests.checks.builder import judge

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader import ros
+from grader.machine import ros
 from grader.run import runner as runner_module
 from grader.run.runner import Runner
 

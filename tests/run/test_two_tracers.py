@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from grader import ros
+from grader.machine import ros
 from grader.recording.model import Recording
 from grader.run.compiled_tracer import compiled_tracer
 from grader.run.environment import TRACER

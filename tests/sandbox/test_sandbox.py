@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from grader import ros
 from grader.errors import GraderFault
+from grader.machine import ros
 from grader.sandbox import bubblewrap, python_tree, sandbox, trial
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.choice import Choice

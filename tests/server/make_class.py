@@ -8,17 +8,17 @@ from dataclasses import replace
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment, load_assignment
-from grader.batch.class_files import standing, write_class
-from grader.batch.files import write_graded
-from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.batch.ledger import Entry, Ledger
 from grader.errors import UsageError
 from grader.grade import grade
+from grader.gradebook.class_files import standing, write_class
+from grader.grading.files import write_graded
+from grader.grading.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.recording.model import to_json
+from grader.recording.submission import PackageRecord, SourceFile, SourceFunction, SubmissionRecord
 from grader.report.model.facts import Clock
 from grader.submission.kept_source import SOURCE_FOLDER
 from grader.submission.prepare import Prepared
-from grader.submission.record import PackageRecord, SourceFile, SourceFunction, SubmissionRecord
 
 YAML = """\
 rosgrade: 1

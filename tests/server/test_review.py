@@ -12,11 +12,11 @@ from urllib.parse import quote
 import pytest
 
 from grader.assignment.load import load_assignment
-from grader.batch.adjusting import ClassAdjustments
-from grader.batch.class_files import all_standing, read_class
-from grader.batch.files import RESULT_FILE
 from grader.batch.ledger import Ledger
-from grader.batch.rendering import bring_up_to_date
+from grader.gradebook.adjusting import ClassAdjustments
+from grader.gradebook.class_files import all_standing, read_class
+from grader.gradebook.rendering import bring_up_to_date
+from grader.grading.files import RESULT_FILE
 from grader.report.files import folder_name
 from grader.report.model.result import read_result
 from grader.report.text.explanation import headline

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.batch.files import RESULT_FILE
 from grader.findings.finding import Finding
+from grader.grading.files import RESULT_FILE
 from grader.report.files import write_whole
 from grader.report.model.result import read_result, result_json
 from grader.server.watch import ReportPage

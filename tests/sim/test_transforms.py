@@ -14,7 +14,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from grader import resources, ros
+from grader.machine import resources, ros
 from grader.run.cell.domain import lock_domain
 from grader.submission.underlay.store import UnderlayStore
 

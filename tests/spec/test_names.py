@@ -7,8 +7,8 @@ import json
 import pytest
 
 from grader.recording.model import to_json
+from grader.recording.submission import PackageRecord, SubmissionRecord, record_of
 from grader.spec.names import NO_NAMES, Names, Thing, WrongName, old_names
-from grader.submission.record import PackageRecord, SubmissionRecord, record_of
 
 
 @pytest.mark.parametrize(

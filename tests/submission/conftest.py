@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from grader import ros as ros_module
-from grader.ros import RosInstallation
+from grader.machine import ros as ros_module
+from grader.machine.ros import RosInstallation
 from tests.submission.samples import Tree
 
 

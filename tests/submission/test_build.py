@@ -16,7 +16,8 @@ import pytest
 from grader.diagnosis.not_built import why_not_built
 from grader.errors import GraderFault
 from grader.findings.finding import Status
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
+from grader.recording.submission import BuildRecord, PackageRecord
 from grader.run.process.descendants import descendants
 from grader.sandbox.limits import BUILD
 from grader.sandbox.sandbox import Sandbox
@@ -26,7 +27,6 @@ from grader.submission.build.build import build_key
 from grader.submission.build.colcon import BuildLimits, builds_at_once
 from grader.submission.build.own_time import OwnTime
 from grader.submission.prepare import Preparation, Prepared, prepare
-from grader.submission.record import BuildRecord, PackageRecord
 from tests.checks.builder import judge
 from tests.submission.samples import INTERFACES, MANIFEST, NODE, SETUP_PY, Tree, zip_bytes
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from grader.errors import GraderFault
+from grader.recording.submission import BuildRecord
 from grader.submission.build.build_cache import (
     INSTALL,
     BuildCache,
     CachedBuild,
 )
-from grader.submission.record import BuildRecord
 
 BUILD = BuildRecord(succeeded=True, duration_s=1.5, log="fine\n")
 COMPILED = "lib/python3.11/site-packages/node/__pycache__/node.cpython-311.pyc"

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from grader.findings.finding import Finding
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
 from grader.sandbox.limits import BUILD, MIB
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox

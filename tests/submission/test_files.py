@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 import zstandard
 
-from grader.ros import find as find_ros
+from grader.machine.ros import find as find_ros
+from grader.recording.submission import BagRecord
 from grader.sandbox.limits import BUILD, MIB
 from grader.sandbox.sandbox import Sandbox
 from grader.submission.intake.locate import opened
@@ -16,7 +17,6 @@ from grader.submission.prepare import Preparation, prepare
 from grader.submission.read import bag as bag_reader
 from grader.submission.read.bag import read_bags
 from grader.submission.read.document import headings
-from grader.submission.record import BagRecord
 from tests.submission.samples import zip_bytes
 
 MADE = {

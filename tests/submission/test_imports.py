@@ -5,8 +5,8 @@ from textwrap import dedent
 
 import pytest
 
+from grader.recording.submission import Import
 from grader.submission.read.imports import find_imports, is_code, ros_imports
-from grader.submission.record import Import
 
 
 def imports(source: str) -> list[tuple[str, int, bool]]:

@@ -3,13 +3,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from grader.recording.submission import Definition
 from grader.submission.build.installed import (
     hash_of,
     inspect,
     match_files,
     tidy,
 )
-from grader.submission.record import Definition
 from tests.submission.samples import Tree
 
 SITE = "lib/python3.12/site-packages"

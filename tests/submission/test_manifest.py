@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from grader.recording.submission import Dependency
 from grader.submission.read.manifest import Manifest, read_manifest
-from grader.submission.record import Dependency
 from tests.submission.samples import MANIFEST
 
 # catkin_pkg calls pyparsing by names that its newer versions deprecate.

@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import pytest
 
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
+from grader.recording.submission import Import, PackageRecord
 from grader.submission.build.installed import InstallSpace
 from grader.submission.intake.locate import opened
 from grader.submission.read.package import read_package, record_packages
-from grader.submission.record import Import, PackageRecord
 from tests.submission.samples import MANIFEST, NODE, Tree
 
 FOLDER = "src/bot_publisher"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.errors import UsageError
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
 from grader.submission.prepare import Preparation, Prepared, fingerprint, prepare
 from tests.submission.samples import NODE, Tree, tar_bytes, tar_member, zip_bytes
 

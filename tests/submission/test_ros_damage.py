@@ -13,7 +13,7 @@ import pytest
 
 from grader.diagnosis.not_built import why_not_built
 from grader.findings.finding import Status
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
 from grader.submission.build.ros_damage import damaged
 from grader.submission.prepare import Preparation, Prepared, prepare
 from tests.submission.samples import MANIFEST, Tree

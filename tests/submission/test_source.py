@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from grader.recording.submission import SourceError
 from grader.submission.read.source import MAX_BYTES, Allowance, parse
-from grader.submission.record import SourceError
 
 
 def error(data: bytes) -> SourceError:

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
+from grader.recording.submission import Definition
 from grader.submission.build.standalone_build import lay, standalone
 from grader.submission.intake.locate import only, opened
 from grader.submission.prepare import Preparation, Prepared, prepare
 from grader.submission.read.package import read_package
-from grader.submission.record import Definition
 from tests.submission.samples import CMAKE_OF_MSGS as CMAKE
 from tests.submission.samples import INTERFACES, MANIFEST, MANIFEST_OF_MSGS, SETUP_PY, Tree
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader import ros as ros_module
+from grader.machine import ros as ros_module
 from grader.submission.prepare import Preparation, prepare
 from tests.submission.samples import MANIFEST, Tree
 

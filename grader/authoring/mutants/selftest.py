@@ -27,17 +27,17 @@ from grader.assignment.mutant import (
     load_mutants,
 )
 from grader.authoring.mutants.standard import with_standard_mutants
-from grader.batch.grading import Graded, Grading
+from grader.authoring.starter import write_starter
 from grader.findings.finding import Status
 from grader.grade.model import Grade
+from grader.grading.grading import Graded, Grading
+from grader.machine.scratch import Scratch
 from grader.report.model.facts import RunFacts
 from grader.report.model.grade_part import grade_json
 from grader.report.model.result import make_result
 from grader.report.text.words import counted_points, number
 from grader.run.imposing.mistake import Mistake
-from grader.scratch import Scratch
 from grader.spec.unit import format_duration
-from grader.starter import write_starter
 
 MOST_FOR_STARTER = 0.15
 """Share of the points that the starter package may get before anything was written in it."""

@@ -11,10 +11,10 @@ from grader.checks.need import Bags
 from grader.diagnosis.mistake import mistaken
 from grader.findings.finding import Finding
 from grader.findings.wording import code, codes, counted, listing
+from grader.recording.submission import BagRecord, SubmissionRecord
 from grader.spec.name import InterfaceName, TopicName
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
-from grader.submission.record import BagRecord, SubmissionRecord
 
 
 class Clean(Parameters):

@@ -29,9 +29,9 @@ from grader.findings.finding import Comparison, Evidence, Finding, Table
 from grader.findings.wording import code, codes, listing
 from grader.findings.words import worded
 from grader.recording.interface import DefinitionError, Section, sections_of
+from grader.recording.submission import Definition, PackageRecord, SourceError, SubmissionRecord
 from grader.spec.name import InterfaceName as Interface
 from grader.spec.names import Thing
-from grader.submission.record import Definition, PackageRecord, SourceError, SubmissionRecord
 
 _BUILD_KINDS = frozenset({"buildtool_depend", "build_depend", "depend"})
 _RUN_KINDS = frozenset({"exec_depend", "run_depend", "depend"})

@@ -13,7 +13,7 @@ from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.not_built import existing_package, why_no_manifest
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code
-from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
+from grader.recording.submission import PackageRecord, SourceError, SubmissionRecord
 
 # What `ros2 pkg create` writes where nothing was given, on any machine.
 _PLACEHOLDER = re.compile(r"TODO|@todo\.todo|@todo$", re.IGNORECASE)

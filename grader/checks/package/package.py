@@ -25,10 +25,10 @@ from grader.diagnosis.wrong_dependencies import why_unknown_imports, why_wrong_d
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes
 from grader.findings.words import worded
+from grader.recording.submission import SourceError, SubmissionRecord
 from grader.spec.name import BuildTypes, PackageName
 from grader.spec.names import NO_NAMES, Names, Thing, WrongName
 from grader.submission.read.reachable import only_for
-from grader.submission.record import SourceError, SubmissionRecord
 
 
 class OfPackage(Parameters):

@@ -17,9 +17,9 @@ from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Finding
 from grader.findings.wording import code, codes
 from grader.findings.words import worded
+from grader.recording.submission import SubmissionRecord
 from grader.spec.names import Thing
 from grader.spec.nearest_name import meant
-from grader.submission.record import SubmissionRecord
 
 
 class File(OfPackage, Named):

@@ -11,7 +11,7 @@ from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes, counted
-from grader.submission.record import SubmissionRecord
+from grader.recording.submission import SubmissionRecord
 
 
 class Tests(OfPackage):

@@ -19,11 +19,7 @@ from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.not_built import existing_package, why_no_package, why_too_new
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes, counted, listing, percent
-from grader.spec.nearest_name import nearest
-from grader.spec.quantity import Ratio
-from grader.submission.read.inheritance import NODE, Family, FoundClass
-from grader.submission.read.lint import EXCLUDED
-from grader.submission.record import (
+from grader.recording.submission import (
     PYTHON,
     PackageRecord,
     SourceError,
@@ -31,6 +27,10 @@ from grader.submission.record import (
     SourceFunction,
     SubmissionRecord,
 )
+from grader.spec.nearest_name import nearest
+from grader.spec.quantity import Ratio
+from grader.submission.read.inheritance import NODE, Family, FoundClass
+from grader.submission.read.lint import EXCLUDED
 
 _MOST_PLACES = 20
 _DOTTED = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+")

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from grader.findings.wording import counted
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
     from rich.progress import TaskID
 
-    from grader.submission.record import SourceError, SubmissionRecord
+    from grader.recording.submission import SourceError, SubmissionRecord
 
 _LEAST_FOR_RATE = 3
 _DOING = {

@@ -15,8 +15,8 @@ from grader.diagnosis.process.raised import READ_MESSAGE, student_place
 from grader.findings.wording import code, listing
 from grader.findings.words import Words
 from grader.recording.model import Recording
+from grader.recording.submission import CPP, PYTHON, PackageRecord, SubmissionRecord
 from grader.spec.source import Model, read_source
-from grader.submission.record import CPP, PYTHON, PackageRecord, SubmissionRecord
 
 _UNDEFINED = re.compile(r"name '(\w+)' is not defined")
 _NO_ATTRIBUTE = re.compile(r"'(\w+)' object has no attribute '(\w+)'")

@@ -24,8 +24,8 @@ from grader.findings.wording import code
 from grader.findings.words import INIT, SPIN, SPIN_NODE, Words, worded
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
+from grader.recording.submission import PYTHON, SourceError
 from grader.spec.source import Model, read_source
-from grader.submission.record import PYTHON, SourceError
 
 _LOG_LINES = 15
 # What a failure ends a compiled program by.

@@ -13,7 +13,7 @@ from grader.findings.wording import code
 from grader.findings.words import Words
 from grader.measure import declarations
 from grader.recording.model import Recording
-from grader.submission.record import SourceError, SubmissionRecord
+from grader.recording.submission import SourceError, SubmissionRecord
 
 READ_MESSAGE = Words(
     python="Read the traceback from its last line upwards.",

@@ -11,8 +11,8 @@ from grader.findings.words import INPUT, SPIN, SPIN_NODE, Words
 from grader.measure.declarations import never_spun
 from grader.measure.standing import Standing, at_the_end, longest_callback
 from grader.recording.model import NS, Recording
+from grader.recording.submission import SourceError
 from grader.spec.unit import format_duration
-from grader.submission.record import SourceError
 
 _LONGEST_TEXT = 80
 ASK_AND_RETURN = Words(

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from markupsafe import Markup
 
 from grader.report.drawing.svg import NARROW, label, line
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 LEFT, RIGHT = 54, 12
 """Pixels beside a drawing with a vertical axis."""

@@ -12,7 +12,7 @@ from grader.findings.wording import counted
 from grader.report.drawing.axes import TIME_AXIS, Scale, time_axis
 from grader.report.drawing.lanes import LANE, SIDE, Bar, Lane, draw_lanes
 from grader.report.drawing.svg import Figure, figure
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 MOST_ROWS = 12
 LONGEST_S = 1e5

@@ -12,7 +12,7 @@ from grader.findings.finding import Case, Cases
 from grader.findings.wording import counted
 from grader.report.drawing import svg
 from grader.report.drawing.axes import RIGHT, Scale, unit_of, value_axis
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 HEIGHT, LEFT, TOP, BOTTOM = 250, 62, 26, 42
 FLOOR = 1e-9

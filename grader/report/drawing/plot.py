@@ -13,7 +13,7 @@ from grader.findings.finding import Plot
 from grader.findings.wording import counted
 from grader.report.drawing import svg
 from grader.report.drawing.axes import LEFT, RIGHT, Scale, ticks, unit_of, value_axis
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 HEIGHT, TOP, BOTTOM = 232, 26, 42
 DRAWABLE = 1e15

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from markupsafe import Markup, escape
 
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 WIDE, NARROW = 760, 330
 LETTER = 6.3

@@ -14,7 +14,7 @@ from grader.report.drawing.flags import Flag, draw_flags
 from grader.report.drawing.lanes import LANE, SIDE, Bar, Lane, draw_lanes
 from grader.report.drawing.svg import Figure, figure, fitted
 from grader.report.model.output import printed
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 MOST_NODES = 4
 _LEAST_HELD_S = 0.01

@@ -19,7 +19,7 @@ from grader.report.model.mistakes import only_shown
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.text import explanation
 from grader.report.text.words import number
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 MOST_ANNOTATIONS = 10
 """Of each kind and step; the runner drops what comes after."""

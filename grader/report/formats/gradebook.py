@@ -21,8 +21,8 @@ from grader.grade.model import total
 from grader.report.model.class_row import ClassRow, RowStatus
 from grader.report.model.result_model import AdjustmentPart, Result
 from grader.report.text.words import number
-from grader.safe_text import one_line
 from grader.spec.nearest_name import did_you_mean
+from grader.spec.safe_text import one_line
 
 # Some spreadsheets take the wide forms of East Asian keyboards for the same.
 _FORMULA = ("=", "+", "-", "@", "\uff1d", "\uff0b", "\uff0d", "\uff20")

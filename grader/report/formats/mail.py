@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 
 from grader.report.files import write_whole
 from grader.report.formats.gradebook import cell, csv_text
-from grader.safe_text import clean, one_line
+from grader.spec.safe_text import clean, one_line
 
 _COLUMNS = ("email", "name", "subject", "body", "report")
 

@@ -17,7 +17,7 @@ from grader.report.model.excerpt import places
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.text import additions, explanation
 from grader.report.text.words import cut
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 # Within a word an underscore is no markup; names would be hard to read with it escaped.
 _MARKUP = re.compile(r"[\\`*\[\]~|$]|(?<![^\W_])_|_(?![^\W_])")

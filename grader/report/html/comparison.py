@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from difflib import SequenceMatcher
 
 from grader.findings.finding import Comparison
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 MOST_LINES = 200
 SIGNS = {"same": "", "changed": "≠", "missing": "−", "extra": "+"}

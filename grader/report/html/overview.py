@@ -17,7 +17,7 @@ from grader.report.html.page import render_page
 from grader.report.model.class_row import ClassRow, RowStatus
 from grader.report.model.cluster import Cluster
 from grader.report.model.result_model import ScenarioPart
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 MOST_DISTURBED = 50
 MOST_SHOWN = 500

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup, escape
 
-from grader import resources
 from grader.findings.finding import Status
 from grader.findings.wording import counted
+from grader.machine import resources
 from grader.report.text import additions, explanation, words
-from grader.safe_text import clean, one_line
+from grader.spec.safe_text import clean, one_line
 
 if TYPE_CHECKING:
     from jinja2 import Environment, FileSystemBytecodeCache

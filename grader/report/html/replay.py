@@ -20,7 +20,7 @@ from grader.recording.simulated import Scene, Truth
 from grader.report.drawing.ground_plan import places
 from grader.report.model.output import printed
 from grader.report.model.target import targets
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 Replay = Mapping[str, Any]
 """One run, ready for JSON; templates/report.js reads it."""

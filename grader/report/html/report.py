@@ -11,6 +11,7 @@ from markupsafe import Markup
 from grader.findings.finding import Plot, Status
 from grader.grade.model import Grade
 from grader.recording.model import Recording
+from grader.recording.submission import BuildRecord
 from grader.report.concepts import SCRIPT, STYLE, concepts
 from grader.report.drawing.callbacks import draw_callbacks
 from grader.report.drawing.cases import draw_cases
@@ -31,7 +32,6 @@ from grader.report.model.output import shorten
 from grader.report.model.result_model import Result
 from grader.report.model.target import targets
 from grader.report.text import explanation
-from grader.submission.record import BuildRecord
 
 CONTEXT = 6
 """Lines of a build log that are shown around the student's own."""

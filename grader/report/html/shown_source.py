@@ -10,9 +10,9 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 
+from grader.recording.submission import SourceError
 from grader.report.html.source_code import code_lines
 from grader.report.model.excerpt import excerpt
-from grader.submission.record import SourceError
 
 
 class ShownSource:

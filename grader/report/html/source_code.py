@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 
 from markupsafe import Markup, escape
 
-from grader.safe_text import visible
+from grader.spec.safe_text import visible
 
 LONGEST_LINE = 2_000
 """Characters of a line that are shown."""

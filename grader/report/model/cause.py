@@ -8,7 +8,7 @@ import sys
 
 from grader.report.model.result_model import CheckPart
 from grader.report.text.words import cut
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 MOST_CHARACTERS = 300
 _MOST_READ = 1000

@@ -11,7 +11,7 @@ from grader.report.model.cause import MOST_CHARACTERS, cause
 from grader.report.model.class_row import ClassRow
 from grader.report.model.result_model import CheckPart
 from grader.report.text.words import cut
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 _NO_SHARES: Mapping[tuple[str, str], float] = {}
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
+from grader.recording.submission import SourceError
 from grader.report.model.result_model import FindingPart
-from grader.submission.record import SourceError
 
 CONTEXT = 3
 """Lines shown before and after the one that is meant."""

@@ -19,8 +19,8 @@ from pydantic_core import core_schema
 
 from grader.findings.finding import Evidence, Status
 from grader.grade.model import still_open, total
-from grader.safe_text import encodable
-from grader.submission.record import BuildRecord
+from grader.recording.submission import BuildRecord
+from grader.spec.safe_text import encodable
 
 SCHEMA: Literal[1] = 1
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from grader.report.model.result_model import AdjustmentPart, CommentPart, Result
 from grader.report.text.words import counted_points, number
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 
 def line(one: AdjustmentPart) -> str:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from grader.findings.finding import Status
 from grader.findings.wording import counted, listing
 from grader.grade.model import total
+from grader.recording.submission import SourceError
 from grader.report.model.excerpt import places as places_of
 from grader.report.model.mistakes import others, reasons
 from grader.report.model.result_model import CheckPart, FindingPart, Result
@@ -22,8 +23,7 @@ from grader.report.text.words import (
     cut,
     number,
 )
-from grader.safe_text import clean, one_line
-from grader.submission.record import SourceError
+from grader.spec.safe_text import clean, one_line
 
 MOST_NOTES = 20
 """Notes of the runs under one title; a submission can cause any number of them."""

@@ -9,7 +9,7 @@ from grader.findings.wording import counted
 from grader.grade.model import CheckResult, total
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.text.words import STATUS, cut, number
-from grader.safe_text import one_line
+from grader.spec.safe_text import one_line
 
 _BARS = "▁▂▃▄▅▆▇█"
 _MOST = 4

@@ -16,12 +16,12 @@ from rich.text import Text
 
 from grader.findings.finding import Status
 from grader.findings.wording import counted
+from grader.recording.submission import SourceError
 from grader.report.model.excerpt import excerpt, places
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.text import additions, explanation, last_save
 from grader.report.text.words import NO_POINTS, number
-from grader.safe_text import clean, one_line, visible
-from grader.submission.record import SourceError
+from grader.spec.safe_text import clean, one_line, visible
 
 _STYLE = {
     Status.PASSED: "green",

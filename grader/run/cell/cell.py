@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from grader.recording.event import Pause, Wait
 from grader.recording.model import NS, Ending, Endpoint, Kind, Owner, Recording
+from grader.recording.submission import SubmissionRecord
 from grader.run.cell.domain import joined_domains
 from grader.run.cell.ending import EndingConditions, ExitBarrier
 from grader.run.cell.graph import GraphObserver
@@ -28,7 +29,7 @@ from grader.run.process.student import StudentProcesses
 from grader.run.stimuli.context import StimulusContext
 from grader.run.stimuli.player import Player
 from grader.sandbox.packet_monitor import PacketMonitor, bound_ports
-from grader.submission.record import SubmissionRecord
+from grader.spec.unit import format_duration
 
 if TYPE_CHECKING:
     from grader.run.cell.simulator import SimulatedRobot
@@ -42,6 +43,8 @@ _PIPES_LIMIT_S = 5.0
 _PAUSED_INTERVALS = 2.5
 _LEAST_PAUSE_S, _MOST_PAUSE_S = 0.4, 6.0
 _UNTIL_PAUSED_S = 3.0
+_MOST_SANDBOX_S = 120.0
+"""A machine that is busy with its disks or namespaces was seen to take 13 s for a sandbox."""
 _MOST_MALFORMED = 10
 """Packets; no library sends a single one."""
 _FORGERY = "wrote into the channel through which rosgrade reports from inside a process"
@@ -213,7 +216,7 @@ class Cell:
 
     def _observe(self) -> Ending:
         ending = self._launch()
-        ending = ending or self._await_node() or self._await_match()
+        ending = ending or self._await_sandboxes() or self._await_node() or self._await_match()
         if ending is None:
             tell("matched", limit_s=self._order.limits.timeout_s)
             self._player.begin()
@@ -278,6 +281,19 @@ class Cell:
         self._students.launch(
             command.name, command.argv, self._order.environment, of_run, Path(self._order.scratch)
         )
+
+    def _await_sandboxes(self) -> Ending | None:
+        """Wait until the programs begin: what comes before is the machine's."""
+        for watch in self._ticks():
+            waiting = self._students.waiting
+            if waiting is None:
+                return None
+            if watch.elapsed_s > _MOST_SANDBOX_S:
+                limit = format_duration(_MOST_SANDBOX_S)
+                self._faults.append(f"the sandbox of {waiting} did not stand within {limit}")
+            if self._faults:
+                return Ending.FAULT
+        return None
 
     def _await_node(self) -> Ending | None:
         def seen() -> bool:

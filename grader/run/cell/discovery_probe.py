@@ -7,7 +7,7 @@ import sys
 import time
 
 from grader.errors import GraderFault
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
 from grader.run.cell.domain import lock_domain
 from grader.run.environment import cell_environment
 

@@ -15,8 +15,8 @@ from pathlib import Path
 from grader.errors import GraderFault
 from grader.recording.event import Breach
 from grader.recording.model import Ending, Process, Recording
+from grader.recording.submission import SubmissionRecord
 from grader.run.order import CellOrder
-from grader.submission.record import SubmissionRecord
 
 ENDED_BY = signal.SIGALRM
 """The signal that ends a cell whose middleware hangs. Unlike SIGKILL, only rosgrade sends it."""

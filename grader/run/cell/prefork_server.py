@@ -31,14 +31,14 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
+from grader.machine.scratch import Scratch
 from grader.run.cell.middleware_hang import HangMonitor
 from grader.run.environment import RMW, TRACER, TRACER_IN_SANDBOX, cell_environment
 from grader.run.process.descendants import descendant_pids, is_stopped, kill_tree, send
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.namespaces import CELL, enter
-from grader.scratch import Scratch
 
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox

@@ -11,7 +11,7 @@ import signal
 import time
 from collections.abc import Iterable, Sequence
 
-from grader.out_of_memory import oom_kills
+from grader.machine.out_of_memory import oom_kills
 from grader.recording.event import Breach
 from grader.recording.model import NS, Process
 

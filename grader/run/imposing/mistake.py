@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from grader.resources import cache_folder
-from grader.ros import RosInstallation
+from grader.machine.resources import cache_folder
+from grader.machine.ros import RosInstallation
 from grader.run.compiled_tracer import build_library
 from grader.run.order import CellOrder
 

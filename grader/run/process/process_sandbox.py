@@ -78,6 +78,7 @@ class SandboxedProcess(subprocess.Popen[bytes]):
         os.set_blocking(self._status, False)
         self._written = b""
         self._init: int | None = None
+        self._has_begun = False
         arguments = [*process_sandbox.arguments, "--clearenv"]
         for name, value in environment.items():
             arguments += ["--setenv", name, value]
@@ -112,6 +113,14 @@ class SandboxedProcess(subprocess.Popen[bytes]):
             pid = self._read_status().get("child-pid")
             self._init = pid if isinstance(pid, int) else None
         return self._init
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the sandbox stands and what is to be run in it was started, ended or not."""
+        if not self._has_begun:
+            init = self.init
+            self._has_begun = self.poll() is not None or bool(init and descendant_pids(init))
+        return self._has_begun
 
     @property
     def was_set_up(self) -> bool:

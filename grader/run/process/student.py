@@ -42,7 +42,7 @@ class PlainProcess(subprocess.Popen[bytes]):
     """A process without a sandbox, with the properties of one in a sandbox."""
 
     init: int | None = None
-    was_set_up = True
+    has_begun = was_set_up = True
 
     @property
     def exit_code(self) -> int | None:
@@ -195,6 +195,11 @@ class StudentProcesses:
     def pids(self) -> frozenset[int]:
         """Every process that was launched or descends from one, ended ones too."""
         return self._pids
+
+    @property
+    def waiting(self) -> str | None:
+        """A process whose program was not started yet, because its sandbox does not stand."""
+        return next((one.name for one in self._running if not one.popen.has_begun), None)
 
     def refresh(self) -> None:
         """Look for descendants that are not known yet."""

@@ -19,8 +19,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from grader.errors import GraderFault, machine_fault
-from grader.out_of_memory import oom_kills
-from grader.ros import RosInstallation
+from grader.machine.out_of_memory import oom_kills
+from grader.machine.ros import RosInstallation
+from grader.recording.submission import BuildRecord
 from grader.submission.build import build_log, own_tests, standalone_build
 from grader.submission.build.bounded import Outcome, Starved
 from grader.submission.build.build_cache import INSTALL, BuildCache, CachedBuild
@@ -32,7 +33,6 @@ from grader.submission.build.toolchain import missing_here, missing_tools, watch
 from grader.submission.intake.locate import Located, only
 from grader.submission.intake.members import MIB
 from grader.submission.read.rosdistro import PACKAGES
-from grader.submission.record import BuildRecord
 
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox

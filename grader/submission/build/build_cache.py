@@ -23,9 +23,9 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from grader.errors import GraderFault, machine_fault
-from grader.resources import check_executable
-from grader.submission.record import BuildRecord
-from grader.tree import remove_tree
+from grader.machine.resources import check_executable
+from grader.machine.tree import remove_tree
+from grader.recording.submission import BuildRecord
 
 INSTALL = "install"
 

@@ -7,8 +7,8 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from grader.recording.submission import SourceError
 from grader.submission.intake.paths import join, shown
-from grader.submission.record import SourceError
 
 _STARTED = re.compile(r"Starting >>> (\S+)")
 _TRACEBACK = "Traceback (most recent call last):"

@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.errors import GraderFault
-from grader.ros import RosInstallation, site_packages
+from grader.machine.ros import RosInstallation, site_packages
+from grader.machine.tree import MOST_DEEP, cut_deep
 from grader.sandbox.limits import BUILD, SandboxLimits
 from grader.sandbox.usage import Usage
 from grader.submission.build import build_log, own_tests
 from grader.submission.build.bounded import Command, Outcome, OutputLimits, run_bounded
 from grader.submission.intake.members import MIB
-from grader.tree import MOST_DEEP, cut_deep
 
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox

@@ -13,9 +13,9 @@ from hashlib import sha256
 from itertools import islice, takewhile
 from pathlib import Path
 
-from grader.ros import site_packages
+from grader.machine.ros import site_packages
+from grader.recording.submission import Definition
 from grader.submission.read.setup_py import EntryPoint, parse_installed
-from grader.submission.record import Definition
 
 MOST_BYTES = 64 * 1024
 """Largest definition of an interface that is kept."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
+from grader.recording.submission import PytestRecord
 from grader.submission.build.bounded import Outcome
-from grader.submission.record import PytestRecord
 
 _OPTIONS = "-q --tb=short -rfEp -p no:cacheprovider -o addopts= --color=no"
 # Made by `ros2 pkg create`: linters of ament, and no tests of the student's.

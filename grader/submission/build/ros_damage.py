@@ -12,10 +12,10 @@ import re
 from collections.abc import Collection, Iterable
 from pathlib import Path
 
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
+from grader.machine.tree import listing
 from grader.submission.build.build_log import ROS
 from grader.submission.read.rosdistro import PACKAGES
-from grader.tree import listing
 
 _FILE = rf"(?P<file>{ROS}/[^\s:'\"]+)"
 # One that was read, so that it is there.

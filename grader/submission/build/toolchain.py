@@ -8,9 +8,9 @@ import sysconfig
 from collections.abc import Collection
 from pathlib import Path
 
-from grader.bootstrap import COMPILERS
 from grader.errors import GraderFault
-from grader.ros import DISTRO
+from grader.machine.bootstrap import COMPILERS
+from grader.machine.ros import DISTRO
 from grader.submission.build.build_log import PYTHON_HEADERS
 from grader.submission.read.rosdistro import PACKAGES
 

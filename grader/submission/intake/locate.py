@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.errors import UsageError
-from grader.scratch import Scratch
+from grader.machine.scratch import Scratch
 from grader.submission.intake import archive
 from grader.submission.intake.listing import (
     ChangedMeanwhile,

@@ -19,14 +19,14 @@ from typing import TYPE_CHECKING
 from pydantic import TypeAdapter
 
 from grader.errors import GraderFault
-from grader.out_of_memory import oom_kills
-from grader.ros import RosInstallation
+from grader.machine.out_of_memory import oom_kills
+from grader.machine.ros import RosInstallation
+from grader.recording.submission import BagRecord, BagTopic
 from grader.sandbox.limits import BUILD, size_words
 from grader.sandbox.usage import Usage, folder_usage
 from grader.submission.build.bounded import Command, Outcome, OutputLimits, run_bounded
 from grader.submission.intake.locate import Located
 from grader.submission.intake.paths import join, shown
-from grader.submission.record import BagRecord, BagTopic
 
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox

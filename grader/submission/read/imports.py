@@ -7,7 +7,7 @@ import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from grader.submission.record import Import
+from grader.recording.submission import Import
 
 _NOT_CODE = frozenset({"test", "tests", "launch", "doc", "docs"})
 _GUARDS = frozenset({"ImportError", "ModuleNotFoundError", "Exception", "BaseException"})

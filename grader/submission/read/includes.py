@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 
+from grader.recording.submission import Import
 from grader.submission.read.cmake import CMakeCommand, read_commands
-from grader.submission.record import Import
 
 CODE = (".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp", ".hxx")
 MOST_SOURCE_BYTES = 256 * 1024

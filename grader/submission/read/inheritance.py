@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from grader.submission.record import SourceClass, SourceFile
+from grader.recording.submission import SourceClass, SourceFile
 
 NODE = "rclpy.node.Node"
 

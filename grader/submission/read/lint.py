@@ -20,9 +20,9 @@ from functools import cache
 from pathlib import Path
 
 from grader.errors import GraderFault
+from grader.recording.submission import Lint, LintFinding, SourceError
 from grader.submission.build.bounded import Command, OutputLimits, run_bounded
 from grader.submission.intake.paths import shown
-from grader.submission.record import Lint, LintFinding, SourceError
 
 LINE_LENGTH = 99
 """Of the ROS 2 style guide for Python."""

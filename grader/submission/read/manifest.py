@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from grader.errors import GraderFault
-from grader.submission.record import EMPTY, Dependency, SourceError
+from grader.recording.submission import EMPTY, Dependency, SourceError
 
 MANIFEST = "package.xml"
 _KINDS = """

@@ -10,7 +10,7 @@ import ast
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from grader.submission.record import SourceClass, SourceFile, SourceFunction
+from grader.recording.submission import SourceClass, SourceFile, SourceFunction
 
 _MOST = 2000
 _LONGEST_NAME = 200

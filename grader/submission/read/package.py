@@ -9,7 +9,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
+from grader.recording.submission import EMPTY, Definition, Import, Lint, PackageRecord, SourceError
 from grader.submission.build.installed import (
     MOST_BYTES,
     InstallSpace,
@@ -29,7 +30,6 @@ from grader.submission.read.outline import outline
 from grader.submission.read.rosdistro import PACKAGES, PYTHON_MODULES
 from grader.submission.read.setup_py import EntryPoint, Setup, read_setup
 from grader.submission.read.targets import Modules, missing_target
-from grader.submission.record import EMPTY, Definition, Import, Lint, PackageRecord, SourceError
 
 SETUP_PY, CMAKE = "setup.py", "CMakeLists.txt"
 _INTERFACES = (".msg", ".srv", ".action")

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import yaml
 
+from grader.recording.submission import ParameterFile
 from grader.submission.intake.listing import SubmissionFile
 from grader.submission.intake.paths import shown
-from grader.submission.record import ParameterFile
 
 _TAG = "ros__parameters"
 _MOST_FILES, _MOST_BYTES, _MOST_NODES = 50, 64 * 2**10, 50

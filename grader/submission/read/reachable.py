@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from grader.recording.submission import PackageRecord, SourceFile
 from grader.submission.read.cmake import read_commands
 from grader.submission.read.includes import needed_files
-from grader.submission.record import PackageRecord, SourceFile
 
 
 def only_for(package: PackageRecord, executable: str) -> PackageRecord:

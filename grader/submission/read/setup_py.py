@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Union
 
+from grader.recording.submission import EMPTY, SourceError
 from grader.submission.intake.paths import join, shown
 from grader.submission.read import source
-from grader.submission.record import EMPTY, SourceError
 
 _GROUP = "console_scripts"
 _MAX_TEXT = 10_000

@@ -9,7 +9,7 @@ import threading
 import warnings
 from dataclasses import dataclass
 
-from grader.submission.record import SourceError
+from grader.recording.submission import SourceError
 
 MAX_BYTES = 2 * 2**20
 """No student writes a longer file by hand."""

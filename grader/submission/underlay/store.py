@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING
 from pydantic import TypeAdapter, ValidationError
 
 from grader.errors import GraderFault, SubmissionError, UsageError
-from grader.resources import carried_interfaces
-from grader.ros import RosInstallation
+from grader.machine.resources import carried_interfaces
+from grader.machine.ros import RosInstallation
+from grader.machine.scratch import Scratch
 from grader.sandbox.limits import BUILD
 from grader.sandbox.python_tree import not_installed
-from grader.scratch import Scratch
 from grader.submission.build.build import Builder, once_more
 from grader.submission.build.build_cache import BUILDS, INSTALL, BuildCache, CachedBuild
 from grader.submission.build.build_error_location import Sources

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from grader import ros as ros_module
+from grader.machine import ros as ros_module
+from grader.machine.ros import RosInstallation
 from grader.recording.interface import sections_of
-from grader.ros import RosInstallation
 from grader.submission.underlay.store import CARRIED, UnderlayStore
 
 EXAMPLE = CARRIED / "example_interfaces"

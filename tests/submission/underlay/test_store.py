@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.errors import GraderFault, UsageError
-from grader.ros import RosInstallation
+from grader.machine.ros import RosInstallation
 from grader.submission.underlay.definition import Underlay, find_underlay
 from grader.submission.underlay.store import MissingUnderlay, UnderlayStore
 from tests.submission.underlay.conftest import Repository

@@ -1,0 +1,1 @@
+"""What only developers of rosgrade need: timings, soak tests, the generator of docs, the demo."""

@@ -1,0 +1,80 @@
+"""The command ``ros2`` beside rosgrade's Python."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from grader.machine.ros import RosInstallation
+from grader.submission.underlay import ros2_command
+from grader.submission.underlay.ros2_command import absence_note, find_command, write_command
+from grader.submission.underlay.store import UnderlayStore
+
+
+@pytest.fixture
+def wheels(tmp_path: Path) -> RosInstallation:
+    prefix = tmp_path / "venv"
+    (prefix / "bin").mkdir(parents=True)
+    python = prefix / "bin/python"
+    python.write_text('#!/bin/sh\necho "$AMENT_PREFIX_PATH|$@"\n')
+    python.chmod(0o755)
+    return RosInstallation("wheels", python, (prefix,))
+
+
+def kept(cache: Path, ros: RosInstallation, name: str, package: str) -> Path:
+    """An underlay as the store keeps it; where it is installed."""
+    folder = cache / "underlays/builds" / name
+    (folder / "install").mkdir(parents=True)
+    about = {
+        **{"name": name, "given": name, "ros": str(ros.prefixes[0]), "packages": [package]},
+        **{"commits": {}, "built": "2026-11-24T14:00:00+00:00", "duration_s": 1.0},
+    }
+    (folder / "underlay.json").write_text(json.dumps(about))
+    return folder / "install"
+
+
+def test_it_runs_the_underlay_s_ros2_behind_what_is_sourced_and_goes_with_it(
+    wheels: RosInstallation, tmp_path: Path
+) -> None:
+    install = kept(tmp_path, wheels, "ros2cli", "ros2cli")
+    store = UnderlayStore(tmp_path, wheels)
+    command = write_command(wheels, store)
+    assert command == find_command(wheels) == wheels.python.parent / "ros2"
+    assert write_command(wheels, store) is None
+    below = f"{install}:{wheels.prefixes[0]}"
+    for sourced, seen in (("", below), ("/ws/install", f"/ws/install:{below}")):
+        done = subprocess.run(
+            [str(command), "topic", "list"],
+            env={"AMENT_PREFIX_PATH": sourced},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout.strip() == f"{seen}|{install}/bin/ros2 topic list"
+    store.remove("ros2cli")
+    write_command(wheels, store)
+    assert not command.exists()
+
+
+def test_a_command_that_rosgrade_did_not_write_is_left_alone(
+    wheels: RosInstallation, tmp_path: Path
+) -> None:
+    kept(tmp_path, wheels, "ros2cli", "ros2cli")
+    own = wheels.python.parent / "ros2"
+    own.write_text("#!/bin/sh\n")
+    assert write_command(wheels, UnderlayStore(tmp_path, wheels)) is None
+    assert own.read_text() == "#!/bin/sh\n"
+
+
+def test_a_text_that_names_it_where_there_is_none_says_how_to_get_it(
+    wheels: RosInstallation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(wheels.python.parent))
+    monkeypatch.setattr(ros2_command, "find", lambda: wheels)
+    assert absence_note("a ROS 2 package") == ""
+    assert "`rosgrade underlay add ros2cli`" in absence_note("`ros2 topic list` shows all")
+    (wheels.python.parent / "ros2").touch(mode=0o755)
+    assert absence_note("`ros2 topic list` shows all") == ""
