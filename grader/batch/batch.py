@@ -18,7 +18,7 @@ from grader.batch.ledger import Entry, Ledger, TakenFrom
 from grader.batch.used_assignment import regrade_command
 from grader.errors import GraderFault, RosgradeError, UsageError, machine_fault
 from grader.grading.files import write_graded
-from grader.grading.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
+from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.grading.last_attempt import EARLIER
 from grader.grading.regrading import find, regrade
 from grader.recording.model import to_json

@@ -15,7 +15,9 @@ from pathlib import Path
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.errors import GraderFault, SubmissionError
 from grader.grading.files import write_graded
-from grader.grading.grading import RECORDINGS_FOLDER, Grading
+from grader.grading.graded import RECORDINGS_FOLDER
+from grader.grading.grading import Grading
+from grader.grading.spine import HandedIn, grade, run_and_judge
 from grader.machine import ros
 from grader.machine.resources import cache_folder
 from grader.machine.scratch import Scratch
@@ -25,7 +27,6 @@ from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose
 from grader.submission.intake.locate import opened
-from grader.submission.kept_source import SOURCE_FOLDER
 from grader.submission.prepare import Prepared, refused
 
 
@@ -46,13 +47,7 @@ Given = Mapping[str, str]
 def grade_into(grading: Grading, key: str, path: Path, folder: Path, given: Given) -> None:
     """Grade a submission and write report, result and recordings."""
     clock = Clock()
-    graded = grading.grade(
-        path,
-        folder / RECORDINGS_FOLDER,
-        name=key,
-        given=given,
-        source_folder=folder / SOURCE_FOLDER,
-    )
+    graded = grade(HandedIn(path, folder, key, given), grading)
     write_graded(graded, folder, clock)
 
 
@@ -120,9 +115,8 @@ def grade_remotely(order: Order, parcel: Parcel) -> bytes:
         if parcel.refused is not None:
             clock = Clock()
             prepared = parcel.refused.named(parcel.key)
-            write_graded(
-                grading.grade_prepared(prepared, folder / RECORDINGS_FOLDER), folder, clock
-            )
+            graded = run_and_judge(prepared, grading, folder / RECORDINGS_FOLDER)
+            write_graded(graded, folder, clock)
         else:
             unpack(parcel.content, temporary / "in")
             path = temporary / "in" / parcel.name

@@ -113,7 +113,8 @@ def check(
             from grader.assignment.load import load_assignment
             from grader.assignment.selection import select, visible_part
             from grader.grading.files import claim
-            from grader.grading.grading import RECORDINGS_FOLDER, Grading
+            from grader.grading.grading import Grading, Told
+            from grader.grading.spine import HandedIn, grade
             from grader.report.files import check_folder
             from grader.submission.intake.locate import check_path
             from grader.submission.kept_source import SOURCE_FOLDER, read_source
@@ -129,15 +130,10 @@ def check(
                 for text in syntax_errors(record, submission):
                     progress.tell(text)
 
-            grading = Grading(loaded, runner, cache_folder(), seed=seed, on_recorded=tell)
+            told = Told(progress.say, partial(progress.output, "build"), tell)
+            grading = Grading(loaded, runner, cache_folder(), seed=seed, told=told)
             with progress.shown():
-                graded = grading.grade(
-                    submission,
-                    report / RECORDINGS_FOLDER,
-                    progress.say,
-                    on_output=partial(progress.output, "build"),
-                    source_folder=report / SOURCE_FOLDER,
-                )
+                graded = grade(HandedIn(submission, report), grading)
             from grader.grading.attempts import with_history
             from grader.grading.files import keep_install, write_graded
             from grader.report.text.terminal import print_grade
@@ -162,9 +158,8 @@ def check(
     formats.write(result, submission)
     if open_report:
         open_page(page.resolve().as_uri())
-    grade = graded.grade
-    status = FULL_POINTS if grade.full_points or classroom50 else POINTS_LOST
-    raise typer.Exit(status if grade.graded else NOT_GRADED)
+    status = FULL_POINTS if graded.grade.full_points or classroom50 else POINTS_LOST
+    raise typer.Exit(status if graded.grade.graded else NOT_GRADED)
 
 
 Narrate = Callable[[str, Mapping[str, Any]], None]

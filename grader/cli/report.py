@@ -42,7 +42,7 @@ def report(
     from grader.gradebook.class_files import all_standing, find_reports, write_class
     from grader.gradebook.rendering import bring_up_to_date, render_again
     from grader.grading.files import REPORT_FILE, RESULT_FILE
-    from grader.grading.grading import RECORDINGS_FOLDER
+    from grader.grading.graded import RECORDINGS_FOLDER
     from grader.report.files import refuse_inputs
 
     ledger = Ledger.around(out)

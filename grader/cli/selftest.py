@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from grader.assignment.load import LoadedAssignment
     from grader.authoring.mutants.selftest import TrialResult
-    from grader.grading.grading import Graded
+    from grader.grading.graded import Graded
 
 
 def selftest(

@@ -40,7 +40,8 @@ if TYPE_CHECKING:
 
     from grader.assignment.load import LoadedAssignment
     from grader.errors import RosgradeError
-    from grader.grading.grading import Graded, Grading
+    from grader.grading.graded import Graded
+    from grader.grading.grading import Grading
     from grader.recording.model import Recording
     from grader.recording.submission import SubmissionRecord
     from grader.report.model.result_model import Result
@@ -134,7 +135,7 @@ class _Work:
 
     def begin(self) -> None:
         from grader.errors import RosgradeError
-        from grader.grading.grading import Grading
+        from grader.grading.grading import Grading, Told
         from grader.report.text.last_save import failed_scenarios
 
         self.runner.get_ready()
@@ -149,24 +150,17 @@ class _Work:
             cache_folder(),
             seed=self.seed,
             first=failed_scenarios(self.before) if self.before is not None else (),
-            on_recorded=self.tell_early,
+            told=Told(self.progress.say, partial(self.progress.output, "build"), self.tell_early),
         )
 
     def grade(self) -> Graded:
-        from grader.grading.grading import RECORDINGS_FOLDER
-        from grader.submission.kept_source import SOURCE_FOLDER
+        from grader.grading.spine import HandedIn, grade
 
         assert self.grading is not None
         if self.problem is not None:
             raise self.problem
         self.progress.say(f"reading {self.submission}")
-        return self.grading.grade(
-            self.submission,
-            self.report / RECORDINGS_FOLDER,
-            self.progress.say,
-            on_output=partial(self.progress.output, "build"),
-            source_folder=self.report / SOURCE_FOLDER,
-        )
+        return grade(HandedIn(self.submission, self.report), self.grading)
 
     def tell_early(self, record: SubmissionRecord, recordings: Mapping[str, Recording]) -> None:
         """Tell what is certain already: lines that Python cannot read, and what failed last."""

@@ -24,8 +24,10 @@ from statistics import median
 from grader.assignment.load import load_assignment
 from grader.assignment.mutant import reference_of
 from grader.grading.files import write_graded
-from grader.grading.grading import RECORDINGS_FOLDER, Grading
+from grader.grading.graded import RECORDINGS_FOLDER
+from grader.grading.grading import Grading
 from grader.grading.regrading import find, regrade
+from grader.grading.spine import run_and_judge
 from grader.machine import ros
 from grader.machine.load import cpu_count
 from grader.recording.mcap_reader import read_recording
@@ -153,7 +155,7 @@ def _grade_into(grading: Grading, prepared: Prepared, folder: Path, number: int)
     """Grade one more of the class; returns why runs were repeated."""
     own = folder / str(number)
     clock = Clock()
-    graded = grading.grade_prepared(prepared, own / RECORDINGS_FOLDER)
+    graded = run_and_judge(prepared, grading, own / RECORDINGS_FOLDER)
     write_graded(graded, own, clock)
     return graded.repeats
 

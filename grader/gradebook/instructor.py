@@ -19,7 +19,7 @@ from grader.gradebook.questions.work import Work
 from grader.gradebook.similarity.fingerprints import all_hashes, fingerprints
 from grader.gradebook.similarity.page import MOST_PAIRS, render_similarity
 from grader.gradebook.similarity.pairs import find_pairs
-from grader.grading.grading import RECORDINGS_FOLDER
+from grader.grading.graded import RECORDINGS_FOLDER
 from grader.recording.mcap_reader import read_recording
 from grader.report.files import write_whole
 from grader.report.html.page import render_page

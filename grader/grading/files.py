@@ -9,7 +9,7 @@ from pathlib import Path
 
 from grader import __version__
 from grader.errors import UsageError
-from grader.grading.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
+from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.grading.last_attempt import keep_replays, replays_before
 from grader.report.files import write_whole
 from grader.report.formats.foxglove import LAYOUT_FILE, render_layout

@@ -7,7 +7,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from grader.grading.grading import Graded
+from grader.grading.graded import Graded
 from grader.report.files import write_whole
 from grader.report.html.replay import Replay, make_replay
 

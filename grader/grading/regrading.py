@@ -13,7 +13,7 @@ from grader.errors import UsageError
 from grader.findings.finding import Status
 from grader.grade import Grade, grade
 from grader.grading.files import RESULT_FILE
-from grader.grading.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
+from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.grading.reference_run import read_references
 from grader.machine import resources
 from grader.recording.mcap_reader import read_recording
@@ -107,7 +107,6 @@ def regrade(loaded: LoadedAssignment, found: FoundRecordings) -> Graded:
         recordings=found.recordings,
         files=found.files,
         runs={one.id: one.runs for one in found.result.scenarios} if found.result else {},
-        faults={},
         references=read_references(loaded),
     )
 

@@ -16,7 +16,7 @@ from watchfiles import Change, watch
 
 from grader.assignment.load import folder_sha256
 from grader.errors import GraderFault, RosgradeError
-from grader.grading.grading import Graded
+from grader.grading.graded import Graded
 from grader.submission.intake.leftovers import is_left_out
 from grader.submission.prepare import fingerprint
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from grader.grading.grading import Grading
+from grader.grading.spine import HandedIn, grade
 from grader.run.process.descendants import descendants
 from grader.run.process.process_sandbox import WORKSPACE
 from tests.attacks.submissions import write_submission
@@ -37,7 +38,7 @@ def test_a_signal_from_outside_costs_no_points(
     thread = threading.Thread(target=strike)
     thread.start()
     try:
-        graded = grading.grade(write_submission(tmp_path / "ana"), tmp_path / "out")
+        graded = grade(HandedIn(write_submission(tmp_path / "ana"), tmp_path / "out"), grading)
     finally:
         over.set()
         thread.join()

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from grader.grading.grading import Grading
+from grader.grading.spine import HandedIn, grade
 from grader.findings.finding import Status
 from tests.attacks.conftest import Targets
 from tests.attacks.submissions import write_submission
@@ -122,7 +123,7 @@ def test_nothing_is_reached_by_a_node_or_at_its_import(
         attack="spy.main(but=spy.NOTICED)",
         files={"bot_publisher/spy.py": targets.spy()},
     )
-    graded = grading.grade(submission, tmp_path / "out")
+    graded = grade(HandedIn(submission, tmp_path / "out"), grading)
     log = "\n".join(line.text for line in graded.recordings["run"].log)
     all_refused(log)
     untouched(targets)
@@ -143,7 +144,7 @@ def test_nothing_is_reached_by_setup_py_or_cmake(
             "../other_package/spy.py": targets.spy(),
         },
     )
-    graded = grading.grade(submission.parent, tmp_path / "out")
+    graded = grade(HandedIn(submission.parent, tmp_path / "out"), grading)
     assert graded.prepared.record.build is not None
     log = graded.prepared.record.build.log
     all_refused(log)
@@ -165,6 +166,6 @@ def test_rosgrade_writes_nothing_through_a_link_of_a_build(
             "../other_package/CMakeLists.txt": cmake.format(python=sys.executable),
         },
     )
-    graded = grading.grade(submission.parent, tmp_path / "out")
+    graded = grade(HandedIn(submission.parent, tmp_path / "out"), grading)
     assert graded.grade.result("builds").status is status
     untouched(targets)

@@ -26,7 +26,8 @@ from grader.errors import GraderFault, UsageError
 from grader.findings.finding import Status
 from grader.gradebook.class_files import NO_RESULT, all_standing, class_rows, copies, find_reports
 from grader.grading.files import RESULT_FILE
-from grader.grading.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
+from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE
+from grader.grading.grading import Grading
 from grader.machine import ros
 from grader.report.model.result import make_result
 from grader.run.runner import Runner

@@ -27,7 +27,7 @@ from grader.gradebook.class_files import read_class, standing, write_class
 from grader.gradebook.class_regrading import regrade_class
 from grader.gradebook.rendering import bring_up_to_date
 from grader.grading.files import REPORT_FILE, RESULT_FILE, STUDENT_FILE, write_graded
-from grader.grading.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
+from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.grading.regrading import find, regrade
 from grader.recording.model import to_json
 from grader.recording.submission import PackageRecord, SubmissionRecord

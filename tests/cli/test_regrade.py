@@ -15,7 +15,7 @@ from grader.batch.ledger import Entry, Ledger
 from grader.grade import grade
 from grader.gradebook.class_files import standing, write_class
 from grader.grading.files import write_graded
-from grader.grading.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
+from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.recording.mcap_writer import write_recording
 from grader.recording.model import to_json
 from grader.recording.submission import SubmissionRecord

@@ -13,7 +13,8 @@ from grader.assignment.load import load_assignment
 from grader.assignment.mutant import CPP, PYTHON
 from grader.authoring.mutants.selftest import Role, Setup, TrialResult, selftest, trials
 from grader.findings.finding import Status
-from grader.grading.grading import Graded, Grading
+from grader.grading.graded import Graded
+from grader.grading.grading import Grading
 from grader.machine import resources, ros
 from grader.machine.load import cpu_count
 from grader.run.runner import Runner

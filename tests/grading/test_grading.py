@@ -24,10 +24,13 @@ from grader.errors import GraderFault, UsageError
 from grader.findings.finding import Status
 from grader.gradebook.class_files import find_reports
 from grader.gradebook.class_regrading import regrade_class
-from grader.grading import grading as grading_module
+from grader.grading import runs as runs_module
+from grader.grading import spine
 from grader.grading.files import REPORT_FILE, RESULT_FILE, write_graded
-from grader.grading.grading import Graded, Grading
+from grader.grading.graded import Graded
+from grader.grading.grading import Grading, Told
 from grader.grading.regrading import compare, find, regrade
+from grader.grading.spine import HandedIn, run_and_judge
 from grader.machine import ros
 from grader.recording.event import Disturbance
 from grader.recording.mcap_writer import write_recording
@@ -135,7 +138,7 @@ def grade(lesson: LoadedAssignment, tmp_path: Path) -> Grade:
         runner = ScriptedRunner(*outcomes)
         grading = Grading(lesson, runner, tmp_path / "cache")
         prepared = Prepared(record=SUBMISSION, install=tmp_path / "install")
-        return grading.grade_prepared(prepared, tmp_path / "recordings"), runner
+        return run_and_judge(prepared, grading, tmp_path / "recordings"), runner
 
     return run
 
@@ -164,7 +167,7 @@ def test_what_failed_last_runs_first_and_is_told_while_the_others_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     one_by_one = partial(ThreadPoolExecutor, 1)
-    monkeypatch.setattr(grading_module, "ThreadPoolExecutor", lambda max_workers: one_by_one())
+    monkeypatch.setattr(runs_module, "ThreadPoolExecutor", lambda max_workers: one_by_one())
     folder = tmp_path / "lesson"
     folder.mkdir()
     run = YAML[YAML.index("  - id: run") : YAML.index("checks:")]
@@ -178,10 +181,10 @@ def test_what_failed_last_runs_first_and_is_told_while_the_others_run(
         runner,
         tmp_path / "cache",
         first={"near"},
-        on_recorded=lambda record, recordings: told.append(list(recordings)),
+        told=Told(recorded=lambda record, recordings: told.append(list(recordings))),
     )
     prepared = Prepared(record=SUBMISSION, install=tmp_path / "install")
-    graded = grading.grade_prepared(prepared, tmp_path / "recordings")
+    graded = run_and_judge(prepared, grading, tmp_path / "recordings")
     assert [one.id for one in runner.scenarios] == ["near", "run", "far"]
     assert [set(names) for names in told] == [
         set(),
@@ -224,7 +227,7 @@ def test_a_run_is_repeated_with_the_name_that_it_showed(
     )
     runner = ScriptedRunner(*[run] * runs)
     prepared = Prepared(record=SUBMISSION, install=tmp_path / "install")
-    graded = Grading(named, runner, tmp_path / "cache").grade_prepared(prepared, tmp_path)
+    graded = run_and_judge(prepared, Grading(named, runner, tmp_path / "cache"), tmp_path)
     assert graded.grade.full_points
     assert [one.record[0].topic for one in runner.scenarios] == ["/cmd_vel", topic][:runs]
 
@@ -250,9 +253,9 @@ def test_a_misnamed_package_is_found_by_the_names_that_the_submission_chose(
         asked.append(how.tested(record))
         return Prepared(record=record, install=None)
 
-    monkeypatch.setattr(grading_module, "prepare", note)
+    monkeypatch.setattr(spine, "prepare", note)
     grading = Grading(load_assignment(folder), ScriptedRunner(), tmp_path / "cache")
-    graded = grading.grade(tmp_path, tmp_path / "out")
+    graded = spine.grade(HandedIn(tmp_path, tmp_path / "out"), grading)
     assert asked == [{"grup3_gp2"}]
     assert graded.prepared.record.names == Names.of(
         [WrongName(Thing.PACKAGE, "grup3_gp2", "group3_gp2")]
@@ -264,7 +267,7 @@ def test_what_has_not_the_name_of_the_roster_is_not_run(
 ) -> None:
     record = dataclasses.replace(SUBMISSION, given=(("bot", "blue"),))
     prepared = Prepared(record=record, install=None)
-    graded = Grading(named, ScriptedRunner(), tmp_path / "cache").grade_prepared(prepared, tmp_path)
+    graded = run_and_judge(prepared, Grading(named, ScriptedRunner(), tmp_path / "cache"), tmp_path)
     assert graded.grade.graded and graded.grade.score == 0
     assert "blue" in graded.grade.result("alive").decisive.finding.expected
     again = regrade(named, find(tmp_path))
@@ -290,7 +293,7 @@ def test_a_wrong_name_is_put_right_in_one_more_run(tmp_path: Path) -> None:
     )
     grading = Grading(load_assignment(folder), runner, tmp_path / "cache")
     prepared = Prepared(record=SUBMISSION, install=tmp_path / "install")
-    graded = grading.grade_prepared(prepared, tmp_path / "recordings")
+    graded = run_and_judge(prepared, grading, tmp_path / "recordings")
     assert runner.names == [Names(), names]
     # It was no machine that disturbed it.
     assert graded.runs == {"run": 1}
@@ -317,8 +320,8 @@ def test_a_failure_of_a_robot_that_the_host_held_up_counts_if_it_happens_again(
         )
         return dataclasses.replace(graded, results=results)
 
-    judge = grading_module.grade
-    monkeypatch.setattr(grading_module, "grade", doubted)
+    judge = runs_module.grade
+    monkeypatch.setattr(runs_module, "grade", doubted)
     wrong = recording(stop_s=2.5)
     graded, runner = grade(wrong, recording())
     assert graded.grade.full_points
@@ -374,8 +377,8 @@ def test_a_bug_in_one_run_ends_no_other(lesson: LoadedAssignment, tmp_path: Path
     runner = ScriptedRunner(ZeroDivisionError("a bug"), recording())
     grading = Grading(lesson, runner, tmp_path / "cache")
     with pytest.raises(ZeroDivisionError):
-        grading.grade_prepared(prepared, tmp_path / "one")
-    assert grading.grade_prepared(prepared, tmp_path / "another").grade.full_points
+        run_and_judge(prepared, grading, tmp_path / "one")
+    assert run_and_judge(prepared, grading, tmp_path / "another").grade.full_points
     assert not runner._aborted
 
 
@@ -384,7 +387,7 @@ def test_what_does_not_build_is_not_run(lesson: LoadedAssignment, tmp_path: Path
     record = dataclasses.replace(SUBMISSION, build=build)
     runner = ScriptedRunner()
     grading = Grading(lesson, runner, tmp_path)
-    graded = grading.grade_prepared(Prepared(record=record, install=None), tmp_path / "r")
+    graded = run_and_judge(Prepared(record=record, install=None), grading, tmp_path / "r")
     assert runner.alone == []
     assert graded.grade.graded
     assert graded.grade.score == 0
@@ -402,28 +405,22 @@ def test_recordings_are_judged_again_without_running_anything(
     assert regrade(load_assignment(lesson.folder), found).grade.full_points
 
 
-class Once:
-    """Grades by giving away what was graded before."""
-
-    def __init__(self, graded: Graded) -> None:
-        self.graded = [graded]
-
-    def imposing(self, _: object) -> Once:
-        return self
-
-    def grade(self, *_: object, **__: object) -> Graded:
-        return self.graded.pop()
+@pytest.fixture
+def grading(lesson: LoadedAssignment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Grading:
+    """Grades one run that does not end in time."""
+    built = Prepared(record=SUBMISSION, install=tmp_path / "install")
+    monkeypatch.setattr(spine, "prepare", lambda _path, _how: built)
+    return Grading(lesson, ScriptedRunner(recording(stop_s=2.5)), tmp_path / "cache")
 
 
 def test_of_a_trial_only_what_is_printed_is_kept(
-    grade: Grade, lesson: LoadedAssignment, tmp_path: Path
+    grading: Grading, lesson: LoadedAssignment, tmp_path: Path
 ) -> None:
-    once = Once(grade(recording(stop_s=2.5))[0])
     told: list[weakref.ref[Graded]] = []
     trial = Trial(Role.REFERENCE, "reference", "the reference solution", None)
     setup = Setup(
         lesson,
-        once,  # type: ignore[arg-type]
+        grading,
         tmp_path,
         on_graded=lambda graded: told.append(weakref.ref(graded)),
     )
@@ -436,11 +433,10 @@ def test_of_a_trial_only_what_is_printed_is_kept(
 
 
 def test_an_untouched_starter_that_gets_many_points_is_judged_wrongly(
-    grade: Grade, lesson: LoadedAssignment, tmp_path: Path
+    grading: Grading, lesson: LoadedAssignment, tmp_path: Path
 ) -> None:
-    once = Once(grade(recording(stop_s=2.5))[0])
     trial = Trial(Role.STARTER, "starter", "the starter package, untouched", None)
-    setup = Setup(lesson, once, tmp_path)  # type: ignore[arg-type]
+    setup = Setup(lesson, grading, tmp_path)
     result = run_trial(trial, setup, tmp_path)
     assert result.mistake.startswith(
         "points: 1 point of 2, and a starter package may have 15% at most"
@@ -459,9 +455,11 @@ def test_a_limit_of_the_build_is_the_author_s(lesson: LoadedAssignment, tmp_path
     file = lesson.folder / "assignment.yaml"
     file.write_text(YAML.replace("scenarios:", written, 1), encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(grading_module, "prepare", note)
+        patch.setattr(spine, "prepare", note)
         for loaded in (lesson, load_assignment(lesson.folder)):
-            Grading(loaded, ScriptedRunner(), tmp_path).grade(tmp_path, tmp_path / "out")
+            spine.grade(
+                HandedIn(tmp_path, tmp_path / "out"), Grading(loaded, ScriptedRunner(), tmp_path)
+            )
     usual, own = asked
     assert usual == BuildLimits()
     assert (own.python_s, own.other_s, own.output.total) == (30.0, 30.0, 2**20)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from grader.grading.grading import Graded
+from grader.grading.graded import Graded
 from grader.grading.last_attempt import EARLIER, keep_replays, replays_before
 from grader.submission.prepare import Prepared
 from tests.report.gallery import gallery

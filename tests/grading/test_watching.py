@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import pytest
 
 from grader.errors import GraderFault, UsageError
-from grader.grading.grading import Graded
+from grader.grading.graded import Graded
 from grader.grading.watching import Ended, Step, Watching
 from grader.submission.prepare import Prepared, fingerprint
 from tests.grade.sample import make_submission

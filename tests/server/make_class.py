@@ -13,7 +13,7 @@ from grader.errors import UsageError
 from grader.grade import grade
 from grader.gradebook.class_files import standing, write_class
 from grader.grading.files import write_graded
-from grader.grading.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
+from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.recording.model import to_json
 from grader.recording.submission import PackageRecord, SourceFile, SourceFunction, SubmissionRecord
 from grader.report.model.facts import Clock

@@ -30,7 +30,9 @@ from grader.authoring.mutants.standard import with_standard_mutants
 from grader.authoring.starter import write_starter
 from grader.findings.finding import Status
 from grader.grade.model import Grade
-from grader.grading.grading import Graded, Grading
+from grader.grading.graded import RECORDINGS_FOLDER, Graded
+from grader.grading.grading import Grading
+from grader.grading.spine import HandedIn, grade
 from grader.machine.scratch import Scratch
 from grader.report.model.facts import RunFacts
 from grader.report.model.grade_part import grade_json
@@ -146,9 +148,8 @@ def run_trial(trial: Trial, setup: Setup, folder: Path) -> TrialResult:
         for name, variable in loaded.assignment.variables.items()
         if variable.match is None
     }
-    graded = setup.grading.imposing(trial.mistakes).grade(
-        submission, folder / "recordings" / trial.id, given=given
-    )
+    handed_in = HandedIn(submission, folder / "graded" / trial.id, given=given)
+    graded = grade(handed_in, setup.grading.imposing(trial.mistakes))
     setup.on_graded(graded)
     actual = {result.id: result.status for result in graded.grade.results}
     if trial.role is Role.STARTER:
@@ -214,8 +215,9 @@ def selftest(
             result = run_trial(trial, setup, folder)
             if keep is not None and result.wrong:
                 shutil.rmtree(keep / trial.id, ignore_errors=True)
-                for part in ("submissions", "recordings"):
-                    made = folder / part / trial.id
+                recordings = folder / "graded" / trial.id / RECORDINGS_FOLDER
+                parts = {"submissions": folder / "submissions" / trial.id, "recordings": recordings}
+                for part, made in parts.items():
                     if made.is_dir():
                         shutil.copytree(made, keep / trial.id / part, symlinks=True)
             return result

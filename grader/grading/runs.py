@@ -1,0 +1,148 @@
+"""The runs of one submission: made side by side, and judged together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import replace
+from pathlib import Path
+
+from grader.errors import GraderFault, UsageError, machine_fault
+from grader.findings.finding import Status
+from grader.grade import Grade, grade
+from grader.grade.naming import named
+from grader.grading.graded import SUBMISSION_FILE, Graded
+from grader.grading.grading import Grading
+from grader.grading.next_runs import Round, Run, times_run
+from grader.grading.reference_run import read_references
+from grader.recording.mcap_reader import read_recording
+from grader.recording.model import Recording, to_json
+from grader.recording.submission import SubmissionRecord
+from grader.report.files import write_whole
+from grader.run.runner import RunRequest, scenario_seed
+from grader.submission.prepare import Prepared
+
+_LONGEST_WORDS = 300
+
+
+class Runs:
+    """Runs of a submission that is built, with their recordings in a folder."""
+
+    def __init__(self, grading: Grading, prepared: Prepared, folder: Path) -> None:
+        """Set up, and note what was handed in; recordings of before are gone then."""
+        self._loaded, record, unnamed = named(grading.loaded, prepared.record)
+        self._grading = grading
+        self._support = grading.type_support_of(self._loaded)
+        self._prepared = replace(prepared, record=record)
+        self._folder = folder
+        self._can_run = prepared.install is not None and unnamed is None
+        self._recordings: dict[str, Recording] = {}
+        self._faults: dict[str, str] = {}
+        self._result: Grade
+        for old in folder.glob("*.mcap"):
+            old.unlink()
+        write_whole(folder / SUBMISSION_FILE, to_json(record))
+        self._tell()
+
+    def make(self, runs: Sequence[Run]) -> None:
+        """Make some runs at once, and then those that want to be alone."""
+        first = self._grading.first
+        together = [run for run in runs if not run.alone]
+        self._make(sorted(together, key=lambda run: run.scenario.id not in first), len(together))
+        self._make([run for run in runs if run.alone], 1)
+
+    def judged(self, runs: Sequence[Run]) -> Round:
+        """What is known after some runs, which were the last."""
+        result = self._result = grade(
+            self._grading.loaded, self._record, self._recordings, self._faults
+        )
+        if result.assignment != self._loaded.assignment:
+            self._loaded, _, _ = named(self._grading.loaded, self._record, self._recordings)
+        disturbed = result.disturbed_scenarios(Status.ERROR)
+        faulty = [name for name, recording in self._recordings.items() if recording.faults]
+        return Round(
+            self._loaded.assignment.scenarios if self._can_run else (),
+            runs,
+            result.names,
+            {
+                name: self._faults.get(name, "too disturbed").partition("\n")[0]
+                for name in (*disturbed, *faulty, *self._faults)
+            },
+            result.disturbed_scenarios(Status.FAILED),
+        )
+
+    def graded(self, rounds: Sequence[Round]) -> Graded:
+        """The grade after all rounds."""
+        return Graded(
+            self._result,
+            self._prepared,
+            self._recordings,
+            {name: self._file(name) for name in self._recordings},
+            times_run(rounds),
+            read_references(self._grading.loaded),
+            tuple(f"{run.scenario.id}, {run.why}" for one in rounds for run in one.runs if run.why),
+        )
+
+    @property
+    def _record(self) -> SubmissionRecord:
+        return self._prepared.record
+
+    def _file(self, name: str) -> Path:
+        return self._folder / f"{name}.mcap"
+
+    def _tell(self) -> None:
+        self._grading.told.recorded(self._record, self._recordings)
+
+    def _make(self, runs: Sequence[Run], at_once: int) -> None:
+        if not runs:
+            return
+        with ThreadPoolExecutor(max_workers=at_once) as pool:
+            try:
+                futures = {pool.submit(self._run, run): run.scenario.id for run in runs}
+                for future in as_completed(futures):
+                    name = futures[future]
+                    self._faults.pop(name, None)
+                    try:
+                        self._recordings[name] = future.result()
+                    except GraderFault as fault:
+                        self._faults[name] = str(fault)
+                    self._tell()
+            except BaseException as error:
+                # An interrupt ends all that runs; a bug of rosgrade costs no other run.
+                if not isinstance(error, Exception):
+                    self._grading.runner.close()
+                raise
+        # As they lie in their folder, whichever ended first.
+        self._recordings = {name: self._recordings[name] for name in sorted(self._recordings)}
+
+    def _run(self, run: Run) -> Recording:
+        assert self._prepared.install is not None
+        loaded, scenario, grading = self._loaded, run.scenario, self._grading
+        file = self._file(scenario.id)
+        try:
+            request = RunRequest(
+                loaded.assignment,
+                scenario,
+                self._record,
+                self._prepared.install,
+                seed=scenario_seed(
+                    loaded.assignment.id, scenario.id, self._record.sha256, grading.seed
+                ),
+                worlds=loaded.folder,
+                underlays=self._prepared.underlays,
+                type_support=self._support.prefixes(),
+                names=run.names,
+                mistakes=grading.mistakes,
+                pauses=any(
+                    bound.parameters.pauses and scenario in loaded.scenarios_of(bound)
+                    for bound in loaded.checks
+                ),
+            )
+            grading.runner.run(request, file, alone=run.alone)
+            return read_recording(file)
+        except UsageError as error:
+            raise GraderFault(f"the new recording cannot be read: {error}") from error
+        except OSError as error:
+            # A full disk, a folder that was removed: it is tried again, and the others go on.
+            fault = GraderFault(f"this machine: {str(error)[:_LONGEST_WORDS]}")
+            raise machine_fault(error) or fault from error
