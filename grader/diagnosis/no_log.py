@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
@@ -193,7 +193,7 @@ def no_cpu_time(symptom: NotLogged) -> Finding | None:
             return None
         blocked = blocked_executor(symptom)
         if blocked is not None:
-            return replace(blocked, disturbed=True)
+            return blocked.doubted()
     return Finding.undecided(
         f"log lines for {code(symptom.topic)} are late or missing, but the machine took "
         f"{format_duration(stolen_s)} from the process meanwhile"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from grader.diagnosis.explanation import explanation
 from grader.diagnosis.mistake import remedy
 from grader.diagnosis.no_answer import why_raised
@@ -71,7 +69,7 @@ def no_cpu_time(symptom: NoMessages) -> Finding | None:
     if not guilty and is_asked and left_s(recording, symptom.since_ns, recording.stop_ns) >= _OWN_S:
         guilty = no_answer(symptom)
     if guilty:
-        return replace(guilty, disturbed=True)
+        return guilty.doubted()
     return Finding.held_up(symptom.seen, symptom.stolen_s)
 
 

@@ -47,12 +47,12 @@ def why_never_appeared(recording: Recording, what: str) -> Finding:
     if not names and was_held_up(recording):
         return Finding.undecided(f"{seen}, while the machine was busy")
     changed = f": the program changed {', '.join(names)}, which nodes use to find each other"
-    return Finding(
+    cause = Finding(
         seen + (changed if names else ""),
         "A node must stay in the ROS domain that it is given. In the environment and in the code, "
         "do not set ROS_DOMAIN_ID, domain_id, a discovery server or a profile of the middleware. "
         + worded("Do not replace rclpy's methods.", "Do not define functions of rcl."),
         Evidence(moments=(Moment("launched", 0.0),)),
-        # What was created right before the end may not have been seen yet.
-        disturbed=not names,
     )
+    # What was created right before the end may not have been seen yet.
+    return cause.doubted(not names)

@@ -22,6 +22,32 @@ class Status(str, Enum):
     """The fault is rosgrade's or the machine's: the submission is not graded."""
 
 
+class Verdict(Enum):
+    """What a check decided, or why it decided nothing."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    DOUBTFUL = "failed, perhaps by the machine: it counts if it happens again"
+    SKIPPED = "not judged, because of a check that this one requires"
+    OURS = "not judged, because of rosgrade or the assignment"
+    MACHINE = "not judged, because of the machine: the run should be repeated"
+
+    @property
+    def status(self) -> Status:
+        """The status of a check that ends so."""
+        return _STATUS[self]
+
+
+_STATUS = {
+    Verdict.PASSED: Status.PASSED,
+    Verdict.FAILED: Status.FAILED,
+    Verdict.DOUBTFUL: Status.FAILED,
+    Verdict.SKIPPED: Status.SKIPPED,
+    Verdict.OURS: Status.ERROR,
+    Verdict.MACHINE: Status.ERROR,
+}
+
+
 @dataclass(frozen=True)
 class Moment:
     """A time in the recording worth looking at.
@@ -166,19 +192,17 @@ class Evidence:
 class Finding:
     """What a check says of one recording or of the submission, and an explanation of a symptom.
 
-    Without a status it is a failure, the student's fault.
+    Without a verdict it is a failure, the student's fault.
 
     Attributes:
         observed: What was observed, and the deepest cause.
         hint: What to try next, in the words of the ROS docs. The author's hint in the YAML is
             shown too.
         evidence: What to show.
-        status: See :class:`Status`.
+        verdict: What is decided by it.
         expected: What is expected, a short phrase with units; empty for what the parameters of
             the check ask for.
         credit: Share of the points in [0, 1].
-        disturbed: The run should be repeated. For an error: the delays of the machine were too
-            large for a fair verdict. For a failure: the machine may be part of the cause.
         names: If wrong names are the only cause of the failure: those. The other checks are then
             judged in a run that puts them right.
         concept: The page of ``docs/concepts`` that explains the idea behind a failure.
@@ -188,18 +212,32 @@ class Finding:
     observed: str
     hint: str = ""
     evidence: Evidence = field(default_factory=Evidence)
-    status: Status = Status.FAILED
+    verdict: Verdict = Verdict.FAILED
     expected: str = ""
     credit: float = 0.0
-    disturbed: bool = False
     names: Names = NO_NAMES
     concept: str = ""
     stands_alone: bool = False
 
+    @property
+    def status(self) -> Status:
+        """How the check ends."""
+        return self.verdict.status
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether the run should be repeated because of the machine."""
+        return self.verdict in (Verdict.DOUBTFUL, Verdict.MACHINE)
+
+    def doubted(self, doubt: bool = True) -> Finding:
+        """The same, but a failure counts only if it happens again, where there is a doubt."""
+        is_failed = doubt and self.verdict is Verdict.FAILED
+        return replace(self, verdict=Verdict.DOUBTFUL) if is_failed else self
+
     @classmethod
     def passed(cls, expected: str, observed: str, evidence: Evidence | None = None) -> Finding:
         """Full credit."""
-        return cls(observed, "", evidence or Evidence(), Status.PASSED, expected, 1.0)
+        return cls(observed, "", evidence or Evidence(), Verdict.PASSED, expected, 1.0)
 
     @classmethod
     def as_asked(cls, observed: str, evidence: Evidence | None = None) -> Finding:
@@ -233,7 +271,7 @@ class Finding:
     @classmethod
     def ours(cls, observed: str, hint: str = "", *, disturbed: bool = False) -> Finding:
         """A cause in rosgrade, the assignment or the machine: nothing is judged."""
-        return cls(observed, hint, status=Status.ERROR, disturbed=disturbed)
+        return cls(observed, hint, verdict=Verdict.MACHINE if disturbed else Verdict.OURS)
 
     @classmethod
     def undecided(cls, observed: str) -> Finding:

@@ -7,27 +7,23 @@ only where every scenario passes, and partial credit counts only as far as every
 from __future__ import annotations
 
 import statistics
-import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from graphlib import TopologicalSorter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from grader.assignment.model import Counts
 from grader.assignment.mutant import required_by
-from grader.checks.check import Parameters, Subject
-from grader.checks.doubt import is_doubtful
+from grader.checks.check import Subject
 from grader.checks.parameter.given import PARAMETERS_GIVEN
 from grader.diagnosis.no_parameter import why_not_taken
-from grader.diagnosis.not_built import why_lacking, why_not_built
-from grader.findings.finding import Finding, Status
-from grader.findings.wording import percent
+from grader.diagnosis.not_built import why_not_built
+from grader.findings.finding import Finding, Status, Verdict
 from grader.findings.words import speaking
+from grader.grade.chain import NOT_YOURS, Case, fault, judged, why_incomplete
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
 from grader.grade.naming import named
-from grader.grade.origins import with_origins
 from grader.grade.runtime_imports import with_runtime_imports
-from grader.grade.windowed import judged_in
 from grader.recording.model import Ending, Recording
 from grader.recording.submission import CPP, SubmissionRecord
 
@@ -42,7 +38,6 @@ _CREDIT: Mapping[Counts, Callable[[Sequence[float]], float]] = {
     Counts.MEDIAN: statistics.median_low,
     Counts.MEAN: statistics.fmean,
 }
-_NOT_YOURS = "Nothing to fix on your side: tell your instructor."
 
 
 def grade(
@@ -157,12 +152,12 @@ def _roots(requires: Iterable[str], results: Mapping[str, CheckResult]) -> tuple
 def _skipped(roots: Sequence[CheckResult]) -> ScenarioFinding:
     titles = " and ".join(f"“{root.title}”" for root in roots)
     if any(root.status is Status.ERROR for root in roots):
-        observed, hint = f"{titles} could not be judged, so neither could this", _NOT_YOURS
+        observed, hint = f"{titles} could not be judged, so neither could this", NOT_YOURS
     else:
         observed = f"{titles} did not pass, so this could not be judged"
         hint = f"Fix {titles} first: this is not a second mistake."
     return ScenarioFinding(
-        None, Finding(observed, hint, status=Status.SKIPPED, expected=f"{titles} to pass first")
+        None, Finding(observed, hint, verdict=Verdict.SKIPPED, expected=f"{titles} to pass first")
     )
 
 
@@ -190,32 +185,27 @@ def _findings(
         if only not in ("", CPP) and submission.spoken(_about(bound, loaded)) == CPP:
             unread = f"this check reads {only}, and the package is written in C++"
             asked = bound.parameters.asked_for
-            yield ScenarioFinding(None, Finding.error(asked, unread, hint=_NOT_YOURS))
+            yield ScenarioFinding(None, Finding.error(asked, unread, hint=NOT_YOURS))
             return
-        yield _judge(bound, submission, None)
+        yield judged(Case(bound, submission))
         return
     scenarios = [scenario.id for scenario in loaded.scenarios_of(bound)]
     if not scenarios:
         # Else a check that judges nothing would pass, and every student would get its points.
-        yield ScenarioFinding(None, _fault("there is no scenario that this check could judge"))
+        yield ScenarioFinding(None, fault("there is no scenario that this check could judge"))
     for scenario in scenarios:
         recording = recordings.get(scenario)
         if recording is None:
             lost = faults.get(scenario, f"there is no recording of the scenario {scenario!r}")
             launched, others = _launched(loaded, scenario), loaded.assignment.packages
-            finding = _why_incomplete(submission, launched, "a run of what was handed in")
+            finding = why_incomplete(submission, launched, "a run of what was handed in")
             finding = finding or why_not_run(submission, [*launched, *(one.name for one in others)])
-            yield ScenarioFinding(scenario, finding or _fault(lost))
-        elif fault := _recording_fault(recording, scenario, submission):
-            yield ScenarioFinding(scenario, _fault(fault))
+            yield ScenarioFinding(scenario, finding or fault(lost))
+        elif why := _why_unusable(recording, scenario, submission):
+            yield ScenarioFinding(scenario, fault(why))
         else:
-            judged = _judge(bound, recording, scenario)
-            finding = judged.finding
-            if finding.status is Status.FAILED:
-                launched = _launched(loaded, scenario)
-                incomplete = _why_incomplete(submission, launched, finding.expected)
-                judged = replace(judged, finding=incomplete or finding)
-            yield judged
+            launched = _launched(loaded, scenario)
+            yield judged(Case(bound, submission, recording, scenario, launched))
 
 
 def _needs_names(bound: BoundCheck, loaded: LoadedAssignment, names: Collection[str]) -> bool:
@@ -237,17 +227,6 @@ def why_not_run(submission: SubmissionRecord, packages: Iterable[str]) -> Findin
     return None
 
 
-def _why_incomplete(
-    submission: SubmissionRecord, packages: Iterable[str], expected: str
-) -> Finding | None:
-    """What this machine lacks for something that a scenario launches: an error, or None."""
-    for package in packages:
-        cause = why_lacking(submission, package)
-        if cause is not None:
-            return replace(cause.after(f"`{package}` could not run here"), expected=expected)
-    return None
-
-
 def _launched(loaded: LoadedAssignment, scenario: str) -> tuple[str, ...]:
     """Packages that a scenario launches something of."""
     assignment = loaded.assignment
@@ -256,9 +235,7 @@ def _launched(loaded: LoadedAssignment, scenario: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(launch.package or default for launch in launches))
 
 
-def _recording_fault(
-    recording: Recording, scenario: str, submission: SubmissionRecord
-) -> str | None:
+def _why_unusable(recording: Recording, scenario: str, submission: SubmissionRecord) -> str | None:
     """Why a recording cannot be judged, or None."""
     if recording.faults:
         return "; ".join(recording.faults)
@@ -268,79 +245,3 @@ def _recording_fault(
         other = f"{recording.scenario!r} of {recording.submission.id!r}"
         return f"the recording is of another run, {other}"
     return None
-
-
-def _judge(
-    bound: BoundCheck, subject: SubmissionRecord | Recording, scenario: str | None
-) -> ScenarioFinding:
-    try:
-        finding = _found(bound, subject, bound.parameters)
-        misuse = _misuse(finding)
-        failed = not misuse and finding.status is Status.FAILED
-        if failed:
-            finding = _with_partial_credit(bound, subject, finding)
-        if failed and isinstance(subject, Recording):
-            doubtful = is_doubtful(subject, bound.parameters.doubt)
-            finding = replace(finding, disturbed=doubtful or finding.disturbed)
-            finding = with_origins(finding, bound.parameters, subject)
-            finding = _with_what_was_not_taken(finding, subject)
-    except Exception as error:
-        # Any exception of a check is a bug in it, and must not cost the student points.
-        trace = "".join(traceback.format_exception(error))
-        message = f"{type(error).__name__}: {error}".rstrip(": ")
-        return ScenarioFinding(scenario, _fault(f"the check itself failed: {message}"), trace)
-    if misuse:
-        return ScenarioFinding(scenario, _fault(f"the check {bound.check.name!r} {misuse}"))
-    return ScenarioFinding(scenario, finding)
-
-
-def _with_what_was_not_taken(finding: Finding, recording: Recording) -> Finding:
-    """The finding of a check that failed; first what the launch gives and no node takes.
-
-    That costs the points of a check of its own, and may be why this one failed too.
-    """
-    right = {one.asked for one in recording.names.wrong}
-    cause = why_not_taken(recording, set(recording.given_parameters) - right)
-    if cause is None or finding.names or finding.observed.startswith(cause.observed):
-        return finding
-    seen = f"{cause.observed}; {finding.observed}"
-    return replace(finding, observed=seen, hint=cause.hint)
-
-
-def _found(
-    bound: BoundCheck, subject: SubmissionRecord | Recording, parameters: Parameters
-) -> Finding:
-    """What a check finds with some parameters, in its windows if it has any."""
-    window = bound.spec.window
-    if window is not None and isinstance(subject, Recording):
-        return judged_in(window, bound.check.judge, subject, parameters)
-    return bound.check.judge(subject, parameters)
-
-
-def _with_partial_credit(
-    bound: BoundCheck, subject: SubmissionRecord | Recording, finding: Finding
-) -> Finding:
-    """The finding of a check that failed, with the credit that looser parameters give."""
-    for share, parameters in bound.partial:
-        looser = _found(bound, subject, parameters)
-        if looser.status is Status.ERROR:
-            return looser
-        if looser.status is Status.PASSED and share > finding.credit:
-            seen = f"{finding.observed}; this gives {percent(share)} of the points"
-            return replace(finding, observed=seen, credit=share)
-    return finding
-
-
-def _misuse(finding: Any) -> str:
-    """What is wrong with what a check returned; an instructor's own check is not typed."""
-    if not isinstance(finding, Finding):
-        return f"returned {type(finding).__name__} instead of a Finding"
-    if finding.status is Status.SKIPPED:
-        return "returned 'skipped', which only its requirements may decide"
-    if finding.status is Status.FAILED and not 0.0 <= finding.credit < 1.0:
-        return f"failed with a credit of {finding.credit}; it must be in [0, 1)"
-    return ""
-
-
-def _fault(observed: str) -> Finding:
-    return Finding.error("a recording and a check that can be judged", observed, hint=_NOT_YOURS)

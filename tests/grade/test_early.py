@@ -41,7 +41,7 @@ def test_what_it_requires_is_judged_in_the_runs_so_far():
 
 
 def test_what_may_be_run_again_is_not_told():
-    disturbed = Told("period", replace(FAIL, disturbed=True), scenarios=("near",))
+    disturbed = Told("period", FAIL.doubted(), scenarios=("near",))
     misnamed = Told(
         "topic",
         replace(FAIL, names=Names.of([WrongName(Thing.TOPIC, "/cmdvel", "/cmd_vel")])),

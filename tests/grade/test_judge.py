@@ -7,7 +7,7 @@ import pytest
 from grader.assignment.model import Launch
 from grader.checks.check import Subject
 from grader.checks.motion.robot_check import RobotParameters
-from grader.findings.finding import Evidence, Finding, Moment, Status
+from grader.findings.finding import Evidence, Finding, Moment, Status, Verdict
 from grader.grade import grade
 from grader.recording.event import Disturbance
 from grader.recording.model import NS, Call, Ending, Node, Owner
@@ -240,7 +240,7 @@ class TestOurFaults:
             (None, "the check 'told.told' returned NoneType instead of a Finding"),
             (True, "the check 'told.told' returned bool instead of a Finding"),
             (
-                Finding("", status=Status.SKIPPED),
+                Finding("", verdict=Verdict.SKIPPED),
                 "the check 'told.told' returned 'skipped', which only its requirements may decide",
             ),
             (

@@ -310,9 +310,7 @@ def test_a_failure_of_a_robot_that_the_host_held_up_counts_if_it_happens_again(
             dataclasses.replace(
                 result,
                 findings=tuple(
-                    dataclasses.replace(
-                        item, finding=dataclasses.replace(item.finding, disturbed=True)
-                    )
+                    dataclasses.replace(item, finding=item.finding.doubted())
                     for item in result.findings
                 ),
             )

@@ -157,7 +157,7 @@ def _why_not_seen(recording: Recording, seen: str, *, declared: bool = True) -> 
     cause = why_ended(recording, seen) or explain(Uncalled(recording, seen))
     shown = Evidence((Moment("launched", 0.0),), spans=spans(recording, timed(recording)))
     lacking = mistaken("not_run", seen + (f"; {codes(others)} ran" if others else ""), shown)
-    return cause or replace(lacking, disturbed=was_held_up(recording))
+    return cause or lacking.doubted(was_held_up(recording))
 
 
 class ExecutorKind(Parameters):

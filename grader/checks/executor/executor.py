@@ -22,7 +22,7 @@ from grader.diagnosis.process.not_called import (
 from grader.diagnosis.process.process_exit import ended_early, why_ended, why_it_exited
 from grader.diagnosis.process.standing import slow_callback, where_it_stands
 from grader.diagnosis.undeclared import why_undeclared
-from grader.findings.finding import Evidence, Finding, Moment, Plot, Status
+from grader.findings.finding import Evidence, Finding, Moment, Plot, Verdict
 from grader.findings.first_seen import first_seen, nodes_seen
 from grader.findings.wording import code, codes, counted
 from grader.findings.words import SPIN_NODE, worded
@@ -232,7 +232,7 @@ def _unasked(recording: Recording, names: list[str], parameters: Responsive) -> 
             "nothing shows from outside whether its executor spins",
             Evidence(moments=nodes_seen(recording)),
         )
-        return replace(found, status=Status.ERROR, disturbed=True) if busy else found
+        return replace(found, verdict=Verdict.MACHINE) if busy else found
     if declarations.declares(recording, "spin") and declarations.declares(recording, "timer"):
         return Finding.as_asked(
             f"{codes(names)} answered no call that could be judged; the process declared a timer "
@@ -380,4 +380,4 @@ def _why_not_paused(recording: Recording, topic: str) -> Finding | None:
         return Finding.ours(f"{seen}: rosgrade does not know its kind")
     shown = Evidence(moments=first_seen(recording, recording.on(topic)))
     found = mistaken("never_waits", seen, shown)
-    return replace(found, disturbed=was_held_up(recording))
+    return found.doubted(was_held_up(recording))

@@ -336,7 +336,7 @@ def _why_arrivals_differ(recording: Recording, live: Sequence[Message]) -> Findi
             "time: the timestamps are not the times of publishing",
             _arrival(recording, late[0]),
         )
-        return replace(found, disturbed=True)
+        return found.doubted()
     arrivals_ns = sorted(message.received_ns for message in live)
     source_s = median((b.stamp_ns - a.stamp_ns) / NS for a, b in pairwise(live))
     arrival_s = median((b - a) / NS for a, b in pairwise(arrivals_ns))
