@@ -83,7 +83,7 @@ class DerivedMessages:
             if not last:
                 continue
             due_ns = message.stamp_ns - round(within_s * NS)
-            begin_ns = due_ns - round(recording.stolen_s(due_ns, message.stamp_ns) * NS)
+            begin_ns = recording.own_begin_ns(message.stamp_ns, within_s)
             # Where the source is silent its newest values stay the right ones.
             first, due = (min(bisect_left(stamps, at), last - 1) for at in (begin_ns, due_ns))
             is_known = last < len(stamps) and lost_before[first] == lost_before[last]

@@ -169,7 +169,7 @@ def echoes(
         begin_ns = item.begin_ns
         end_ns = item.due_ns + within_ns
         if forgive:
-            end_ns += round(recording.stolen_s(begin_ns, end_ns) * NS)
+            end_ns = recording.own_end_ns(begin_ns, (end_ns - begin_ns) / NS)
         missing = set(item.values)
         serving: list[int] = []
         begin = bisect_left(times, begin_ns)

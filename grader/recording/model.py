@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -419,6 +419,22 @@ class Recording:
         waited = sum(sample.waited_ns for sample in samples)
         late = max((sample.late_ns for sample in samples), default=0)
         return (waited + late) / NS
+
+    def own_end_ns(self, begin_ns: int, own_s: float) -> int:
+        """When a program had so much time after ``begin_ns``, at the latest: without delays."""
+        return begin_ns + self._stretched_ns(own_s, lambda long_ns: (begin_ns, begin_ns + long_ns))
+
+    def own_begin_ns(self, end_ns: int, own_s: float) -> int:
+        """Since when a program had so much time before ``end_ns``, at the earliest."""
+        return end_ns - self._stretched_ns(own_s, lambda long_ns: (end_ns - long_ns, end_ns))
+
+    def _stretched_ns(self, own_s: float, interval: Callable[[int], tuple[int, int]]) -> int:
+        """How long it lasts at most, with what the machine took in all of that time."""
+        before_ns, long_ns = -1, round(own_s * NS)
+        while long_ns > before_ns:
+            before_ns = long_ns
+            long_ns = round((own_s + self.stolen_s(*interval(long_ns))) * NS)
+        return long_ns
 
 
 def to_json(fact: Any) -> bytes:

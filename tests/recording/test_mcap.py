@@ -62,6 +62,8 @@ PACKAGE = PackageRecord(
     lint=Lint(None, (LintFinding("F401", "src/node.py", 1, "unused"),)),
 )
 
+SECOND = 1_000_000_000
+
 
 def a_recording(**changes: object) -> Recording:
     """A recording with one fact of each kind."""
@@ -269,6 +271,15 @@ def test_the_host_s_share_is_what_overlaps_the_interval() -> None:
     assert recording.stolen_s(2_500, 2_600) == pytest.approx(250e-9)
     assert recording.stolen_s(2_500, 3_500) == pytest.approx(650e-9)
     assert recording.stolen_s(5_000, 6_000) == 0.0
+
+
+def test_a_time_of_one_s_own_is_longer_by_all_that_the_host_took_in_it() -> None:
+    host = (Disturbance(n * SECOND, 0, SECOND // 2) for n in (2, 3, 4, 9))
+    recording = a_recording(disturbance=tuple(host))
+    # By the half second of the first sample it reaches into the second, and so on.
+    assert recording.own_end_ns(SECOND, 0.9) == SECOND + 1_900_000_000
+    assert recording.own_begin_ns(4 * SECOND, 0.9) == 4 * SECOND - 1_900_000_000
+    assert recording.own_end_ns(5 * SECOND, 0.9) == 5 * SECOND + 1_400_000_000
 
 
 def with_every_channel(folder: Path) -> Path:

@@ -115,6 +115,44 @@ def test_a_wait_is_a_disturbance_only_as_far_as_others_had_the_cpus(
     assert third.waited_ns == pytest.approx(counted_ms * MS, abs=1000)
 
 
+def test_a_sample_is_of_the_time_at_which_it_was_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    read, meters = threading.Event(), []
+
+    def threads(pid: int) -> dict[int, Scheduled]:
+        # The thread that samples loses its CPU for a while after it has read.
+        noted = time.time_ns()
+        if not meters:
+            meters.append(noted)
+            time.sleep(0.2)
+            read.set()
+        return {pid: Scheduled(0, 0)}
+
+    meter = DisturbanceMeter(lambda: (1,), PretendedCpus(0.0), threads)
+    meter.start()
+    assert read.wait(30)
+    first, *_ = meter.stop()
+    assert first.time_ns <= meters[0]
+
+
+def test_a_wait_for_the_kernel_is_the_machine_s_where_it_lasts() -> None:
+    looks, enough = iter("DSDDDSSS"), threading.Event()
+
+    def blocked(_: int) -> bool:
+        state = next(looks, "")
+        if not state:
+            enough.set()
+        return state == "D"
+
+    meter = DisturbanceMeter(
+        lambda: (1,), PretendedCpus(0.0), lambda pid: {pid: Scheduled(0, 0)}, blocked
+    )
+    meter.start()
+    assert enough.wait(30)
+    waited = [one.waited_ns for one in meter.stop()]
+    assert [bool(ns) for ns in waited[:8]] == [state == "D" for state in "SSSDDSSS"]
+    assert waited[3] >= 90 * MS
+
+
 def test_a_limit_is_not_over_before_it_is_known_what_the_machine_took(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

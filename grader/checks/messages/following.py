@@ -18,7 +18,7 @@ from grader.findings.finding import Evidence, Finding, Moment, Plot
 from grader.findings.value import FieldPath
 from grader.findings.wording import code, counted, listing
 from grader.measure.derived_messages import DerivedMessages, Sample
-from grader.recording.model import NS, Recording
+from grader.recording.model import Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
 
@@ -117,8 +117,7 @@ def _judged(
     # One that fits nothing may be made of a message that was not recorded.
     known = [sample for sample in samples if sample.is_known or sample.number in right]
     begin_ns = recording.on(parameters.source)[0].stamp_ns
-    settled_ns = begin_ns + round(parameters.settle * NS)
-    settled_ns += round(recording.stolen_s(begin_ns, settled_ns) * NS)
+    settled_ns = recording.own_end_ns(begin_ns, parameters.settle)
     first = next((index for index, sample in enumerate(known) if sample.number in right), 0)
     if first and known[first - 1].message.stamp_ns > settled_ns:
         first = 0

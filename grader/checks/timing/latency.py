@@ -141,7 +141,8 @@ def _excused(
     for at, next_ns in zip_longest(sent, sent[1:], fillvalue=recording.stop_ns):
         limit_ns = at + within_ns
         stolen_ns = round(recording.stolen_s(at, limit_ns) * NS)
-        late = any(limit_ns < one.stamp_ns <= limit_ns + stolen_ns for one in answers)
+        latest_ns = recording.own_end_ns(at, within_ns / NS)
+        late = any(limit_ns < one.stamp_ns <= latest_ns for one in answers)
         if stolen_ns and (late or stolen_ns >= min(next_ns, recording.stop_ns - within_ns) - at):
             found.add(at)
     return found

@@ -1,7 +1,10 @@
 """What the host takes from a run, measured while it runs.
 
-Two instruments: a metronome, a thread that asks to be woken every 20 ms and notes how late it was;
-and the time that each thread of the student was ready to run but had no CPU (its run delay).
+Three instruments: a metronome, a thread that asks to be woken every 20 ms and notes how late it
+was; the time that each thread of the student was ready to run but had no CPU (its run delay); and
+whether a process of the student waits for the kernel, as for a page of a library that a busy disk
+has not read yet. What a student writes lies in memory, so that the student's own files are no
+such wait.
 
 A thread waits for a CPU because another one runs on it. Where that is one of the student's, the
 wait is the submission's; only what others took, also rosgrade, is a disturbance. And a submission
@@ -18,6 +21,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 from grader.recording.event import LONGEST_STRETCH, Disturbance
@@ -213,6 +217,15 @@ def beyond(late_ns: int, waited_ns: int, length_ns: int) -> int:
     return min(late_ns, max(length_ns, waited_ns, late_ns) - waited_ns)
 
 
+def is_blocked(pid: int) -> bool:
+    """Whether a process waits for the kernel, uninterruptibly: state D in proc_pid_stat(5)."""
+    try:
+        status = Path(f"/proc/{pid}/stat").read_bytes()
+    except OSError:
+        return False
+    return status[status.rindex(b")") + 2 :].startswith(b"D")
+
+
 class DisturbanceMeter:
     """Samples the disturbance every 100 ms from a thread of its own."""
 
@@ -221,8 +234,11 @@ class DisturbanceMeter:
         pids: Callable[[], Iterable[int]],
         cpu: CpuMeter | None = None,
         threads: Callable[[int], Mapping[int, Scheduled]] = scheduled,
+        blocked: Callable[[int], bool] = is_blocked,
     ) -> None:
         self._threads = threads
+        self._blocked = blocked
+        self._was_blocked = False
         self._pids = pids
         self._known: tuple[int, ...] = ()
         self._number = 0
@@ -277,6 +293,8 @@ class DisturbanceMeter:
                 worst_ns = 0
 
     def _sample(self, late_ns: int) -> None:
+        # What is read may be older than the end of this method: it can be held up as well.
+        now_ns, time_ns = time.monotonic_ns(), time.time_ns()
         looks = self._number < _STARTING or self._number % _SAMPLES_PER_LOOK == 0
         self._number += 1
         if looks:
@@ -284,21 +302,24 @@ class DisturbanceMeter:
         threads: dict[int, Scheduled] = {}
         for pid in self._known:
             threads |= self._threads(pid)
-        waited_ns = self._waits.longest_ns(time.monotonic_ns(), threads)
+        waited_ns = self._waits.longest_ns(now_ns, threads)
         if looks or waited_ns + late_ns > _TRIFLE_NS:
             if not looks:
                 self._known = tuple(self._pids())
             self._read_cpu_times()
             waited_ns = others_share(waited_ns, self._intervals)
             late_ns = others_share(late_ns, self._intervals)
-        before_ns, now_ns = self._sampled_ns, time.monotonic_ns()
+        blocked, before_ns = any(map(self._blocked, self._known)), self._sampled_ns
+        if blocked and self._was_blocked:
+            waited_ns = max(waited_ns, now_ns - before_ns)
+        self._was_blocked = blocked
         waited_ns = uncounted(waited_ns, now_ns, self._counted)
         self._counted.append((before_ns, now_ns, waited_ns))
         late_ns = beyond(late_ns, waited_ns, now_ns - before_ns)
         self._taken_ns += waited_ns + late_ns
         # Last, so that what was taken until then is known to who reads it.
         self._sampled_ns = now_ns
-        self._samples.append(Disturbance(time.time_ns(), late_ns, waited_ns))
+        self._samples.append(Disturbance(time_ns, late_ns, waited_ns))
 
     def _read_cpu_times(self) -> None:
         times = self._cpu.read(self._known)
