@@ -15,14 +15,13 @@ demo: setup ## grade the reference solution, then a broken one
 test: lint ## lint, type-check and run every test
 	@$(run) -m pytest -q -rs -n 3 --dist loadfile --no-loadscope-reorder
 
-lint: setup ## check style, types, imports between folders and dead code; print lines by folder
+lint: setup ## check style, types, imports between folders and dead code; print the house
 	@.venv/bin/ruff check --quiet
 	@.venv/bin/ruff format --check --quiet
 	@$(run) -m mypy --no-error-summary
 	@broken=$$(.venv/bin/lint-imports --no-logo --no-cache) || { echo "$$broken"; exit 1; }
 	@.venv/bin/vulture
-	@for folder in $$(ls -d grader/[a-z]*/) grader sim tests assignments; do \
-		printf '%6d %s\n' "$$(find $$folder -name '*.py' | xargs cat | wc -l)" "$${folder%/}"; done
+	@$(run) -m grader.dev.house
 
 lock: setup ## regenerate requirements.lock; UPGRADE=1 to newer versions
 	@$(run) -m pip install --quiet "uv>=0.8"

@@ -31,7 +31,7 @@ from grader.findings.fields import (
     words,
 )
 from grader.findings.finding import Evidence, Finding, Moment, Table
-from grader.findings.value import EXACT, Tolerance
+from grader.findings.value import EXACT, Difference
 from grader.findings.wording import code
 from grader.recording.interaction import NO_SERVER, Goal
 from grader.recording.model import Call, Recording
@@ -121,8 +121,7 @@ def why_other_fields(
     seen: str,
     part: str,
     value: Mapping[str, Any] | None,
-    wanted: Mapping[str, Any],
-    tolerance: Tolerance,
+    found: Sequence[Difference],
     evidence: Evidence,
     hint: str = "",
 ) -> Finding | None:
@@ -130,8 +129,8 @@ def why_other_fields(
 
     Args:
         part: What the answer is called, such as ``result``.
+        found: What is different in it.
     """
-    found = unlike(value or {}, wanted, tolerance)
     if not found:
         return None
     tables = (difference_table(part.capitalize(), found), *evidence.tables)

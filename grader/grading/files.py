@@ -14,6 +14,7 @@ from grader.grading.last_attempt import keep_replays, replays_before
 from grader.report.files import write_whole
 from grader.report.formats.foxglove import LAYOUT_FILE, render_layout
 from grader.report.html.report import render_report
+from grader.report.html.shown_source import ShownSource
 from grader.report.model.facts import Clock, RunFacts
 from grader.report.model.result import make_result, result_json
 from grader.report.model.result_model import Result
@@ -79,14 +80,16 @@ def write_report(
         write_whole(folder / RECORDINGS_FOLDER / LAYOUT_FILE, layout)
     source = read_source(folder / SOURCE_FOLDER).files
     before = replays_before(folder, result.submission.sha256)
-    shown = (graded.recordings, graded.references, before, source)
+    shown = (graded.recordings, graded.references, before)
     root = root.resolve() if root is not None and root.is_dir() else None
-    write_whole(folder / REPORT_FILE, render_report(graded.grade, result, *shown, root))
+    html = render_report(graded.grade, result, *shown, ShownSource(source, root))
+    write_whole(folder / REPORT_FILE, html)
     copy, file = for_student(result, visible), folder / STUDENT_FILE
     if copy is result:
         file.unlink(missing_ok=True)
     else:
-        write_whole(file, render_report(graded.grade, copy, *shown))
+        html = render_report(graded.grade, copy, *shown, ShownSource(source, None))
+        write_whole(file, html)
 
 
 def claim(folder: Path, *, keep: bool) -> None:

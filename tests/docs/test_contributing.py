@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.dev.house import floors, imports_between_rooms
 from grader.machine import resources
 
 ROOT = resources.root()
@@ -48,6 +49,17 @@ def rosgrade(copy: Path, *arguments: str) -> str:
 def python(copy: Path, code: str) -> None:
     environment = {**os.environ, "PYTHONPATH": str(copy)}
     subprocess.run([sys.executable, "-c", code], cwd=copy, env=environment, check=True, timeout=60)
+
+
+def test_the_map_shows_every_room_of_the_house_and_no_other() -> None:
+    on_the_map = re.findall(r"^  (\w+)/ ", PAGE[PAGE.index("\ngrader/\n") :], re.MULTILINE)
+    assert sorted(on_the_map) == sorted(imports_between_rooms())
+
+
+def test_nothing_lies_loose_in_the_house() -> None:
+    loose = {file.stem for file in (ROOT / "grader").glob("*.py")}
+    assert loose == {"__init__", "__main__", "errors"}
+    assert max(floors(imports_between_rooms()).values()) <= 15
 
 
 def test_the_walks_are_one_file_each() -> None:

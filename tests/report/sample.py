@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -18,6 +19,7 @@ from grader.recording.model import NS, Call, LogLine, Message, Node, Owner, Proc
 from grader.recording.submission import BuildRecord, SourceError, SubmissionRecord
 from grader.report.html.replay import Replay
 from grader.report.html.report import render_report
+from grader.report.html.shown_source import ShownSource
 from grader.report.model.facts import RunFacts
 from grader.report.model.result import make_result
 from grader.report.model.result_model import AdjustmentPart, AttemptPart, CommentPart, Result
@@ -71,8 +73,15 @@ class Sample:
         made = make_result(self.grade, self.recordings, self.facts)
         return made.model_copy(update=dict(self.added))
 
-    def html(self, references: Mapping[str, Replay] = {}, **options: Any) -> str:
-        return render_report(self.grade, self.result, self.recordings, references, **options)
+    def html(
+        self,
+        references: Mapping[str, Replay] = {},
+        before: Mapping[str, Replay] = {},
+        source: Mapping[str, str] = {},
+        root: Path | None = None,
+    ) -> str:
+        shown = ShownSource(source, root)
+        return render_report(self.grade, self.result, self.recordings, references, before, shown)
 
     def printed(
         self,

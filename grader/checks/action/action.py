@@ -28,7 +28,7 @@ from grader.diagnosis.explanation import cause_of
 from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.no_answer import NoAnswer, why_late, why_raised
 from grader.diagnosis.no_endpoint import ACTION
-from grader.findings.fields import FieldTolerance, the_goal, words
+from grader.findings.fields import FieldTolerance, the_goal, unlike, words
 from grader.findings.finding import Evidence, Finding
 from grader.findings.value import EXACT
 from grader.findings.wording import code, counted, percent
@@ -246,7 +246,8 @@ def _why_other_feedback(recording: Recording, goal: Goal, parameters: FeedbackOf
     hint = remedy("other_feedback")
     for which, index, wanted in (("first", 0, parameters.first), ("last", -1, parameters.last)):
         seen, value = f"the {which} feedback of {the_goal(goal)} has", goal.feedback[index].value
-        cause = why_other_fields(seen, f"{which} feedback", value, wanted, EXACT, shown, hint)
+        other = unlike(value, wanted, EXACT)
+        cause = why_other_fields(seen, f"{which} feedback", value, other, shown, hint)
         if cause is not None:
             return cause
     return None
@@ -320,5 +321,5 @@ def _why_no_result(recording: Recording, goal: Goal, within_s: float) -> Finding
 
 def _why_other_result(recording: Recording, goal: Goal, parameters: Result) -> Finding | None:
     seen, shown = f"the result of {the_goal(goal)} has", evidence(recording, goal)
-    wanted, tolerance = parameters.result, parameters.tolerance
-    return why_other_fields(seen, "result", goal.result, wanted, tolerance, shown)
+    other = unlike(goal.result or {}, parameters.result, parameters.tolerance)
+    return why_other_fields(seen, "result", goal.result, other, shown)

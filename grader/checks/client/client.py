@@ -14,7 +14,7 @@ from grader.checks.requests import why_other_fields
 from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.no_answer import why_taken
 from grader.diagnosis.not_asked import evidence, why_not_asked
-from grader.findings.fields import FieldTolerance, brief, words
+from grader.findings.fields import FieldTolerance, brief, unlike, words
 from grader.findings.finding import Evidence, Finding
 from grader.findings.value import EXACT
 from grader.findings.wording import code, counted
@@ -76,8 +76,9 @@ def asks(recording: Recording, parameters: Asks) -> Finding:
     shown, needed = evidence(recording, asked), len(parameters.sequence)
     hint = remedy("other_request")
     for number, (wanted, one) in enumerate(zip(parameters.sequence, asked, strict=False), start=1):
-        seen, tolerance = f"number {number} that came to {code(server)} has", parameters.tolerance
-        stop_if(why_other_fields(seen, "request", one.fields, wanted, tolerance, shown, hint))
+        seen = f"number {number} that came to {code(server)} has"
+        other = unlike(one.fields, wanted, parameters.tolerance)
+        stop_if(why_other_fields(seen, "request", one.fields, other, shown, hint))
     for before, after in itertools.pairwise(asked) if parameters.after_result else ():
         stop_if(_why_too_early(before, after, shown))
     if len(asked) < needed:

@@ -23,7 +23,7 @@ from grader.checks.requests import Offered, is_offered, judged_requests, why_oth
 from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_answer import NoAnswer, why_late
 from grader.diagnosis.no_endpoint import SERVICE
-from grader.findings.fields import FieldTolerance, brief, words
+from grader.findings.fields import FieldTolerance, brief, unlike, words
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.value import EXACT, value_at
 from grader.findings.wording import code, codes, counted
@@ -141,9 +141,8 @@ def _why_other_response(
     seen = f"{_which(calls, call)} was answered with"
     called = Moment(f"called with {brief(call.request or {})}", _since_s(recording, call))
     shown, response = Evidence(moments=(called,)), call.response or {}
-    wrong = why_other_fields(
-        seen, "response", response, parameters.response, parameters.tolerance, shown
-    )
+    other = unlike(response, parameters.response, parameters.tolerance)
+    wrong = why_other_fields(seen, "response", response, other, shown)
     lacking = [
         f"{path} = {value_at(response, path)!r} without “{word}”"
         for path, word in parameters.contains.items()

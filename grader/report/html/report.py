@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
 
 from markupsafe import Markup
 
@@ -45,8 +44,7 @@ def render_report(
     recordings: Mapping[str, Recording],
     references: Mapping[str, Replay] = {},
     before: Mapping[str, Replay] = {},
-    source: Mapping[str, str] = {},
-    root: Path | None = None,
+    source: ShownSource | None = None,
 ) -> str:
     """Render the report of one submission.
 
@@ -55,8 +53,7 @@ def render_report(
         result: Its result or the student's copy of it: nothing else of the checks is shown.
         recordings: By scenario id; may lack scenarios that were not run.
         references: Runs of the reference by scenario id, ``before`` those of the attempt before.
-        source: Texts of the submission by path.
-        root: Its folder on the reader's own machine, for links that open an editor, or None.
+        source: What is shown of the submission's source; by default nothing.
     """
     assignment = grade.assignment
     sections = make_sections(grade, result, recordings)
@@ -83,7 +80,7 @@ def render_report(
         files={run.id: run.recording for run in result.scenarios},
         remarks={run.id: run.remarks for run in result.scenarios},
         gallery=Gallery(),
-        source=ShownSource(source, root),
+        source=source or ShownSource({}, None),
         places=places,
         same_as=explanation.same_as(result),
         SIGNS=SIGNS,
