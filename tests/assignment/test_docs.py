@@ -70,7 +70,7 @@ def test_a_link_to_a_check_still_leads_to_it() -> None:
 
 
 def test_a_value_is_described_in_the_words_of_yaml(catalogue: dict[str, Check]) -> None:
-    text = docs.check_markdown(catalogue["timing.period"])
+    text = documentation.check_markdown(catalogue["timing.period"])
     assert "| `topic` | topic, such as `/cmd_vel` | required |  |" in text
     assert "| `period` | time, such as `300 ms` | required |" in text
     text = PAGE
@@ -105,7 +105,7 @@ def test_the_example_in_the_documentation_is_the_shipped_assignment() -> None:
 
 
 def test_the_page_of_the_recording_describes_every_part_of_it() -> None:
-    text = "\n".join(docs.classes_markdown().values())
+    text = "\n".join(documentation.classes_markdown().values())
     for one in (Recording, Message, Endpoint, Goal, Truth, Scene, Finding, Evidence):
         section = text.partition(f"\n## {one.__name__}\n")[2].partition("\n## ")[0]
         for field in fields(one):

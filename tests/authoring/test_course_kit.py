@@ -31,7 +31,7 @@ from grader.spec.document import parse_yaml, write_yaml
 from tests.alone import alone
 from tests.assignment.lessons import GOOD, HEAD
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 SECRET = (
     "  # A secret comment.\n"
     "  - {id: zq_secret, title: Zq secretly, uses: lesson.zq_own, points: 2.5,\n"
@@ -261,7 +261,7 @@ def test_no_other_folder_becomes_a_kit(tmp_path: Path) -> None:
 def test_a_set_up_of_a_kit_installs_its_wheel(kit: Path) -> None:
     code = (
         "import sys; from pathlib import Path; sys.path.insert(0, sys.argv[1])\n"
-        "from grader import bootstrap\n"
+        "from grader.machine import bootstrap\n"
         "def create(venv, chosen):\n"
         "    (venv / 'bin').mkdir(parents=True)\n"
         "    (venv / 'bin' / 'python').touch()\n"
@@ -329,7 +329,7 @@ def test_the_solutions_that_instructors_install_beside_it_are_found(tmp_path: Pa
             assert not [name for name in wheel.namelist() if (site / name).exists()]
             wheel.extractall(site)
     code = (
-        "from grader import resources; from grader.assignment.load import *\n"
+        "from grader.machine import resources; from grader.assignment.load import *\n"
         "from grader.assignment.mutant import *\n"
         "for name in list_assignments():\n"
         "    loaded = load_assignment(name)\n"

@@ -23,7 +23,7 @@ from grader.report.concepts import concepts
 from tests.alone import alone
 from tests.assignment.lessons import GOOD, HEAD
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 HIDDEN = HEAD + (
     "  - {id: alive, uses: node.alive, points: 1}\n"
     "  - {id: secret, uses: node.starts, points: 1, visibility: hidden}\n"
@@ -319,5 +319,5 @@ def test_the_classroom50_folder_can_be_written_again(loaded, tmp_path):
     script = (folder / "autograder.py").read_text(encoding="utf-8")
     compile(script, "autograder.py", "exec")
     assert '"check", "timed_publisher", "."' in script
-    assert (folder / "rosgrade" / "grader" / "bootstrap.py").is_file()
+    assert (folder / "rosgrade" / "grader" / "machine" / "bootstrap.py").is_file()
     assert not [path for path in tmp_path.iterdir() if path != folder]

@@ -13,7 +13,7 @@ import pytest
 from grader.machine import bootstrap
 from grader.machine.bootstrap import Interpreter, Plan, SetupError
 
-ROOT = Path(bootstrap.__file__).resolve().parent.parent
+ROOT = Path(bootstrap.__file__).resolve().parents[2]
 LINUX = "linux-x86_64"
 SOURCED = {"ROS_DISTRO": "jazzy", "AMENT_PREFIX_PATH": "/opt/ros/jazzy"}
 
