@@ -48,6 +48,21 @@
     annotate();
   };
 
+  const again = async (button) => {
+    button.disabled = true;
+    saved.textContent = "running it again: this takes as long as its runs";
+    try {
+      const answer = await fetch("again", {
+        method: "POST", headers: { "Content-Type": "application/json" }, body: "{}",
+      });
+      if (answer.ok) return location.reload();
+      fail(`It was not run again. ${await answer.text()}`);
+    } catch {
+      fail("rosgrade review cannot be reached any more. Start it again.");
+    }
+    button.disabled = false;
+  };
+
   const items = () => all(".item", panel);
   const mark = () => items().forEach((item, i) => {
     item.classList.toggle("is-current", i === current);
@@ -178,7 +193,8 @@
     else if (target.matches(".place")) {
       const at = target.dataset.file ? target.dataset : entry.dataset;
       if (files && [...files.options].some((option) => option.value === at.file)) { files.value = at.file; show("source", at.line); }
-    } else if (target.matches(".settle")) change({ do: "settle" });
+    } else if (target.matches("#settle")) change({ do: "settle" });
+    else if (target.matches("#again")) again(target);
     else if (target.matches(".take")) change({ do: "take", index: Number(entry.dataset.index) });
     else if (target.matches(".remove")) change({ do: "uncomment", index: Number(entry.dataset.index) });
     else if (target.matches(".edit")) {

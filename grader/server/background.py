@@ -1,17 +1,22 @@
-"""What a review does in the background, one thing at a time: write reports, judge the class."""
+"""What a review does in the background, one thing at a time: write reports, judge, run again."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 
 from grader.assignment.load import LoadedAssignment
-from grader.errors import RosgradeError
+from grader.errors import GraderFault, RosgradeError
 from grader.gradebook.class_files import all_standing, write_class
 from grader.gradebook.class_regrading import Regraded, regrade_class, write_regraded
 from grader.gradebook.rendering import bring_up_to_date
 from grader.server.reviewed_class import ReviewedClass
+
+_NOT_GRADED = 3
+"""Exit code of a batch of which something is not graded."""
 
 
 @dataclass
@@ -43,6 +48,7 @@ class Background:
         self._worker = ThreadPoolExecutor(1, "background")
         self._next: Future[None] | None = None
         self._ended = False
+        self._batch: subprocess.Popen[str] | None = None
         self._worker.submit(reviewed.rows)
         self.refresh()
 
@@ -59,9 +65,15 @@ class Background:
         self.judging = Judging(title, check, total, running=True)
         self._worker.submit(self._judge, self.judging, loaded, write)
 
+    def run_again(self, key: str) -> None:
+        """Run a submission again, as ``rosgrade batch OUT --retry KEY`` does; wait for its end."""
+        self._worker.submit(self._run_again, key).result()
+
     def close(self) -> None:
-        """End, when all that was begun is written."""
+        """End, when all that was begun is written; a batch ends as by Ctrl-C."""
         self._ended = True
+        if self._batch is not None:
+            self._batch.terminate()
         self._worker.shutdown()
 
     def _refresh(self) -> None:
@@ -72,6 +84,21 @@ class Background:
         except Exception as error:
             # Also that of a check of the assignment's own; what was written down is safe.
             self.problem = f"The reports are not up to date: {_said(error)}"
+
+    def _run_again(self, key: str) -> None:
+        if self._ended:
+            return
+        command = [sys.executable, "-m", "grader", "batch", str(self._ledger.out.resolve())]
+        self._batch = subprocess.Popen(
+            [*command, "--retry", key, "--quiet"],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        _, said = self._batch.communicate()
+        if self._batch.returncode not in (0, _NOT_GRADED):
+            raise GraderFault(said.strip() or f"the batch ended with {self._batch.returncode}")
 
     def _judge(self, judging: Judging, loaded: LoadedAssignment, write: bool) -> None:
         try:

@@ -60,6 +60,7 @@ class ReviewServer(LocalServer):
             Route("/s/{name}/", self._submission),
             Route("/s/{name}/source", self._source),
             Route("/s/{name}/review", posted(self._change), methods=["POST"]),
+            Route("/s/{name}/again", posted(self._run_again), methods=["POST"]),
             Route("/s/{name}/{file:path}", self._report_file),
             Route(f"/{INSTRUCTOR_FOLDER}/{{file}}", self._instructor_file),
         ]
@@ -147,6 +148,11 @@ class ReviewServer(LocalServer):
         self._background.refresh()
         row, _ = self._class.find(row.name)
         return HTMLResponse(self._panel(row, time.strftime("saved %H:%M:%S")))
+
+    def _run_again(self, request: Request, _: Any) -> Response:
+        row, _ = self._class.find(request.path_params["name"])
+        self._background.run_again(row.row.id)
+        return PlainTextResponse("graded again")
 
     def _report_file(self, request: Request) -> Response:
         """The report, and the recordings that it links to; nothing else of the folder."""

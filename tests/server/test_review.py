@@ -6,6 +6,9 @@ import csv
 import html
 import json
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from urllib.parse import quote
 
@@ -206,7 +209,7 @@ def test_a_click_grades_without_a_check_that_could_not_be_judged(out: Path, clie
     end(out, "ana", "print")
     text = client.get(page("ana")).text
     assert "5 of 6 points so far, 1 open" in text and "Give 1 point and grade without this" in text
-    assert "--retry" in text
+    assert "Run it again" in text
     assert change(client, "ana", do="settle").status == 200
     row = next(row for row in read_class(out) if row.id == "ana")
     assert row.result is not None and row.result.graded and not row.result.open
@@ -469,3 +472,28 @@ def test_a_cause_is_split_by_hand_and_then_forgiven_for_a_part(out: Path, client
     back = {**named, "do": "split", "students": ["ben"], "name": " ", "was": 1}
     assert client.post("/clusters", back).status == 200
     assert "3 students" in client.get("/clusters").text
+
+
+def test_a_click_runs_a_submission_again(tmp_path: Path) -> None:
+    lesson, bot = tmp_path / "lesson", tmp_path / "class" / "ana" / "bot"
+    for folder in (lesson, bot):
+        folder.mkdir(parents=True)
+    (lesson / "assignment.yaml").write_text(
+        "rosgrade: 1\nid: lesson\ntitle: Bot\npackages: [{name: bot}]\nchecks:\n"
+        "  - {id: found, uses: package.found, with: {package: bot}, points: 1}\n"
+    )
+    (bot / "package.xml").write_text("<package format='3'><name>bott</name></package>")
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "grader", "batch", str(lesson), str(tmp_path / "class")]
+    subprocess.run([*command, "--out", str(out), "-q"], check=True, capture_output=True)
+    first = read_result(out / "submissions" / "ana" / "result.json")
+    server = ReviewServer(out, "AK")
+    try:
+        client = Client(server).open()
+        assert client.post(f"{page('ana')}again", {}).status == 200
+        shutil.rmtree(tmp_path / "class")
+        gone = client.post(f"{page('ana')}again", {})
+    finally:
+        server.close()
+    assert read_result(out / "submissions" / "ana" / "result.json").started > first.started
+    assert gone.status == 422 and "class" in gone.text and "Traceback" not in gone.text
