@@ -20,7 +20,7 @@ from grader.errors import GraderFault, RosgradeError, UsageError, machine_fault
 from grader.grading.files import write_graded
 from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.grading.last_attempt import EARLIER
-from grader.grading.regrading import find, regrade
+from grader.grading.regrading import find_recordings, regrade
 from grader.recording.model import to_json
 from grader.report.files import write_whole
 from grader.report.model.facts import Clock
@@ -140,7 +140,7 @@ class Batch:
         if result is None or result.submission.sha256 != self._entries[key].sha256:
             return False
         given = self._given[key]
-        if given and dict(find(self.ledger.folder(key)).submission.given) != given:
+        if given and dict(find_recordings(self.ledger.folder(key)).submission.given) != given:
             return False
         # Of identical submissions only one is graded, even if another one was named.
         same = {key, *self._twins.get(key, ())}
@@ -296,7 +296,7 @@ def copy_result(loaded: LoadedAssignment, ledger: Ledger, key: str, twin: Entry)
     partial = ledger.partial(twin.key)
     history = shutil.ignore_patterns(EARLIER)
     shutil.copytree(ledger.folder(key), partial, dirs_exist_ok=True, ignore=history)
-    found = find(partial)
+    found = find_recordings(partial)
     record = replace(found.submission, id=twin.key)
     write_whole(partial / RECORDINGS_FOLDER / SUBMISSION_FILE, to_json(record))
     write_graded(regrade(loaded, replace(found, submission=record)), partial, Clock())

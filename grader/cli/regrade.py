@@ -53,13 +53,13 @@ def _one(path: Path, assignment: str | None, *, write: bool) -> None:
     from grader.assignment.load import load_assignment
     from grader.grading.attempts import with_history
     from grader.grading.files import REPORT_FILE, write_graded
-    from grader.grading.regrading import compare, find, refuse_other, stored_assignment
+    from grader.grading.regrading import compare, find_recordings, refuse_other, stored_assignment
     from grader.grading.regrading import regrade as judge_again
     from grader.report.model.facts import Clock, RunFacts
     from grader.report.model.result import make_result
     from grader.report.text.terminal import print_grade
 
-    found = find(path)
+    found = find_recordings(path)
     words = ("regrade", str(path))
     loaded = load_assignment(
         assignment or stored_assignment(path, found.assignment, found.location, *words)

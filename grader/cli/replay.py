@@ -40,8 +40,8 @@ def replay(
     from grader.assignment.load import load_assignment
     from grader.errors import UsageError
     from grader.grade.judge import why_not_run
-    from grader.grade.naming import named
-    from grader.grading.regrading import find, stored_assignment
+    from grader.grade.naming import with_chosen_names
+    from grader.grading.regrading import find_recordings, stored_assignment
     from grader.grading.type_support import TypeSupport
     from grader.machine import ros
     from grader.recording.mcap_reader import read_recording
@@ -52,7 +52,7 @@ def replay(
     from grader.submission.prepare import Preparation, prepare
 
     recorded = read_recording(recording)
-    found = find(recording)
+    found = find_recordings(recording)
     words = ("replay", str(recording), str(submission))
     loaded = load_assignment(
         assignment or stored_assignment(recording, found.assignment, found.location, *words)
@@ -65,7 +65,7 @@ def replay(
         how = Preparation(installation, cache_folder(), on_progress=progress.say)
         prepared = prepare(submission, how)
         record = replace(prepared.record, given=recorded.submission.given)
-        loaded, _, _ = named(loaded, record, {recorded.scenario: recorded})
+        loaded, _, _ = with_chosen_names(loaded, record, {recorded.scenario: recorded})
         type_support = TypeSupport(loaded, ros.find(), cache_folder()).prefixes(progress.say)
     reason = why_not_run(prepared.record, [one.name for one in loaded.assignment.packages])
     if prepared.install is None or reason is not None:

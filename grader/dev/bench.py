@@ -26,7 +26,7 @@ from grader.assignment.mutant import reference_of
 from grader.grading.files import write_graded
 from grader.grading.graded import RECORDINGS_FOLDER
 from grader.grading.grading import Grading
-from grader.grading.regrading import find, regrade
+from grader.grading.regrading import find_recordings, regrade
 from grader.grading.spine import run_and_judge
 from grader.machine import ros
 from grader.machine.load import cpu_count
@@ -146,7 +146,7 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
         samples[f"batch of {name}: share of what the CPUs bound"].append(share)
         began_s = time.monotonic()
         for _ in range(REGRADED):
-            regrade(loaded, find(folder / name / "0"))
+            regrade(loaded, find_recordings(folder / name / "0"))
         rate = 60 * REGRADED / (time.monotonic() - began_s)
         samples[f"regrade of {name}: submissions per minute"].append(rate)
 

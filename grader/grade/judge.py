@@ -22,7 +22,7 @@ from grader.findings.finding import Finding, Status, Verdict
 from grader.findings.words import speaking
 from grader.grade.chain import NOT_YOURS, Case, fault, judged, why_incomplete
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
-from grader.grade.naming import named
+from grader.grade.naming import with_chosen_names
 from grader.grade.runtime_imports import with_runtime_imports
 from grader.recording.model import Ending, Recording
 from grader.recording.submission import CPP, SubmissionRecord
@@ -58,7 +58,7 @@ def grade(
         faults: By scenario id: why there is no recording.
     """
     with speaking(submission.spoken(())):
-        loaded, submission, unnamed = named(loaded, submission, recordings)
+        loaded, submission, unnamed = with_chosen_names(loaded, submission, recordings)
     bound = {item.spec.id: item for item in loaded.checks}
     known = with_runtime_imports(submission, recordings.values())
     results: dict[str, CheckResult] = {}

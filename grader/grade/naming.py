@@ -88,7 +88,7 @@ def _programs(package: PackageRecord) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def named(
+def with_chosen_names(
     loaded: LoadedAssignment,
     submission: SubmissionRecord,
     recordings: Mapping[str, Recording] = {},

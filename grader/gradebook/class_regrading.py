@@ -16,7 +16,7 @@ from grader.gradebook.class_files import GRADES_FILE, NO_RESULT, all_standing, w
 from grader.gradebook.rendering import bring_up_to_date
 from grader.grading.files import RESULT_FILE, write_graded
 from grader.grading.last_attempt import keep_earlier
-from grader.grading.regrading import compare, find, refuse_other, regrade
+from grader.grading.regrading import compare, find_recordings, refuse_other, regrade
 from grader.report.model.facts import Clock, RunFacts
 from grader.report.model.result import make_result
 from grader.report.model.result_model import Result
@@ -82,7 +82,7 @@ def _regrade(
 ) -> Regraded:
     folder = ledger.folder(entry.key)
     try:
-        found = find(folder)
+        found = find_recordings(folder)
     except RosgradeError as error:
         why = str(error).partition("\n")[0]
         noted = entry.with_problem(f"not judged again: {why}")

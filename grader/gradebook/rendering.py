@@ -16,7 +16,7 @@ from grader.batch.used_assignment import refuse_changed, regrade_command
 from grader.errors import RosgradeError, UsageError
 from grader.gradebook.adjusting import ClassAdjustments
 from grader.grading.files import RESULT_FILE, write_report
-from grader.grading.regrading import find, regrade, stored_assignment
+from grader.grading.regrading import find_recordings, regrade, stored_assignment
 from grader.report.files import write_whole
 from grader.report.model.result import read_result, result_json
 from grader.report.model.result_model import Result
@@ -65,7 +65,7 @@ def render_again(
     Args:
         amended: What is added to the results of its class now.
     """
-    found = find(folder)
+    found = find_recordings(folder)
     result = found.result or read_result(folder / RESULT_FILE)
     used = result.assignment
     words = ("report", str(folder))

@@ -14,7 +14,7 @@ from grader.assignment.limits import BuildLimitOptions
 from grader.assignment.load import LoadedAssignment
 from grader.checks.check import Parameters
 from grader.checks.need import Bags, Need, StudentTests
-from grader.grade.naming import named
+from grader.grade.naming import with_chosen_names
 from grader.grading.type_support import TypeSupport
 from grader.machine.load import cpu_count
 from grader.recording.model import Recording
@@ -104,7 +104,7 @@ class Grading:
 
         def tested(record: SubmissionRecord) -> frozenset[str]:
             self.told.recorded(record, {})
-            loaded, record, _ = named(self.loaded, replace(record, given=given))
+            loaded, record, _ = with_chosen_names(self.loaded, replace(record, given=given))
             return frozenset(one.name for name in _tested(loaded) if (one := record.package(name)))
 
         return Preparation(

@@ -50,7 +50,7 @@ class FoundRecordings:
         return self.result.assignment.location if self.result is not None else None
 
 
-def find(path: Path) -> FoundRecordings:
+def find_recordings(path: Path) -> FoundRecordings:
     """Find the recordings at a path."""
     if not path.exists():
         raise UsageError(f"{path}: does not exist")

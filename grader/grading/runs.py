@@ -10,7 +10,7 @@ from pathlib import Path
 from grader.errors import GraderFault, UsageError, machine_fault
 from grader.findings.finding import Status
 from grader.grade import Grade, grade
-from grader.grade.naming import named
+from grader.grade.naming import with_chosen_names
 from grader.grading.graded import SUBMISSION_FILE, Graded
 from grader.grading.grading import Grading
 from grader.grading.next_runs import Round, Run, times_run
@@ -30,7 +30,7 @@ class Runs:
 
     def __init__(self, grading: Grading, prepared: Prepared, folder: Path) -> None:
         """Set up, and note what was handed in; recordings of before are gone then."""
-        self._loaded, record, unnamed = named(grading.loaded, prepared.record)
+        self._loaded, record, unnamed = with_chosen_names(grading.loaded, prepared.record)
         self._grading = grading
         self._support = grading.type_support_of(self._loaded)
         self._prepared = replace(prepared, record=record)
@@ -57,7 +57,9 @@ class Runs:
             self._grading.loaded, self._record, self._recordings, self._faults
         )
         if result.assignment != self._loaded.assignment:
-            self._loaded, _, _ = named(self._grading.loaded, self._record, self._recordings)
+            self._loaded, _, _ = with_chosen_names(
+                self._grading.loaded, self._record, self._recordings
+            )
         disturbed = result.disturbed_scenarios(Status.ERROR)
         faulty = [name for name, recording in self._recordings.items() if recording.faults]
         return Round(

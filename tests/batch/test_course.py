@@ -28,7 +28,7 @@ from grader.gradebook.class_regrading import regrade_class
 from grader.gradebook.rendering import bring_up_to_date
 from grader.grading.files import REPORT_FILE, RESULT_FILE, STUDENT_FILE, write_graded
 from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE
-from grader.grading.regrading import find, regrade
+from grader.grading.regrading import find_recordings, regrade
 from grader.recording.model import to_json
 from grader.recording.submission import PackageRecord, SubmissionRecord
 from grader.report.files import write_whole
@@ -77,7 +77,7 @@ class Reader:
         record = SubmissionRecord(key, fingerprint(path), packages=packages)
         (folder / RECORDINGS_FOLDER).mkdir()
         write_whole(folder / RECORDINGS_FOLDER / SUBMISSION_FILE, to_json(record))
-        write_graded(regrade(self._loaded, find(folder)), folder, Clock())
+        write_graded(regrade(self._loaded, find_recordings(folder)), folder, Clock())
         done: Future[None] = Future()
         done.set_result(None)
         return done

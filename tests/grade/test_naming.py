@@ -15,7 +15,7 @@ from grader.assignment.selection import select
 from grader.errors import UsageError
 from grader.findings.finding import Status
 from grader.grade import Grade, grade
-from grader.grade.naming import named
+from grader.grade.naming import with_chosen_names
 from grader.recording.interaction import Service
 from grader.recording.model import Recording
 from grader.recording.submission import BuildRecord, Definition, PackageRecord, SubmissionRecord
@@ -89,7 +89,7 @@ def test_names_of_the_submission_stand_everywhere_and_a_number_alone_is_a_number
     loaded: LoadedAssignment,
 ) -> None:
     record = submission("group12_gp2", "blue_maps", scripts=("driver",))
-    found, _, why = named(loaded, record)
+    found, _, why = with_chosen_names(loaded, record)
     assert why is None
     launch = found.assignment.scenarios[0].launch[0]
     assert (launch.package, launch.executable) == ("group12_gp2", "driver")
@@ -100,7 +100,7 @@ def test_names_of_the_submission_stand_everywhere_and_a_number_alone_is_a_number
 
 def test_a_part_of_an_assignment_stays_the_same_part(loaded: LoadedAssignment) -> None:
     part = select(loaded, ("maps",))
-    found, *_ = named(part, submission("group12_gp2", "blue_maps"))
+    found, *_ = with_chosen_names(part, submission("group12_gp2", "blue_maps"))
     assert [check.spec.id for check in found.checks] == ["maps"]
     assert found.assignment.scenarios == ()
 
@@ -128,7 +128,7 @@ def test_two_names_that_fit_are_both_told(loaded: LoadedAssignment) -> None:
 
 
 def test_a_free_choice_must_be_a_single_one(loaded: LoadedAssignment) -> None:
-    *_, why = named(loaded, submission("group7_gp2", scripts=("bot", "test")))
+    *_, why = with_chosen_names(loaded, submission("group7_gp2", scripts=("bot", "test")))
     assert why is not None
     assert why.finding.expected == "one executable of `group7_gp2` of any name, such as `bot`"
     assert why.finding.observed == "found `bot` and `test`"
@@ -150,13 +150,13 @@ def test_a_name_of_what_was_not_built_is_not_asked_for_and_the_build_is_told(
     loaded: LoadedAssignment,
 ) -> None:
     record = failed_build(submission("group12_gp2", "red_maps"), "group12_gp2")
-    found, _, why = named(loaded, record)
+    found, _, why = with_chosen_names(loaded, record)
     assert why is None
     assert (found.assignment.title, found.values["run"]) == ("The bot of group 12", "driver")
     silent = dataclasses.replace(
         record, packages=tuple(dataclasses.replace(one, cmake="") for one in record.packages)
     )
-    found, _, why = named(loaded, silent)
+    found, _, why = with_chosen_names(loaded, silent)
     assert why is None
     assert (found.assignment.title, found.values["run"]) == ("The bot of group 12", "bot")
 
@@ -174,7 +174,7 @@ def test_a_check_of_a_name_that_was_found_does_not_fail_by_another(
 
 def test_the_roster_comes_before_what_was_handed_in(loaded: LoadedAssignment) -> None:
     record = submission("group7_gp2", "blue_maps", team="green")
-    found, *_ = named(loaded, record)
+    found, *_ = with_chosen_names(loaded, record)
     assert found.values["team"] == "green"
     result = grade(loaded, record, {}).result("maps")
     assert "green_maps" in result.decisive.finding.expected
@@ -184,13 +184,13 @@ def test_a_value_of_the_roster_that_is_no_name_is_no_fault_of_the_student(
     loaded: LoadedAssignment,
 ) -> None:
     with pytest.raises(UsageError, match="'Team' of the roster holds 'red team'"):
-        named(loaded, submission("group7_gp2", team="red team"))
+        with_chosen_names(loaded, submission("group7_gp2", team="red team"))
 
 
 def test_a_service_of_any_name_is_found_in_the_run_by_its_type(loaded: LoadedAssignment) -> None:
     record = submission("group7_gp2", "red_maps")
-    assert named(loaded, record)[0].values["toggle"] == "/toggle"
-    assert named(loaded, record, runs(record, "/light"))[0].values["toggle"] == "/light"
+    assert with_chosen_names(loaded, record)[0].values["toggle"] == "/toggle"
+    assert with_chosen_names(loaded, record, runs(record, "/light"))[0].values["toggle"] == "/light"
     graded = grade(loaded, record, runs(record, "/light"))
     assert graded.result("service").status is Status.PASSED
 
@@ -210,7 +210,7 @@ def test_a_package_name_that_begins_with_a_digit_breaks_rep_144_and_is_graded(
     loaded: LoadedAssignment,
 ) -> None:
     record = submission("group7_gp2", "7up_maps")
-    found, _, why = named(loaded, record)
+    found, _, why = with_chosen_names(loaded, record)
     assert why is None and found.values["team"] == "7up"
     finding = grade(loaded, record, {}).result("maps").decisive.finding
     assert finding.status is Status.FAILED
@@ -222,7 +222,7 @@ def test_a_name_that_ros_does_not_allow_is_told_and_not_run(tmp_path: Path) -> N
     folder.mkdir()
     text = YAML.replace('{call: "{toggle}"', '{call: "/{team}/toggle"')
     (folder / "assignment.yaml").write_text(text, encoding="utf-8")
-    *_, why = named(load_assignment(folder), submission("group7_gp2", "7up_maps"))
+    *_, why = with_chosen_names(load_assignment(folder), submission("group7_gp2", "7up_maps"))
     assert why is not None
     assert "'/7up/toggle' is not a ROS topic name" in why.finding.observed
 
@@ -257,7 +257,7 @@ def stand_in(tmp_path: Path, **facts: Any) -> tuple[Grade, SubmissionRecord]:
     loaded = load_assignment(folder)
     package = PackageRecord(**{"name": "bot_publish", "path": "bot_publish", **facts})
     record = dataclasses.replace(submission(), packages=(package,))
-    return grade(loaded, record, {}), named(loaded, record)[1]
+    return grade(loaded, record, {}), with_chosen_names(loaded, record)[1]
 
 
 @pytest.mark.parametrize(
@@ -360,7 +360,7 @@ def test_an_interface_under_another_name_is_used_instead_and_costs_its_own_check
             PackageRecord(package, package, "ament_cmake", definitions=(definition,)),
         ),
     )
-    found, record, _ = named(loaded, record)
+    found, record, _ = with_chosen_names(loaded, record)
     type_ = f"{package}/msg/{interface}"
     assert found.assignment.scenarios[0].record[0].type == type_
     run = dataclasses.replace(recording(), scenario="main", submission=record, names=record.names)

@@ -29,7 +29,7 @@ from grader.grading import spine
 from grader.grading.files import REPORT_FILE, RESULT_FILE, write_graded
 from grader.grading.graded import Graded
 from grader.grading.grading import Grading, Told
-from grader.grading.regrading import compare, find, regrade
+from grader.grading.regrading import compare, find_recordings, regrade
 from grader.grading.spine import HandedIn, run_and_judge
 from grader.machine import ros
 from grader.recording.event import Disturbance
@@ -270,7 +270,7 @@ def test_what_has_not_the_name_of_the_roster_is_not_run(
     graded = run_and_judge(prepared, Grading(named, ScriptedRunner(), tmp_path / "cache"), tmp_path)
     assert graded.grade.graded and graded.grade.score == 0
     assert "blue" in graded.grade.result("alive").decisive.finding.expected
-    again = regrade(named, find(tmp_path))
+    again = regrade(named, find_recordings(tmp_path))
     assert again.grade.assignment.packages[0].name == "blue"
 
 
@@ -395,7 +395,7 @@ def test_recordings_are_judged_again_without_running_anything(
     grade: Grade, lesson: LoadedAssignment, tmp_path: Path
 ) -> None:
     first, _ = grade(recording(stop_s=2.5))
-    found = find(tmp_path / "recordings")
+    found = find_recordings(tmp_path / "recordings")
     assert regrade(lesson, found).grade == first.grade
     (lesson.folder / "assignment.yaml").write_text(
         YAML.replace("within: 2 s", "within: 3 s"), encoding="utf-8"
@@ -472,7 +472,7 @@ def test_a_regrade_says_who_gains_what_and_why(
     (lesson.folder / "assignment.yaml").write_text(
         YAML.replace("within: 2 s", "within: 3 s"), encoding="utf-8"
     )
-    found = find(tmp_path)
+    found = find_recordings(tmp_path)
     assert found.assignment == "lesson"
     assert found.result is not None
     lines = compare(found.result, regrade(load_assignment(lesson.folder), found).grade)
@@ -555,7 +555,7 @@ def test_a_class_is_not_judged_again_as_of_another_assignment(
 
 def test_a_folder_without_recordings_is_a_wrong_use(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="there are no recordings in it"):
-        find(tmp_path)
-    for missing in (find, find_reports):
+        find_recordings(tmp_path)
+    for missing in (find_recordings, find_reports):
         with pytest.raises(UsageError, match="nowhere: does not exist"):
             missing(tmp_path / "nowhere")
