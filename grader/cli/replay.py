@@ -39,7 +39,7 @@ def replay(
 
     from grader.assignment.load import load_assignment
     from grader.errors import UsageError
-    from grader.grade.judge import why_not_run
+    from grader.grade.judging import why_not_run
     from grader.grade.naming import with_chosen_names
     from grader.grading.regrading import find_recordings, stored_assignment
     from grader.grading.type_support import TypeSupport

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.selection import select
 from grader.findings.finding import Status
-from grader.grade.judge import grade
+from grader.grade.judging import judge_all
 from grader.grade.model import CheckResult
 from grader.recording.model import Recording
 from grader.recording.submission import SubmissionRecord
@@ -34,7 +34,7 @@ def judge_early(
     part = select(loaded, decided, tuple(recordings))
     return tuple(
         one
-        for one in grade(part, submission, recordings).results
+        for one in judge_all(part, submission, recordings).results
         if one.id in decided
         and one.status in (Status.PASSED, Status.FAILED)
         and not any(item.finding.disturbed or item.finding.names for item in one.findings)

@@ -11,7 +11,7 @@ from grader.assignment.load import LoadedAssignment, list_assignments
 from grader.assignment.selection import visible_part
 from grader.errors import UsageError
 from grader.findings.finding import Status
-from grader.grade import Grade, grade
+from grader.grade import Grade, judge_all
 from grader.grading.files import RESULT_FILE
 from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.grading.reference_run import read_references
@@ -102,7 +102,7 @@ def regrade(loaded: LoadedAssignment, found: FoundRecordings) -> Graded:
     if found.result is not None and found.result.withheld.checks:
         loaded = visible_part(loaded)
     return Graded(
-        grade=grade(loaded, found.submission, found.recordings),
+        grade=judge_all(loaded, found.submission, found.recordings),
         prepared=Prepared(record=found.submission, install=None),
         recordings=found.recordings,
         files=found.files,

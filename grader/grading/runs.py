@@ -9,7 +9,7 @@ from pathlib import Path
 
 from grader.errors import GraderFault, UsageError, machine_fault
 from grader.findings.finding import Status
-from grader.grade import Grade, grade
+from grader.grade import Grade, judge_all
 from grader.grade.naming import with_chosen_names
 from grader.grading.graded import SUBMISSION_FILE, Graded
 from grader.grading.grading import Grading
@@ -53,7 +53,7 @@ class Runs:
 
     def judged(self, runs: Sequence[Run]) -> Round:
         """What is known after some runs, which were the last."""
-        result = self._result = grade(
+        result = self._result = judge_all(
             self._grading.loaded, self._record, self._recordings, self._faults
         )
         if result.assignment != self._loaded.assignment:

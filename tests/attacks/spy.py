@@ -58,8 +58,8 @@ def read_other_submission():
 
 
 def import_rosgrade():
-    import grader.grade.judge
-    return grader.grade.judge.__file__
+    import grader.grade.judging
+    return grader.grade.judging.__file__
 
 
 def import_library_of_rosgrade():
@@ -219,7 +219,7 @@ SIMPLE = {
     'read_instructors_home': lambda: read(TARGETS['home']),
     'read_reference': lambda: os.listdir(TARGETS['repository'] + '/reference'),
     'read_assignments': lambda: os.listdir(TARGETS['repository'] + '/assignments'),
-    'read_code_of_rosgrade': lambda: read(TARGETS['repository'] + '/grader/grade/judge.py'),
+    'read_code_of_rosgrade': lambda: read(TARGETS['repository'] + '/grader/grade/judging.py'),
     'read_host_password_file': lambda: read('/etc/shadow'),
     'forge_result': lambda: write(TARGETS['result']),
     'plant_in_cache': lambda: write(glob.glob(TARGETS['cache'] + '/python/*')[0] + '/planted'),

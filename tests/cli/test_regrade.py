@@ -12,7 +12,7 @@ import pytest
 
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.ledger import Entry, Ledger
-from grader.grade import grade
+from grader.grade import judge_all
 from grader.gradebook.class_files import standing, write_class
 from grader.grading.files import write_graded
 from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
@@ -45,7 +45,7 @@ BROKEN = "zed.zip: is broken"
 def graded(loaded: LoadedAssignment, name: str, sha256: str, problem: str | None) -> Graded:
     """A submission without any package, judged."""
     record = SubmissionRecord(name, sha256, problem)
-    return Graded(grade(loaded, record, {}), Prepared(record, None), {}, {}, {}, {})
+    return Graded(judge_all(loaded, record, {}), Prepared(record, None), {}, {}, {}, {})
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ from grader.diagnosis.mistake import TABLE, remedy
 from grader.diagnosis.process import exceptions
 from grader.findings.finding import Finding, Status
 from grader.findings.words import SPIN_NODE, Words, speaking
-from grader.grade import grade
+from grader.grade import judge_all
 from grader.grade.model import CheckResult
 from grader.machine import resources
 from grader.recording.submission import CPP, PYTHON, PackageRecord, SourceFile
@@ -183,7 +183,7 @@ def _grade_in(language: str, hint: str, says: Finding) -> CheckResult:
     }
     record = packages[language]
     loaded = make_loaded([Told("node", says, hint=hint)])
-    return grade(loaded, record, {"listen": make_recording(submission=record)}).result("node")
+    return judge_all(loaded, record, {"listen": make_recording(submission=record)}).result("node")
 
 
 @given(written=_TEXT, printed=_TEXT)
@@ -294,7 +294,7 @@ def test_findings_and_hints_of_the_author_are_in_the_language_of_the_package() -
         (make_submission(), ("Call rclpy.spin(node).", words["python"], "It imports rclpy.")),
     ):
         run = {"listen": make_recording(submission=record)}
-        result = grade(loaded, record, run).result("node")
+        result = judge_all(loaded, record, run).result("node")
         assert (result.decisive.finding.hint, *result.hints) == expected
 
 
@@ -305,7 +305,7 @@ def test_a_check_that_reads_python_takes_no_points_from_students_of_cpp() -> Non
     compiled = PackageRecord("bot_publisher", "src/bot_publisher", "ament_cmake")
     record = make_submission(packages=(compiled,), files=("src/bot_publisher/src/bot.cpp",))
     check = Told("classes", FAIL, Subject.SUBMISSION, parameters=OfPython())
-    result = grade(make_loaded([check]), record, {}).result("classes")
+    result = judge_all(make_loaded([check]), record, {}).result("classes")
     assert result.status is Status.ERROR
     assert "reads Python" in result.decisive.finding.observed
     assert not check.asked

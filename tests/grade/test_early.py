@@ -7,7 +7,7 @@ from dataclasses import replace
 from grader.checks.check import Subject
 from grader.findings.finding import Status
 from grader.grade.early import judge_early
-from grader.grade.judge import grade
+from grader.grade.judging import judge_all
 from grader.spec.names import Names, Thing, WrongName
 from tests.grade.sample import FAIL, PASS, Told, make_loaded, make_recording, make_submission
 
@@ -27,7 +27,7 @@ def test_a_check_is_told_when_its_last_scenario_is_recorded():
     turns = Told("turns", PASS, scenarios=("near", "far"))
     assert early(stops, turns) == {"stops": Status.FAILED}
     both = {name: make_recording(name) for name in SCENARIOS}
-    whole = grade(make_loaded((stops, turns), SCENARIOS), make_submission(), both)
+    whole = judge_all(make_loaded((stops, turns), SCENARIOS), make_submission(), both)
     assert early(stops, turns, recordings=both) == {one.id: one.status for one in whole.results}
 
 

@@ -14,7 +14,7 @@ from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.selection import select
 from grader.errors import UsageError
 from grader.findings.finding import Status
-from grader.grade import Grade, grade
+from grader.grade import Grade, judge_all
 from grader.grade.naming import with_chosen_names
 from grader.recording.interaction import Service
 from grader.recording.model import Recording
@@ -108,7 +108,7 @@ def test_a_part_of_an_assignment_stays_the_same_part(loaded: LoadedAssignment) -
 def test_where_no_name_fits_each_check_of_it_tells_the_form_and_what_was_found(
     loaded: LoadedAssignment,
 ) -> None:
-    graded = grade(loaded, submission("team7", "red_maps"), {})
+    graded = judge_all(loaded, submission("team7", "red_maps"), {})
     result = graded.result("bot")
     assert result.status is Status.FAILED
     finding = result.decisive.finding
@@ -121,7 +121,7 @@ def test_where_no_name_fits_each_check_of_it_tells_the_form_and_what_was_found(
 
 
 def test_two_names_that_fit_are_both_told(loaded: LoadedAssignment) -> None:
-    graded = grade(loaded, submission("group7_gp2", "group12_gp2", "red_maps"), {})
+    graded = judge_all(loaded, submission("group7_gp2", "group12_gp2", "red_maps"), {})
     assert graded.result("bot").decisive.finding.observed == (
         "found `group7_gp2` and `group12_gp2`"
     )
@@ -164,7 +164,7 @@ def test_a_name_of_what_was_not_built_is_not_asked_for_and_the_build_is_told(
 def test_a_check_of_a_name_that_was_found_does_not_fail_by_another(
     loaded: LoadedAssignment,
 ) -> None:
-    graded = grade(loaded, submission("group12_gp2", "red_maps", scripts=()), {})
+    graded = judge_all(loaded, submission("group12_gp2", "red_maps", scripts=()), {})
     assert graded.result("bot").status is Status.PASSED
     assert "group12_gp2" in graded.result("bot").decisive.finding.observed
     service = graded.result("service").decisive.finding
@@ -176,7 +176,7 @@ def test_the_roster_comes_before_what_was_handed_in(loaded: LoadedAssignment) ->
     record = submission("group7_gp2", "blue_maps", team="green")
     found, *_ = with_chosen_names(loaded, record)
     assert found.values["team"] == "green"
-    result = grade(loaded, record, {}).result("maps")
+    result = judge_all(loaded, record, {}).result("maps")
     assert "green_maps" in result.decisive.finding.expected
 
 
@@ -191,7 +191,7 @@ def test_a_service_of_any_name_is_found_in_the_run_by_its_type(loaded: LoadedAss
     record = submission("group7_gp2", "red_maps")
     assert with_chosen_names(loaded, record)[0].values["toggle"] == "/toggle"
     assert with_chosen_names(loaded, record, runs(record, "/light"))[0].values["toggle"] == "/light"
-    graded = grade(loaded, record, runs(record, "/light"))
+    graded = judge_all(loaded, record, runs(record, "/light"))
     assert graded.result("service").status is Status.PASSED
 
 
@@ -200,7 +200,7 @@ def test_none_or_two_services_of_the_type_are_what_the_check_finds(
     loaded: LoadedAssignment, services: tuple[str, ...]
 ) -> None:
     record = submission("group7_gp2", "red_maps")
-    result = grade(loaded, record, runs(record, *services)).result("service")
+    result = judge_all(loaded, record, runs(record, *services)).result("service")
     assert result.status is Status.FAILED
     assert "`/toggle`" in result.decisive.finding.expected
     assert all(service in result.decisive.finding.observed for service in services)
@@ -212,7 +212,7 @@ def test_a_package_name_that_begins_with_a_digit_breaks_rep_144_and_is_graded(
     record = submission("group7_gp2", "7up_maps")
     found, _, why = with_chosen_names(loaded, record)
     assert why is None and found.values["team"] == "7up"
-    finding = grade(loaded, record, {}).result("maps").decisive.finding
+    finding = judge_all(loaded, record, {}).result("maps").decisive.finding
     assert finding.status is Status.FAILED
     assert "REP-144" in finding.observed
 
@@ -257,7 +257,7 @@ def stand_in(tmp_path: Path, **facts: Any) -> tuple[Grade, SubmissionRecord]:
     loaded = load_assignment(folder)
     package = PackageRecord(**{"name": "bot_publish", "path": "bot_publish", **facts})
     record = dataclasses.replace(submission(), packages=(package,))
-    return grade(loaded, record, {}), with_chosen_names(loaded, record)[1]
+    return judge_all(loaded, record, {}), with_chosen_names(loaded, record)[1]
 
 
 @pytest.mark.parametrize(
@@ -281,7 +281,7 @@ def test_a_package_with_a_wrong_name_costs_the_points_of_its_own_check(
     names = record.names
     assert graded.names == {"main": names} and names
     run = dataclasses.replace(recording(), scenario="main", submission=record, names=names)
-    graded = grade(load_assignment(tmp_path / "stand_in"), record, {"main": run})
+    graded = judge_all(load_assignment(tmp_path / "stand_in"), record, {"main": run})
     assert graded.result("starts").status is not Status.SKIPPED
 
 
@@ -364,7 +364,7 @@ def test_an_interface_under_another_name_is_used_instead_and_costs_its_own_check
     type_ = f"{package}/msg/{interface}"
     assert found.assignment.scenarios[0].record[0].type == type_
     run = dataclasses.replace(recording(), scenario="main", submission=record, names=record.names)
-    graded = grade(loaded, record, {"main": run})
+    graded = judge_all(loaded, record, {"main": run})
     assert {one.id for one in graded.results if one.put_right} == lost
     assert graded.result("fields").status is Status.PASSED
     assert type_ in graded.result("type").decisive.finding.expected

@@ -4,7 +4,7 @@ import pytest
 
 from grader.assignment.load import load_assignment
 from grader.errors import AssignmentError
-from grader.grade import grade
+from grader.grade import judge_all
 from tests.assignment.lessons import HEAD
 from tests.checks.builder import every, messages, recording
 
@@ -24,7 +24,7 @@ def points(folder, tolerance, looser="5 %", window="", **changes):
     text = HEAD + CHECK.format(tolerance=tolerance).replace("5 %}}", f"{looser}}}}}") + window
     (folder / "lesson" / "assignment.yaml").write_text(text)
     run = recording(scenario="run", **changes)
-    result = grade(load_assignment(folder / "lesson"), run.submission, {"run": run})
+    result = judge_all(load_assignment(folder / "lesson"), run.submission, {"run": run})
     return result.results[0]
 
 

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.findings.finding import Finding, Status
-from grader.grade import grade
+from grader.grade import judge_all
 from tests.grade.sample import FAIL, PASS, Told, make_loaded, make_recording, make_submission
 
 SCENARIOS = ("listen", "renamed")
@@ -34,7 +34,7 @@ def assignments(draw):
 
 def judge(checks, scenarios=SCENARIOS):
     recordings = {name: make_recording(name) for name in scenarios}
-    return grade(make_loaded(checks, SCENARIOS), make_submission(), recordings)
+    return judge_all(make_loaded(checks, SCENARIOS), make_submission(), recordings)
 
 
 @given(assignments())

@@ -318,8 +318,8 @@ def test_a_failure_of_a_robot_that_the_host_held_up_counts_if_it_happens_again(
         )
         return dataclasses.replace(graded, results=results)
 
-    judge = runs_module.grade
-    monkeypatch.setattr(runs_module, "grade", doubted)
+    judge = runs_module.judge_all
+    monkeypatch.setattr(runs_module, "judge_all", doubted)
     wrong = recording(stop_s=2.5)
     graded, runner = grade(wrong, recording())
     assert graded.grade.full_points

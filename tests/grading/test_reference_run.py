@@ -10,7 +10,7 @@ import pytest
 
 from grader.assignment.load import list_assignments, load_assignment
 from grader.errors import AssignmentError, UsageError
-from grader.grade import grade
+from grader.grade import judge_all
 from grader.grading.reference_run import REFERENCE_FILE, keep_reference, read_references
 from tests.grade.sample import FAIL, Told, make_loaded, make_submission
 from tests.report.gallery import ahead_until
@@ -30,7 +30,7 @@ def make(folder: Path, says=None):
 
 def kept(loaded, recordings):
     """Where the runs of a reference with full points are kept."""
-    keep_reference(loaded, grade(loaded, make_submission(), recordings), recordings)
+    keep_reference(loaded, judge_all(loaded, make_submission(), recordings), recordings)
     return loaded.folder / REFERENCE_FILE
 
 
@@ -83,13 +83,13 @@ def test_a_damaged_file_is_refused(tmp_path, content):
 
 def test_what_is_kept_is_named(tmp_path):
     loaded, recordings = make(tmp_path)
-    told = keep_reference(loaded, grade(loaded, make_submission(), recordings), recordings)
+    told = keep_reference(loaded, judge_all(loaded, make_submission(), recordings), recordings)
     assert told.endswith(f"1 run of the reference kept in {tmp_path / REFERENCE_FILE}")
 
 
 def test_a_reference_that_loses_points_is_not_kept(tmp_path):
     loaded, recordings = make(tmp_path, FAIL)
-    result = grade(loaded, make_submission(), recordings)
+    result = judge_all(loaded, make_submission(), recordings)
     with pytest.raises(UsageError, match="does not get full points"):
         keep_reference(loaded, result, recordings)
     assert not (tmp_path / REFERENCE_FILE).exists()

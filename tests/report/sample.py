@@ -13,7 +13,7 @@ from rich.console import Console
 
 from grader.checks.check import Subject
 from grader.findings.finding import Evidence, Finding, Moment, Plot, Table
-from grader.grade import Grade, grade
+from grader.grade import Grade, judge_all
 from grader.recording.event import Breach, Disturbance
 from grader.recording.model import NS, Call, LogLine, Message, Node, Owner, Process, Recording
 from grader.recording.submission import BuildRecord, SourceError, SubmissionRecord
@@ -110,7 +110,7 @@ def judged_runs(
     """A grade by checks of these runs, by scenario."""
     made = make_loaded(checks, tuple(recordings) or ("listen",), **loaded)
     return Sample(
-        grade(made, submission or make_submission(), recordings), recordings, make_facts()
+        judge_all(made, submission or make_submission(), recordings), recordings, make_facts()
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 from grader.assignment.load import load_assignment
 from grader.errors import UsageError
 from grader.findings.finding import Evidence, Finding, Plot
-from grader.grade import grade
+from grader.grade import judge_all
 from grader.report.model.result import (
     make_result,
     read_result,
@@ -74,7 +74,7 @@ def test_where_the_assignment_lies_is_known_unless_it_is_one_of_rosgrade_s_own(t
     (tmp_path / "lesson").mkdir()
     (tmp_path / "lesson" / "assignment.yaml").write_text(GOOD, encoding="utf-8")
     for name, location in ((tmp_path / "lesson", str(tmp_path / "lesson")), ("qos", None)):
-        judged = grade(load_assignment(name), make_submission(), {})
+        judged = judge_all(load_assignment(name), make_submission(), {})
         assert make_result(judged, {}, make_facts()).assignment.location == location
 
 

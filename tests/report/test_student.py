@@ -17,7 +17,7 @@ from grader.assignment.selection import visible_part
 from grader.checks.check import Subject
 from grader.errors import GraderFault
 from grader.findings.finding import Evidence, Finding, Moment, Plot, Table
-from grader.grade import grade
+from grader.grade import judge_all
 from grader.recording.submission import SourceError
 from grader.report import formats
 from grader.report.audience import RENDERERS, Audience
@@ -104,7 +104,7 @@ def recordings():
 def whole(loaded):
     runs = recordings()
     facts = make_facts(recordings={name: f"recordings/{name}.mcap" for name in runs})
-    return Sample(grade(loaded, make_submission(), runs), runs, facts)
+    return Sample(judge_all(loaded, make_submission(), runs), runs, facts)
 
 
 def visible_alone(loaded):
@@ -112,7 +112,7 @@ def visible_alone(loaded):
     part = visible_part(loaded)
     runs = {scenario.id: recordings()[scenario.id] for scenario in part.assignment.scenarios}
     return dataclasses.replace(
-        whole(loaded), grade=grade(part, make_submission(), runs), recordings=runs
+        whole(loaded), grade=judge_all(part, make_submission(), runs), recordings=runs
     )
 
 

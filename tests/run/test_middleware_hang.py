@@ -12,7 +12,7 @@ from grader.assignment.model import Scenario
 from grader.checks.check import Subject
 from grader.checks.parameter.given import PARAMETERS_GIVEN
 from grader.findings.finding import Status
-from grader.grade.judge import grade
+from grader.grade.judging import judge_all
 from grader.run.cell.middleware_hang import ENDED_BY, HangMonitor, hung_recording
 from grader.run.order import CellOrder, ProcessCommand, RunLimits, Until
 from tests.checks.builder import submission
@@ -96,7 +96,7 @@ def test_no_check_takes_a_run_that_hung_for_a_fault_of_rosgrade(name: str) -> No
         scenario.id: hung_recording(order(scenario), submission(), 0)
         for scenario in loaded.assignment.scenarios
     }
-    results = grade(replace(loaded, checks=tuple(alone)), submission(), recordings).results
+    results = judge_all(replace(loaded, checks=tuple(alone)), submission(), recordings).results
     assert {
         result.id: result.status for result in results if result.status is not Status.FAILED
     } == {}

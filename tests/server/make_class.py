@@ -10,7 +10,7 @@ from pathlib import Path
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.ledger import Entry, Ledger
 from grader.errors import UsageError
-from grader.grade import grade
+from grader.grade import judge_all
 from grader.gradebook.class_files import standing, write_class
 from grader.grading.files import write_graded
 from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
@@ -118,6 +118,6 @@ def put(ledger: Ledger, loaded: LoadedAssignment, submission: SubmissionRecord) 
     (partial / RECORDINGS_FOLDER).mkdir()
     (partial / RECORDINGS_FOLDER / SUBMISSION_FILE).write_bytes(to_json(submission))
     prepared = Prepared(submission, None)
-    judged = Graded(grade(loaded, submission, {}), prepared, {}, {}, {}, {})
+    judged = Graded(judge_all(loaded, submission, {}), prepared, {}, {}, {}, {})
     write_graded(judged, partial, Clock())
     ledger.put(submission.id, partial)

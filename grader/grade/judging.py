@@ -40,7 +40,7 @@ _CREDIT: Mapping[Counts, Callable[[Sequence[float]], float]] = {
 }
 
 
-def grade(
+def judge_all(
     loaded: LoadedAssignment,
     submission: SubmissionRecord,
     recordings: Mapping[str, Recording],

@@ -8,7 +8,7 @@ from grader.assignment.model import Launch
 from grader.checks.check import Subject
 from grader.checks.motion.robot_check import RobotParameters
 from grader.findings.finding import Evidence, Finding, Moment, Status, Verdict
-from grader.grade import grade
+from grader.grade import judge_all
 from grader.recording.event import Disturbance
 from grader.recording.model import NS, Call, Ending, Node, Owner
 from grader.recording.simulated import Truth
@@ -31,7 +31,7 @@ def judge(*checks, scenarios=("listen",), submission=None, recordings=None):
     submission = submission or make_submission()
     if recordings is None:
         recordings = {name: make_recording(name) for name in scenarios}
-    return grade(make_loaded(checks, scenarios), submission, recordings)
+    return judge_all(make_loaded(checks, scenarios), submission, recordings)
 
 
 def drive(seconds):
@@ -355,7 +355,7 @@ class TestNotRun:
             submission = make_submission(packages=(other, cpp), build=lacking)
             recordings = {"listen": make_recording(submission=submission)} if recorded else {}
             loaded = make_loaded([Told("node", FAIL)], launched=launched)
-            finding = grade(loaded, submission, recordings).result("node").decisive.finding
+            finding = judge_all(loaded, submission, recordings).result("node").decisive.finding
             assert finding.status is expected
             assert ("`rclcpp`" in finding.observed) == (launched == "cpp" or other is rests)
 
@@ -441,7 +441,7 @@ def test_a_name_is_put_right_only_where_the_program_that_has_it_wrong_is_launche
     loaded = replace(
         loaded, assignment=loaded.assignment.model_copy(update={"scenarios": scenarios})
     )
-    result = grade(loaded, make_submission(), {"one": make_recording("one")})
+    result = judge_all(loaded, make_submission(), {"one": make_recording("one")})
     assert result.names == {"one": names, "again": names, "other": Names()}
 
 
@@ -466,7 +466,7 @@ def test_what_lies_in_the_namespace_of_a_misnamed_node_is_put_right_with_it():
 
 def test_what_another_check_asks_for_is_not_misnamed():
     loaded = make_loaded([Told("topic", replace(FAIL, names=wrong(Thing.NODE, "/bot", "/robot")))])
-    result = grade(loaded, make_submission(), {"listen": make_recording()})
+    result = judge_all(loaded, make_submission(), {"listen": make_recording()})
     asked = replace(result.results[0], id="node", asked_name=(Thing.NODE, "/bot"))
     assert result.names["listen"]
     assert not replace(result, results=(*result.results, asked)).names["listen"]
@@ -480,5 +480,5 @@ def test_a_launch_file_names_its_nodes_itself():
     loaded = replace(
         loaded, assignment=loaded.assignment.model_copy(update={"scenarios": (scenario,)})
     )
-    result = grade(loaded, make_submission(), {"listen": make_recording()})
+    result = judge_all(loaded, make_submission(), {"listen": make_recording()})
     assert result.names == {"listen": Names()}
