@@ -52,10 +52,14 @@
     button.disabled = true;
     saved.textContent = "running it again: this takes as long as its runs";
     try {
-      const answer = await fetch("again", {
+      let answer = await fetch("again", {
         method: "POST", headers: { "Content-Type": "application/json" }, body: "{}",
       });
-      if (answer.ok) return location.reload();
+      while (answer.ok) {
+        answer = await fetch("again");
+        if (answer.status === 200) return location.reload();
+        await new Promise((done) => setTimeout(done, 500));
+      }
       fail(`It was not run again. ${await answer.text()}`);
     } catch {
       fail("rosgrade review cannot be reached any more. Start it again.");

@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 
 from grader.assignment.load import LoadedAssignment
-from grader.errors import GraderFault, RosgradeError
+from grader.errors import RosgradeError
 from grader.gradebook.class_files import all_standing, write_class
 from grader.gradebook.class_regrading import Regraded, regrade_class, write_regraded
 from grader.gradebook.rendering import bring_up_to_date
@@ -36,6 +36,15 @@ class Judging:
         return [row for row in self.rows if row.changes or row.problem]
 
 
+@dataclass
+class Again:
+    """A submission that is run again; what is wrong if it cannot be."""
+
+    key: str
+    running: bool = True
+    problem: str = ""
+
+
 class Background:
     """One thread for a class."""
 
@@ -48,6 +57,8 @@ class Background:
         self._worker = ThreadPoolExecutor(1, "background")
         self._next: Future[None] | None = None
         self._ended = False
+        self.again: dict[str, Again] = {}
+        """What is run again, by its key, until the page has asked how that ended."""
         self._batch: subprocess.Popen[str] | None = None
         self._worker.submit(reviewed.rows)
         self.refresh()
@@ -66,8 +77,8 @@ class Background:
         self._worker.submit(self._judge, self.judging, loaded, write)
 
     def run_again(self, key: str) -> None:
-        """Run a submission again, as ``rosgrade batch OUT --retry KEY`` does; wait for its end."""
-        self._worker.submit(self._run_again, key).result()
+        """Run a submission again, as ``rosgrade batch OUT --retry KEY`` does."""
+        self._worker.submit(self._run_again, self.again.setdefault(key, Again(key)))
 
     def close(self) -> None:
         """End, when all that was begun is written; a batch ends as by Ctrl-C."""
@@ -85,12 +96,12 @@ class Background:
             # Also that of a check of the assignment's own; what was written down is safe.
             self.problem = f"The reports are not up to date: {_said(error)}"
 
-    def _run_again(self, key: str) -> None:
+    def _run_again(self, again: Again) -> None:
         if self._ended:
             return
         command = [sys.executable, "-m", "grader", "batch", str(self._ledger.out.resolve())]
         self._batch = subprocess.Popen(
-            [*command, "--retry", key, "--quiet"],
+            [*command, "--retry", again.key, "--quiet"],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
@@ -98,7 +109,8 @@ class Background:
         )
         _, said = self._batch.communicate()
         if self._batch.returncode not in (0, _NOT_GRADED):
-            raise GraderFault(said.strip() or f"the batch ended with {self._batch.returncode}")
+            again.problem = said.strip() or f"The batch ended with {self._batch.returncode}."
+        again.running = False
 
     def _judge(self, judging: Judging, loaded: LoadedAssignment, write: bool) -> None:
         try:

@@ -60,6 +60,7 @@ class ReviewServer(LocalServer):
             Route("/s/{name}/", self._submission),
             Route("/s/{name}/source", self._source),
             Route("/s/{name}/review", posted(self._change), methods=["POST"]),
+            Route("/s/{name}/again", self._again),
             Route("/s/{name}/again", posted(self._run_again), methods=["POST"]),
             Route("/s/{name}/{file:path}", self._report_file),
             Route(f"/{INSTRUCTOR_FOLDER}/{{file}}", self._instructor_file),
@@ -152,7 +153,16 @@ class ReviewServer(LocalServer):
     def _run_again(self, request: Request, _: Any) -> Response:
         row, _ = self._class.find(request.path_params["name"])
         self._background.run_again(row.row.id)
-        return PlainTextResponse("graded again")
+        return PlainTextResponse("begun")
+
+    def _again(self, request: Request) -> Response:
+        """How far it is: 202 while it runs, and why where it could not be run."""
+        row, _ = self._class.find(request.path_params["name"])
+        again = self._background.again.get(row.row.id)
+        if again is None or again.running:
+            return PlainTextResponse("", 202 if again else 200)
+        del self._background.again[row.row.id]
+        return PlainTextResponse(again.problem, 422 if again.problem else 200)
 
     def _report_file(self, request: Request) -> Response:
         """The report, and the recordings that it links to; nothing else of the folder."""
