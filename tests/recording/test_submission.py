@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
 from grader.errors import UsageError
-from grader.recording.submission import SubmissionRecord, read_record
+from grader.recording.submission import PackageRecord, SubmissionRecord, read_record
+from grader.submission import record as old_place
 
 st.register_type_strategy(float, st.floats(allow_nan=False, allow_infinity=False))
 st.register_type_strategy(str, st.text(st.characters(blacklist_categories=["Cs"]), max_size=10))
@@ -40,3 +41,8 @@ def test_a_file_that_holds_no_record_is_refused(tmp_path: Path, text: str, place
         read_record(file)
     with pytest.raises(UsageError, match="is not the record of a submission"):
         read_record(tmp_path / "none.json")
+
+
+def test_own_checks_of_before_find_the_record_where_it_was():
+    assert old_place.SubmissionRecord is SubmissionRecord
+    assert old_place.PackageRecord is PackageRecord
