@@ -60,7 +60,7 @@
         if (answer.status === 200) return location.reload();
         await new Promise((done) => setTimeout(done, 500));
       }
-      fail(`It was not run again. ${await answer.text()}`);
+      fail(`It was not run again: ${await answer.text()}`);
     } catch {
       fail("rosgrade review cannot be reached any more. Start it again.");
     }

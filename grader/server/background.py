@@ -109,7 +109,8 @@ class Background:
         )
         _, said = self._batch.communicate()
         if self._batch.returncode not in (0, _NOT_GRADED):
-            again.problem = said.strip() or f"The batch ended with {self._batch.returncode}."
+            why = said.strip().removeprefix("rosgrade: error: ")
+            again.problem = why or f"the batch ended with {self._batch.returncode}"
         again.running = False
 
     def _judge(self, judging: Judging, loaded: LoadedAssignment, write: bool) -> None:
