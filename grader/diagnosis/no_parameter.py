@@ -10,6 +10,7 @@ from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_answer import NoAnswer, why_late
 from grader.diagnosis.no_endpoint import SERVICE
 from grader.diagnosis.no_node import why_not_node, written_nodes
+from grader.diagnosis.process.not_called import ANSWER_S
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import evidence_at, nodes_seen
@@ -22,7 +23,6 @@ from grader.recording.model import Call, Recording
 from grader.recording.submission import SourceError
 from grader.spec.nearest_name import nearest
 
-_ANSWER_S = 1.0
 _LAUNCH_FILES = (".py", ".xml", ".yaml", ".yml")
 _WILD = {"*": "[^/]+", "**": ".+"}
 
@@ -168,7 +168,7 @@ def why_services_silent(recording: Recording, calls: Iterable[Call]) -> Finding 
     service = code(lost.service.rpartition("/")[2])
     if not lost.error:
         what = f"the node's parameter service {service} did not answer"
-        asked = (lost.service, lost.requested_ns, _ANSWER_S)
+        asked = (lost.service, lost.requested_ns, ANSWER_S)
         return cause_of(NoAnswer(recording, what, SERVICE, *asked))
     if lost.error != NO_SERVER:
         return Finding.ours(f"{service} could not be asked: {lost.error}")
@@ -195,7 +195,7 @@ def why_not_asked(recording: Recording, node: str, what: str) -> Finding:
         server, asked_ns = last.service, last.requested_ns
         seen = f"the node's parameter service {code(server.rpartition('/')[2])} did not answer"
         shown = evidence_at(recording, "asked", asked_ns)
-        silence = NoAnswer(recording, seen, SERVICE, server, asked_ns, _ANSWER_S)
+        silence = NoAnswer(recording, seen, SERVICE, server, asked_ns, ANSWER_S)
         ended = why_late(silence, last.answered_ns, "slow_node", shown)
     return ended.after(what) if ended else Finding.undecided(f"{what} by the probe")
 

@@ -12,6 +12,7 @@ from grader.diagnosis.explanation import cause_of
 from grader.diagnosis.no_answer import NoAnswer
 from grader.diagnosis.no_endpoint import SERVICE
 from grader.diagnosis.no_messages import why_not_sent, why_silent
+from grader.diagnosis.process.not_called import ANSWER_S
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.fields import difference_words, unlike
 from grader.findings.finding import Evidence, Finding
@@ -22,8 +23,6 @@ from grader.findings.words import worded
 from grader.grade.model import SEVERITY
 from grader.recording.model import Kind, Owner, Recording
 from grader.recording.window import cut
-
-_ANSWER_S = 1.0
 
 
 def judged_in(
@@ -85,7 +84,7 @@ def _why_not(recording: Recording, phase: Phase) -> Finding:
             return Finding.undecided(f"{seen}, but the probe received none of its events")
         bad = [one for one, result in zip(changes, results, strict=True) if result is not True]
         if bad and bad[0].answered_ns is None:
-            asked = (bad[0].service, bad[0].requested_ns, _ANSWER_S)
+            asked = (bad[0].service, bad[0].requested_ns, ANSWER_S)
             return cause_of(NoAnswer(recording, seen, SERVICE, *asked))
         if bad:
             success = worded("TransitionCallbackReturn.SUCCESS", "CallbackReturn::SUCCESS")

@@ -139,7 +139,7 @@ def proportional_speed(recording: Recording, parameters: ProportionalSpeed) -> F
     limit_m_s = math.inf if recording.scene is None else recording.scene.max_linear_m_s
     tried = [_speeds(run, behind) for behind in range(MOST_BEHIND + 1)]
     if min(map(len, tried)) < LEAST_FIT:
-        return Finding.passed(parameters.asked_for, "too few speeds to tell")
+        return Finding.as_asked("too few speeds to tell")
     lines = [fit(samples, limit_m_s) for samples in tried]
     best = max(range(len(lines)), key=lambda index: lines[index].r2)
     line, samples = lines[best], tried[best]
@@ -152,11 +152,11 @@ def proportional_speed(recording: Recording, parameters: ProportionalSpeed) -> F
         tuple(item.command for item in samples),
     )
     if far.error < _LEAST_SPREAD * near.error:
-        return Finding.passed(parameters.asked_for, "the distances hardly differ")
+        return Finding.as_asked("the distances hardly differ")
     rounded = all(abs(one.command - line.gain * one.error) <= _ROUNDED_M_S for one in samples)
     if line.r2 >= parameters.r2 or rounded:
         seen = f"gain {line.gain:.3g} 1/s, R² {line.r2:.3f}, {counted(line.used, 'command')}"
-        return Finding.passed(parameters.asked_for, seen, Evidence(plots=(plot,)))
+        return Finding.as_asked(seen, Evidence(plots=(plot,)))
     return why_off_course(recording) or Finding(
         f"linear.x is {speed(far.command)} at {metres(far.error)}, but {speed(near.command)} at "
         f"{metres(near.error)}: {far.command / far.error:.2g} and "

@@ -28,6 +28,7 @@ from grader.diagnosis.explanation import cause_of
 from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.no_answer import NoAnswer, why_late, why_raised
 from grader.diagnosis.no_endpoint import ACTION
+from grader.diagnosis.process.not_called import ANSWER_S
 from grader.findings.fields import FieldTolerance, the_goal, unlike, words
 from grader.findings.finding import Evidence, Finding
 from grader.findings.value import EXACT
@@ -40,7 +41,6 @@ from grader.spec.quantity import Duration, Frequency, Ratio
 from grader.spec.unit import format_duration
 
 # How soon a server must say whether it accepts a goal: its callback only decides.
-_ANSWER_S = 1.0
 
 
 class ActionExists(Offered):
@@ -93,7 +93,7 @@ def answered_goals(
     for goal in found:
         if goal.accepted is None:
             what = f"{the_goal(goal)} was neither accepted nor rejected"
-            silence = NoAnswer(recording, what, ACTION, goal.action, goal.sent_ns, _ANSWER_S)
+            silence = NoAnswer(recording, what, ACTION, goal.action, goal.sent_ns, ANSWER_S)
             stop_if(cause_of(silence))
     return found
 

@@ -14,6 +14,7 @@ from grader.checks.service.service import judged_calls, why_slow
 from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_endpoint import SERVICE, offered
 from grader.diagnosis.no_node import why_not_node
+from grader.diagnosis.process.not_called import ANSWER_S
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import nodes_seen
@@ -21,7 +22,6 @@ from grader.findings.wording import code, counted, listing
 from grader.recording.model import Call, Recording
 from grader.spec.name import QualifiedNodeName
 
-_ANSWER_S = 1.0
 # By their ids in lifecycle_msgs/msg/Transition.
 _TRANSITIONS = ("create", "configure", "cleanup", "activate", "deactivate", *("shutdown",) * 3)
 
@@ -56,7 +56,7 @@ def state(recording: Recording, parameters: State) -> Finding:
     node, service = parameters.node, f"{parameters.node}/get_state"
     stop_if(why_not_managed(recording, node))
     calls = judged_calls(recording, service)
-    stop_if(why_slow(recording, calls, _ANSWER_S))
+    stop_if(why_slow(recording, calls, ANSWER_S))
     seen = [_state(call) for call in calls]
     if len(seen) < len(parameters.states):
         stop_if(why_ended(recording))

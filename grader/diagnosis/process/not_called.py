@@ -18,7 +18,7 @@ from grader.recording.model import NS, Call, Process, Recording
 from grader.spec.unit import format_duration
 
 # A call with less time for an answer than this may be unanswered for that reason.
-_ANSWER_S = 1.0
+ANSWER_S = 1.0
 # A node whose callbacks return at once answers a call to its parameter services sooner.
 _SLOW_S = 0.5
 
@@ -136,7 +136,7 @@ def blocked_executor(symptom: NotCalled) -> Finding | None:
     calls = [
         call
         for call in _calls(symptom)
-        if left_s(recording, call.requested_ns, recording.stop_ns) >= _ANSWER_S
+        if left_s(recording, call.requested_ns, recording.stop_ns) >= ANSWER_S
     ]
     call = next((call for call in calls if call.answered_ns is None), None)
     if call is None or any((one.answered_ns or 0) >= symptom.since_ns for one in calls):
