@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.assignment.contract.expand import expanded, plain
+from grader.assignment.contract.table import MARKER, with_table
 from grader.assignment.load import load_assignment
 from grader.authoring.visible_files import visible_files
 from grader.errors import AssignmentError
@@ -303,3 +304,15 @@ def test_students_get_the_contract_and_no_hidden_check(write: Write) -> None:
     assert [one.spec.id for one in part.checks] == ["builds", "topic", "type", "qos", "period"]
     assert part.withheld.points == 1.0
     assert make_handout(part).total == make_handout(loaded).total
+
+
+def test_a_rate_is_judged_and_told_in_the_table(write: Write) -> None:
+    text = GOOD.replace("period: 100 ms", "rate: {at_least: 9 Hz, at_most: 11 Hz}")
+    text = text.replace("period: 2", "rate: 2")
+    loaded, often = load_assignment(write(text)), "at least 9 Hz and at most 11 Hz"
+    *_, rate = loaded.checks
+    assert (rate.spec.id, rate.title) == ("rate", f"Messages come with {often}")
+    assert rate.spec.with_ == {"topic": "/cmd_vel", "at_least": "9 Hz", "at_most": "11 Hz"}
+    assert f"| how often | {often} |" in with_table(MARKER, loaded.assignment.contract)
+    (wrong,) = found(write(text.replace("at_least: 9 Hz, at_most: 11 Hz", "at_least: 9 m")))
+    assert wrong.startswith("13: contract.packages.bot.executables.drive.publishes./cmd_vel: ")

@@ -57,6 +57,11 @@ class Publication(Connection):
         description="Period of its messages, such as `300 ms`, or the parameters of "
         "`timing.period`, such as `{period: 300 ms, spread: 20 %}`.",
     )
+    rate: dict[str, Any] = Field(
+        default_factory=dict,
+        description="How often they come, roughly: the parameters of `timing.rate`, such as "
+        "`{at_least: 9 Hz, at_most: 11 Hz}`.",
+    )
     timer: bool = Field(False, description="Whether the callback of a timer must publish them.")
 
     @model_validator(mode="after")

@@ -115,6 +115,7 @@ class Spot:
             )
             found["are"] = "is" if self.part.count == 1 else "are"
             found["period"] = str(period_of(self.part).get("period"))
+            found["rate"] = rate_words(self.part)
             found["value"] = listing(
                 f"{name} = {value_text(value)}" for name, value in leaves(self.part.value)
             )
@@ -136,6 +137,12 @@ def period_of(part: Publication) -> dict[str, Any]:
     if part.period is None:
         return {}
     return part.period if isinstance(part.period, dict) else {"period": part.period}
+
+
+def rate_words(part: Publication) -> str:
+    """How often messages come, such as ``at least 9 Hz and at most 11 Hz``."""
+    limits = {"at_least": "at least", "at_most": "at most"}
+    return listing(f"{text} {part.rate[key]}" for key, text in limits.items() if key in part.rate)
 
 
 def leaves(value: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
@@ -189,7 +196,7 @@ def _publication(spot: Spot) -> Publication:
 
 def _sent(spot: Spot) -> dict[str, Any] | None:
     part = _publication(spot)
-    counts = part.value or part.period or part.count
+    counts = part.value or part.period or part.rate or part.count
     return {"topic": spot.name, "at_least": 1} if counts else None
 
 
@@ -403,6 +410,15 @@ PUBLICATION = (
         "`ros2 topic hz {name}` shows the rate.",
         ("sent", "alive"),
         8,
+    ),
+    Fact(
+        "rate",
+        "timing.rate",
+        lambda it: {"topic": it.name, **rate} if (rate := _publication(it).rate) else None,
+        "Messages come with {rate}{on}",
+        "`ros2 topic hz {name}` shows the rate.",
+        ("sent", "alive"),
+        4,
     ),
     Fact(
         "timer",

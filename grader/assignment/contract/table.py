@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from grader.assignment.contract.model import Connection, Contract, Declared, Program
-from grader.assignment.contract.standard import ANY, leaves, period_of
+from grader.assignment.contract.standard import ANY, leaves, period_of, rate_words
 from grader.findings.wording import codes, listing, value_text
 from grader.spec.document import Place
 
@@ -75,6 +75,8 @@ def _program(executable: str, program: Program, place: Place) -> Iterator[Row]:
             by = ", from the callback of a timer" if part.timer else ""
             often = f"every {period_of(part)['period']}{by}"
             yield Row(f"how often{on}", often, here, ("period", "timer"))
+        if part.rate:
+            yield Row(f"how often{on}", rate_words(part), here, ("rate",))
     for key, label, fact in (
         ("serves", "offers the service", "service"),
         ("actions", "offers the action", "action"),
