@@ -44,7 +44,7 @@ _PAUSED_INTERVALS = 2.5
 _LEAST_PAUSE_S, _MOST_PAUSE_S = 0.4, 6.0
 _UNTIL_PAUSED_S = 3.0
 _MOST_SANDBOX_S = 120.0
-"""A machine that is busy with its disks or namespaces was seen to take 13 s for a sandbox."""
+"""A machine whose kernel threads got no CPU was seen to take 13 s for a sandbox."""
 _MOST_MALFORMED = 10
 """Packets; no library sends a single one."""
 _FORGERY = "wrote into the channel through which rosgrade reports from inside a process"
