@@ -11,17 +11,24 @@ from collections.abc import Iterator, Mapping
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+import grimp
+
 from grader.machine.resources import PACKAGE
 
 
-def imports_between_rooms(folder: Path = PACKAGE) -> dict[str, set[str]]:
+def imports_between_rooms() -> dict[str, set[str]]:
     """The rooms that each room imports from; what only types need does not count."""
-    rooms = {item.name for item in folder.iterdir() if (item / "__init__.py").is_file()}
-    found: dict[str, set[str]] = {room: set() for room in sorted(rooms)}
-    for room in rooms:
-        for file in (folder / room).rglob("*.py"):
-            found[room] |= {*_imported(ast.parse(file.read_bytes()))} & rooms - {room}
-    return found
+    graph = grimp.build_graph("grader", exclude_type_checking_imports=True, cache_dir=None)
+    rooms = [one for one in sorted(graph.find_children("grader")) if graph.find_children(one)]
+    return {
+        room.removeprefix("grader."): {
+            other.removeprefix("grader.")
+            for other in rooms
+            if other != room
+            and graph.direct_import_exists(importer=room, imported=other, as_packages=True)
+        }
+        for room in rooms
+    }
 
 
 def floors(imports: Mapping[str, set[str]]) -> dict[str, int]:
@@ -47,16 +54,6 @@ def parameters(folder: Path = PACKAGE) -> Iterator[tuple[int, str]]:
 def lines(folder: Path) -> int:
     """Lines of Python in a folder."""
     return sum(file.read_bytes().count(b"\n") for file in folder.rglob("*.py"))
-
-
-def _imported(node: ast.AST) -> Iterator[str]:
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.ImportFrom) and child.module:
-            parts = child.module.split(".")
-            if parts[0] == "grader":
-                yield from parts[1:2] or [name.name for name in child.names]
-        elif not (isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)):
-            yield from _imported(child)
 
 
 def main() -> None:

@@ -15,8 +15,7 @@ from grader.gradebook.class_regrading import Regraded, regrade_class, write_regr
 from grader.gradebook.rendering import bring_up_to_date
 from grader.server.reviewed_class import ReviewedClass
 
-_NOT_GRADED = 3
-"""Exit code of a batch of which something is not graded."""
+_NOT_RUN = "the batch ended, and its result is the one of before"
 
 
 @dataclass
@@ -78,7 +77,9 @@ class Background:
 
     def run_again(self, key: str) -> None:
         """Run a submission again, as ``rosgrade batch OUT --retry KEY`` does."""
-        self._worker.submit(self._run_again, self.again.setdefault(key, Again(key)))
+        if key not in self.again or not self.again[key].running:
+            self.again[key] = Again(key)
+            self._worker.submit(self._run_again, self.again[key])
 
     def close(self) -> None:
         """End, when all that was begun is written; a batch ends as by Ctrl-C."""
@@ -97,21 +98,28 @@ class Background:
             self.problem = f"The reports are not up to date: {_said(error)}"
 
     def _run_again(self, again: Again) -> None:
-        if self._ended:
-            return
+        try:
+            before = self._ledger.result(again.key)
+            said = "" if self._ended else self._batch_again(again.key)
+            # Its exit code is also that of other submissions, and of a machine without a sandbox.
+            after = self._ledger.result(again.key)
+            if after is None or (before is not None and after.started == before.started):
+                again.problem = said.strip().removeprefix("rosgrade: error: ") or _NOT_RUN
+        except Exception as error:
+            again.problem = _said(error)
+        again.running = False
+
+    def _batch_again(self, key: str) -> str:
+        """Run it; what the batch says of what is wrong."""
         command = [sys.executable, "-m", "grader", "batch", str(self._ledger.out.resolve())]
         self._batch = subprocess.Popen(
-            [*command, "--retry", again.key, "--quiet"],
+            [*command, "--retry", key, "--quiet"],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
         )
-        _, said = self._batch.communicate()
-        if self._batch.returncode not in (0, _NOT_GRADED):
-            why = said.strip().removeprefix("rosgrade: error: ")
-            again.problem = why or f"the batch ended with {self._batch.returncode}"
-        again.running = False
+        return self._batch.communicate()[1]
 
     def _judge(self, judging: Judging, loaded: LoadedAssignment, write: bool) -> None:
         try:

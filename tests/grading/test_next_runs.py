@@ -6,7 +6,7 @@ import pytest
 
 from grader.assignment.model import Scenario
 from grader.grading.next_runs import MOST_ROUNDS, Round, Run, next_runs, times_run
-from grader.spec.names import NO_NAMES, Names, Thing, WrongName
+from grader.spec.names import Names, Thing, WrongName
 
 SHORT = Scenario(id="short", launch=[{"executable": "bot"}], timeout="1 s")
 LONG = Scenario(id="long", launch=[{"executable": "bot"}], timeout="9 s")
@@ -95,7 +95,3 @@ def test_no_scenario_is_tried_for_ever():
 def test_a_run_that_puts_a_name_right_is_no_repetition():
     rounds = [BUILT, after(*FIRST, names={"long": WRONG}), after(Run(LONG, WRONG))]
     assert times_run(rounds) == {"long": 1, "short": 1}
-
-
-def test_a_scenario_without_names_is_run_without_names():
-    assert all(run.names == NO_NAMES for run in next_runs([BUILT]))

@@ -18,7 +18,7 @@ from grader.run.cell.ending import EndingConditions, ExitBarrier
 from grader.run.cell.graph import GraphObserver
 from grader.run.cell.probe import Probe
 from grader.run.cell.progress_events import LineTeller, tell
-from grader.run.host.disturbance import DisturbanceMeter, Stopwatch
+from grader.run.host.disturbance import DisturbanceMeter, Stopwatch, is_blocked
 from grader.run.host.machine_faults import MachineFaults
 from grader.run.host.watchdog import Watchdog
 from grader.run.order import CellOrder, ProcessCommand
@@ -74,7 +74,11 @@ class Cell:
         self._ports = bound_ports() if packets is not None else frozenset()
         on_line = LineTeller() if order.tells_output else None
         self._output = OutputReader(order.limits.output_bytes, on_line)
-        self._meter = DisturbanceMeter(Family(os.getpid()).look)
+        self._has_node = False
+        # Later a program could pretend to wait, as the parent of a vfork(2) does.
+        self._meter = DisturbanceMeter(
+            Family(os.getpid()).look, blocked=lambda pid: not self._has_node and is_blocked(pid)
+        )
         self._students = StudentProcesses(self._output, self._meter, order.process_sandbox)
         self._other_domains: tuple[int, ...] = ()
         self._graph = GraphObserver(
@@ -304,6 +308,7 @@ class Cell:
         limit_s = self._order.limits.discovery_s
         for watch in self._wait("a node of the student", limit_s):
             if seen():
+                self._has_node = True
                 return None
             if self._faults:
                 return Ending.FAULT

@@ -2,9 +2,8 @@
 
 Three instruments: a metronome, a thread that asks to be woken every 20 ms and notes how late it
 was; the time that each thread of the student was ready to run but had no CPU (its run delay); and
-whether a process of the student waits for the kernel, as for a page of a library that a busy disk
-has not read yet. What a student writes lies in memory, so that the student's own files are no
-such wait.
+while it starts, whether a process of the student waits for the kernel, as for a page of a library
+that a busy disk has not read yet.
 
 A thread waits for a CPU because another one runs on it. Where that is one of the student's, the
 wait is the submission's; only what others took, also rosgrade, is a disturbance. And a submission
