@@ -63,7 +63,7 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "executables": contract.Program,
         "publishes": contract.Publication,
         "subscribes": contract.Subscription,
-        "serves, actions": contract.Server,
+        "serves, actions, calls, sends_goals": contract.Server,
         "parameters": contract.Declared,
         "interfaces": contract.Interface,
     },

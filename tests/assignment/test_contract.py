@@ -284,6 +284,27 @@ def test_two_topics_of_a_program_have_titles_of_their_own(write: Write) -> None:
     assert titles["cmd_vel_qos"] == "The publisher on /cmd_vel is reliable"
 
 
+def test_a_client_is_judged_where_the_scenario_serves_what_it_calls(write: Write) -> None:
+    client = """              period: 100 ms
+          calls: {/ask: {type: std_srvs/srv/Trigger}}
+          sends_goals: {/turn: {type: bot_msgs/action/Turn}}
+"""
+    text = GOOD.replace("              period: 100 ms\n", client)
+    text = text.replace("period: 2}", "period: 2, calls: 1}")
+    (said,) = found(write(text))
+    assert said.startswith("17: contract.packages.bot.executables.drive.calls./ask: no stimulus")
+    served = "stimuli: [{serve: /ask, type: std_srvs/srv/Trigger, answers: [{}]}], until: {m"
+    place = write(text.replace("until: {m", served))
+    (place / "README.md").write_text("<!-- contract -->\n")
+    loaded = load_assignment(place)
+    (calls,) = (one for one in loaded.checks if one.spec.id == "calls")
+    assert calls.title == "The node calls the service /ask"
+    assert calls.spec.with_ == {"server": "/ask", "more": True}
+    handout = make_handout(loaded).text
+    assert "| calls the service | `/ask`, type `std_srvs/srv/Trigger` |" in handout
+    assert "| sends goals to | `/turn`, type `bot_msgs/action/Turn` |" in handout
+
+
 def test_a_part_whose_name_is_chosen_needs_ids_where_there_are_several(write: Write) -> None:
     text = GOOD.replace(
         "    bot:\n", '    "bot{n}_msgs": {build_type: ament_cmake}\n    "bot{n}":\n'

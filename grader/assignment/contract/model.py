@@ -76,7 +76,7 @@ class Subscription(Connection):
 
 
 class Server(Part):
-    """A service or an action that a node offers."""
+    """A service or an action that a node offers or uses."""
 
     type: str = Field(description="Its interface, such as std_srvs/srv/SetBool.")
 
@@ -111,6 +111,14 @@ class Program(Part):
     subscribes: dict[str, Subscription] = Field(default_factory=dict, description="By topic.")
     serves: dict[str, Server] = Field(default_factory=dict, description="Services, by name.")
     actions: dict[str, Server] = Field(default_factory=dict, description="Actions, by name.")
+    calls: dict[str, Server] = Field(
+        default_factory=dict,
+        description="Services that it calls, by name; judged where the scenario has a `serve`.",
+    )
+    sends_goals: dict[str, Server] = Field(
+        default_factory=dict,
+        description="Actions that it sends goals to, by name; judged as `calls` are.",
+    )
     parameters: dict[str, Declared] = Field(default_factory=dict, description="By name.")
     leaves_alone: Literal["robot"] | tuple[str, ...] = Field(
         (),

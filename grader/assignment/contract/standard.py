@@ -545,6 +545,37 @@ ACTION = (
     ),
 )
 
+CALL = (
+    Fact(
+        "calls",
+        "client.asks",
+        lambda it: {"server": it.name, "more": True},
+        "{subject} calls the service {name}",
+        Words(
+            "self.create_client({short}, '{name}').call_async(request) sends a request.",
+            'create_client<{cpp_type}>("{name}")->async_send_request(request) sends a request.',
+        ),
+        ("starts",),
+        2,
+    ),
+)
+
+SENT_GOAL = (
+    Fact(
+        "sends_goals",
+        "client.asks",
+        lambda it: {"server": it.name, "more": True},
+        "{subject} sends a goal to the action {name}",
+        Words(
+            "ActionClient(self, {short}, '{name}').send_goal_async(goal) sends a goal.",
+            'rclcpp_action::create_client<{cpp_type}>(this, "{name}")->async_send_goal(goal) sends '
+            "a goal.",
+        ),
+        ("starts",),
+        2,
+    ),
+)
+
 PARAMETER = (
     Fact(
         "parameter",
@@ -642,6 +673,8 @@ def _of_program(
         ("subscribes", program.subscribes, SUBSCRIPTION),
         ("serves", program.serves, SERVICE),
         ("actions", program.actions, ACTION),
+        ("calls", program.calls, CALL),
+        ("sends_goals", program.sends_goals, SENT_GOAL),
         ("parameters", program.parameters, PARAMETER),
     )
     around = (here, package)

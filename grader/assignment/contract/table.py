@@ -80,6 +80,8 @@ def _program(executable: str, program: Program, place: Place) -> Iterator[Row]:
     for key, label, fact in (
         ("serves", "offers the service", "service"),
         ("actions", "offers the action", "action"),
+        ("calls", "calls the service", "calls"),
+        ("sends_goals", "sends goals to", "sends_goals"),
     ):
         for name, server in getattr(program, key).items():
             yield Row(label, f"`{name}`, type `{server.type}`", (*place, key, name), (fact,))
