@@ -128,7 +128,10 @@ class Launch(Model):
     Where ROS 2 comes from wheels, a launch file needs `underlays: [launch]`.
     """
 
-    executable: str | None = Field(None, description="Name of the executable (entry point).")
+    executable: str | None = Field(
+        None,
+        description="Name of the executable (entry point); optional if the contract has only one.",
+    )
     file: str | None = Field(
         None,
         pattern=r"^[A-Za-z0-9_.-]+\.(py|xml|yaml|yml)$",

@@ -90,6 +90,14 @@ def test_it_makes_packages_launches_records_and_checks(write: Write) -> None:
     }
 
 
+def test_a_launch_that_names_no_program_starts_the_only_one(write: Write) -> None:
+    launch = "launch: [{parameters: {speed: 0.5}}], until: {m"
+    (scenario,) = load_assignment(write(GOOD.replace("until: {m", launch))).assignment.scenarios
+    (started,) = scenario.launch
+    assert (started.executable, started.parameters) == ("drive", {"speed": 0.5})
+    assert scenario.recorded_types == {"/cmd_vel": "geometry_msgs/msg/Twist"}
+
+
 def test_where_the_check_of_a_name_is_left_out_the_next_one_puts_the_name_right(
     write: Write,
 ) -> None:

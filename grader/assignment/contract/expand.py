@@ -132,14 +132,13 @@ class _Written:
         if not isinstance(entry, dict):
             return entry
         programs = contract.programs
+        place: Place = ("scenarios", index)
         made: dict[str, Any] = {}
-        if "launch" not in entry and len(programs) == 1:
-            ((package, executable),) = programs
-            several = len(contract.packages) > 1
-            made["launch"] = [
-                {"executable": executable, **({"package": package} if several else {})}
-            ]
-        launched = entry.get("launch", made.get("launch"))
+        launched = _launched(contract, entry)
+        if launched != entry.get("launch"):
+            made["launch"] = launched
+            if "launch" not in entry:
+                self.stand_for((*place, "launch"), launched, self._PACKAGES)
         launched = launched if isinstance(launched, list) else []
         names = [one.get("executable") for one in launched if isinstance(one, dict)]
         topics = {
@@ -150,9 +149,6 @@ class _Written:
         }
         if "world" in entry:
             topics.pop(_command_topic(entry), None)
-        place: Place = ("scenarios", index)
-        for key, value in made.items():
-            self.stand_for((*place, key), value, self._PACKAGES)
         if "record" not in entry and topics:
             made["record"] = [
                 {"topic": topic, "type": type_} for topic, (type_, _) in topics.items()
@@ -163,6 +159,21 @@ class _Written:
                 origin = (*program_place, "publishes", topic)
                 self.stand_for(record, made["record"][number], origin)
         return {**entry, **made}
+
+
+def _launched(contract: Contract, scenario: dict[str, Any]) -> Any:
+    """What a scenario launches: where it does not say which program, the only one."""
+    launched = scenario.get("launch", [{}])
+    if len(contract.programs) != 1 or not isinstance(launched, list):
+        return scenario.get("launch")
+    ((package, executable),) = contract.programs
+    only = {"executable": executable}
+    if len(contract.packages) > 1:
+        only["package"] = package
+    return [
+        {**only, **one} if isinstance(one, dict) and not {"executable", "file"} & {*one} else one
+        for one in launched
+    ]
 
 
 def _command_topic(scenario: dict[str, Any]) -> str:
