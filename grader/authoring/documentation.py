@@ -27,7 +27,7 @@ from grader.checks.catalogue import CATALOGUE, families
 from grader.checks.check import Check
 from grader.checks.tolerance import TimeTolerance
 from grader.diagnosis.explanation import explanations
-from grader.diagnosis.mistake import TABLE
+from grader.diagnosis.mistake import mistakes
 from grader.findings import finding
 from grader.machine import resources
 from grader.recording import interaction, simulated
@@ -201,7 +201,7 @@ def explanations_markdown() -> dict[str, str]:
     return {
         "explanations.md": _rendered("explanations.md", symptoms=others),
         "errors.md": _rendered("errors.md", symptoms=errors),
-        "mistakes.md": _rendered("mistakes.md", mistakes=TABLE),
+        "mistakes.md": _rendered("mistakes.md", mistakes=mistakes()),
     }
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from string import Template
 
 from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
+from grader.diagnosis.mistake import remedy
 from grader.recording.submission import CPP, EMPTY, PYTHON, PackageRecord, SourceError
 from grader.spec.source import Model, read_source
 
@@ -51,7 +52,6 @@ class Table(Model):
 TABLE = read_source(Path(__file__).with_suffix(".yaml")).read(Table)
 
 
-EMPTY_HINT = "Hand in the file with its content: was it saved, and copied whole?"
 _OWN_HEADER = re.compile(r"^'?(\w+)/\S+?'?(?:: No such file or directory| file not found)")
 _COMMAND = re.compile(r'Unknown CMake command "(\w+)"')
 _PACKAGE_OF_COMMAND = {
@@ -67,7 +67,7 @@ _PACKAGE_OF_COMMAND = {
 @explanation(BuildError)
 def empty_file(symptom: BuildError) -> str | None:
     """A file that the build reads is empty."""
-    return EMPTY_HINT if symptom.error.message == EMPTY else None
+    return remedy("empty_file") if symptom.error.message == EMPTY else None
 
 
 @explanation(BuildError, only=CPP)
@@ -76,11 +76,7 @@ def own_header(symptom: BuildError) -> str | None:
     found = _OWN_HEADER.match(symptom.error.message)
     if found is None or found[1] != symptom.package.name:
         return None
-    return (
-        f"Headers of your own package lie in include/{found[1]}/. Write "
-        "`target_include_directories(<program> PRIVATE include)` in CMakeLists.txt, below "
-        "add_executable()."
-    )
+    return remedy("own_header", package=found[1])
 
 
 @explanation(BuildError, only=CPP)
@@ -91,10 +87,7 @@ def command_of_another_package(symptom: BuildError) -> str | None:
         return None
     for beginning, package in _PACKAGE_OF_COMMAND.items():
         if found[1].startswith(beginning):
-            return (
-                f"Write `find_package({package} REQUIRED)` above this line, and `{package}` in "
-                f"package.xml. If both are there, `{found[1]}` is misspelt."
-            )
+            return remedy("command_of_another_package", package=package, command=found[1])
     return None
 
 
@@ -111,7 +104,4 @@ for _row in TABLE.errors:
 @explanation(BuildError, general=True)
 def any_build_error(symptom: BuildError) -> str:
     """Any other error: the build is run again to see it."""
-    return (
-        f"Run `colcon build --packages-select {symptom.package.name}` in the workspace and correct "
-        "the first error that it prints."
-    )
+    return remedy("any_build_error", package=symptom.package.name)

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
+from grader.diagnosis.mistake import remedy
 from grader.diagnosis.process.process_exit import ended_early, exited
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code
-from grader.findings.words import Words
 from grader.measure import declarations
 from grader.recording.interaction import Service, executor_services
 from grader.recording.model import NS, Endpoint, Kind, Recording
 
 # A program that is about to end may destroy what it has first.
 _LONG_NS = NS
-_HINT = Words(
-    python="Keep it and its node until rclpy.spin() returns. Look for destroy_publisher(), "
-    "destroy_subscription(), destroy_service(), destroy() and destroy_node(), and for a node that "
-    "is stored only in a local variable of a function that returns.",
-    cpp="A publisher, a subscription or a server lasts as long as a variable that holds it. Keep "
-    "it in a member of the class, and the node until rclcpp::spin() returns.",
-)
 
 
 def why_unsubscribed(
@@ -101,7 +94,7 @@ def _destroyed_at(
     when_s = recording.since_launch_s(last_ns)
     return Finding(
         f"{seen}: {what} was destroyed {when_s:.2f} s after launch, while the process still ran",
-        str(_HINT),
+        remedy("destroyed_endpoint"),
         Evidence(moments=(Moment(f"{what.replace('`', '')} was destroyed", when_s),)),
         concept="nodes",
     )

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.explanation import Symptom, explanation
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.wording import counted
-from grader.findings.words import worded
 from grader.measure import declarations
 from grader.measure.compatibility import compatibility_table, refusals
 from grader.measure.numbering import published
@@ -17,9 +17,6 @@ from grader.recording.model import NS, Endpoint, Join, Kind, Message, Recording
 from grader.spec.unit import format_duration
 
 _SHOWN = 50
-_ONE_PUBLISHER = (
-    "Call create_publisher once, in the constructor of the node, and not in a callback."
-)
 
 
 @dataclass(frozen=True)
@@ -86,13 +83,7 @@ class OtherHistory(Symptom[Finding]):
     @property
     def hint(self) -> str:
         """What keeps as much as is asked for."""
-        if self.last == 0:
-            return "A volatile publisher keeps nothing for late joiners: that is the default."
-        return "Give create_publisher a profile that keeps messages for late joiners: " + worded(
-            python=f"QoSProfile(history=HistoryPolicy.KEEP_LAST, depth={self.last}, "
-            "durability=DurabilityPolicy.TRANSIENT_LOCAL).",
-            cpp=f"rclcpp::QoS({self.last}).transient_local().",
-        )
+        return remedy("keeps_last", last=self.last) if self.last else remedy("keeps_nothing")
 
     @property
     def evidence(self) -> Evidence:
@@ -151,11 +142,11 @@ def offers_less(symptom: TooFewKept) -> Finding | None:
         if refused:
             table = compatibility_table(publisher.qos, symptom.join.qos)
             shown = symptom.evidence
-            return Finding(
+            return mistaken(
+                "offers_too_little",
                 f"it got nothing at all: {', '.join(refused)}",
-                f"{symptom.hint} A subscription receives nothing from a publisher that offers less "
-                "than it requests.",
                 replace(shown, tables=(table, *shown.tables)),
+                hint=symptom.hint,
             )
     return None
 
@@ -169,11 +160,10 @@ def lifespan_over(symptom: TooFewKept) -> Finding | None:
     oldest_ns = symptom.before[-symptom.last].stamp_ns if known else launched_ns
     if not lifespans or min(lifespans) >= (symptom.join.joined_ns - oldest_ns) / NS:
         return None
-    return Finding(
+    return mistaken(
+        "lifespan_over",
         f"{symptom.seen}: the publisher's lifespan is {format_duration(min(lifespans))}, and what "
         "is older is thrown away",
-        f"Leave `lifespan` out of the {worded('QoSProfile', 'rclcpp::QoS')}: then a message stays "
-        "until newer ones take its place in the queue.",
         symptom.evidence,
     )
 
@@ -200,7 +190,7 @@ def publisher_destroyed(symptom: OtherHistory) -> Finding | None:
     number = counted(gone, "publisher was", "publishers were")
     lost = "what a publisher keeps is lost with it"
     observed = f"{symptom.seen}: {number} destroyed before it joined, and {lost}"
-    return Finding(observed, _ONE_PUBLISHER, symptom.evidence)
+    return mistaken("one_publisher", observed, symptom.evidence)
 
 
 @explanation(TooFewKept)
@@ -218,7 +208,7 @@ def several_publishers(symptom: TooManyKept) -> Finding | None:
     if len(symptom.publishers) < 2:
         return None
     each = f"of {len(symptom.publishers)} publishers, each of which keeps its own"
-    return Finding(f"{symptom.seen}, {each}", _ONE_PUBLISHER, symptom.evidence)
+    return mistaken("one_publisher", f"{symptom.seen}, {each}", symptom.evidence)
 
 
 @explanation(TooFewKept, TooManyKept, general=True)
@@ -251,10 +241,9 @@ def no_cpu_time(symptom: UnpublishedBefore) -> Finding | None:
 def waits_for_a_subscription(symptom: UnpublishedBefore) -> Finding:
     """It publishes only while there is a subscription."""
     begin_ns, joined_ns = _watched_ns(symptom)
-    return Finding(
+    return mistaken(
+        "waits_for_a_subscription",
         f"{symptom.seen} ({format_duration((joined_ns - begin_ns) / NS)})",
-        "Publish from the start, whether or not there is a subscription: leave out conditions such "
-        "as get_subscription_count() > 0. What comes before the late joiner is kept for it.",
         symptom.evidence,
     )
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from grader.diagnosis.explanation import cause_of, explanation
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.no_endpoint import Word, offered
 from grader.diagnosis.process.not_called import (
     NotCalled,
@@ -16,7 +16,6 @@ from grader.diagnosis.process.not_called import (
 )
 from grader.diagnosis.process.process_exit import ended_early, exited, why_it_exited
 from grader.diagnosis.process.raised import (
-    READ_MESSAGE,
     in_brackets,
     own_frames,
     parse_failures,
@@ -24,7 +23,6 @@ from grader.diagnosis.process.raised import (
 )
 from grader.diagnosis.process.standing import where_it_stands
 from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.words import worded
 from grader.measure import declarations
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
@@ -151,17 +149,7 @@ def busy_with_something_else(symptom: NoAnswer) -> Finding | None:
 def callback_does_not_answer(symptom: NoAnswer) -> Finding:
     """The callback does not finish, or waits for another callback of its group."""
     spins = ", although the node's executor spins" if symptom.spins else ""
-    return symptom.placed(
-        Finding(
-            f"{symptom.what}{spins}",
-            worded(
-                python="Does the callback reach its end and return the response?",
-                cpp="Does the callback reach its end, with the response filled in?",
-            )
-            + " A callback that waits for another callback of the same callback group waits for "
-            "ever.",
-        )
-    )
+    return symptom.placed(mistaken("callback_does_not_answer", f"{symptom.what}{spins}"))
 
 
 def why_gone(recording: Recording, what: str, node: str) -> Finding | None:
@@ -213,7 +201,7 @@ def why_raised(
         place = raised_at(raised, recording)
         return Finding(
             f"{what}: an exception was raised meanwhile, {raised}{in_brackets(place)}",
-            "Correct the line that is named here." if place else str(READ_MESSAGE),
+            remedy("named_line" if place else "read_message"),
             Evidence(
                 moments=(Moment("the exception", recording.since_launch_s(lines[-1].time_ns)),),
                 places=(place,) if place else (),

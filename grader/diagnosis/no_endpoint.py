@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from grader.diagnosis.destroyed_endpoint import why_dropped
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import crashed, why_crashed
 from grader.diagnosis.undeclared import why_never_appeared
@@ -166,12 +167,12 @@ def why_not_offered(
 
 def why_not_met(recording: Recording, word: Word, name: str, asked_ns: int) -> Finding:
     """Why something that was offered could not be asked."""
-    return Finding(
+    return mistaken(
+        "not_met",
         f"the {word.noun} {code(name)} could not be asked: it was there, but went away, or did not "
         "match a client with the default QoS",
-        f"Keep the {word.noun} and its node as long as the program runs, and do not change its "
-        "QoS.",
         evidence_at(recording, "rosgrade gave up", asked_ns),
+        noun=word.noun,
     )
 
 
@@ -209,11 +210,11 @@ def other_interface(symptom: NoEndpoint) -> Finding | None:
     own = next((one for one in symptom.there if one.name == symptom.name), None)
     if own is None or not symptom.types:
         return None
-    return Finding(
+    return mistaken(
+        "other_interface",
         f"the {symptom.word.noun} {code(own.name)} has the type {code(own.type)}",
-        "A client and a server communicate only if they use the same type: "
-        f"{code(type_in_code(symptom.types[0]))}.",
         symptom.evidence,
+        type=code(type_in_code(symptom.types[0])),
     )
 
 
@@ -228,18 +229,18 @@ def misspelt_name(symptom: NoEndpoint) -> Finding | None:
         if not ended or declarations.process_of(symptom.recording, item.node) in (None, *ended)
     ]
     base, match = wanted.rpartition("/")[2], None
-    hint = f"Write the name as '{base}': {symptom.create}."
-    why = ""
+    mistake, why = "misspelt_name", ""
     for item in suspects:
         prefix = item.name.removesuffix(wanted)
         if item.name.lower() == wanted.lower():
             match, why = item.name, ": upper and lower case differ"
         elif prefix != item.name:
             match, why = item.name, f": {code(prefix)} stands in front of the name"
-            hint += " Leave out `~/`, which puts the node's name in front, and any namespace."
+            mistake = "prefixed_name"
     match = match or nearest(wanted, [item.name for item in suspects])
     found = f"the node {symptom.word.does} {code(match or '')} instead of {code(wanted)}{why}"
-    return Finding(found, hint, symptom.evidence) if match else None
+    create = symptom.create
+    return mistaken(mistake, found, symptom.evidence, base=base, create=create) if match else None
 
 
 @explanation(NoEndpoint)
@@ -271,10 +272,11 @@ def others_only(symptom: NoEndpoint) -> Finding:
     there = codes(item.name for item in symptom.there)
     same = codes(item.name for item in symptom.there if item.type in symptom.types)
     has = f"created {word.noun}s only for {there}" if there else f"created no {word.noun}"
-    return Finding(
+    return mistaken(
+        "others_only",
         f"{nodes} {has}" + (f"; the type is right on {same}" if same else ""),
-        f"Call {symptom.create} in the node's constructor.",
         symptom.evidence,
+        create=symptom.create,
     )
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Evidence, Finding
 from grader.findings.wording import code, codes
-from grader.findings.words import worded
 from grader.recording.submission import CPP, PYTHON, PackageRecord, SourceError, SubmissionRecord
 from grader.spec.nearest_name import nearest
 
@@ -60,17 +60,10 @@ def no_such_function(symptom: NoExecutable) -> Finding | None:
         return None
     points_to = dict(symptom.package.entry_points).get(symptom.name, "")
     entry = f"{symptom.name} = {points_to}" if points_to else symptom.name
-    hint = (
-        "An entry of console_scripts is `name = package.module:function`. Write the function as "
-        "the module spells it."
-    )
-    if target.message.endswith("/__init__.py"):
-        hint = (
-            "find_packages() in setup.py leaves out a folder without __init__.py. Create this "
-            "file there; it may be empty."
-        )
+    is_init = target.message.endswith("/__init__.py")
     seen = f"the entry point {code(entry)} does not work: {target}"
-    return Finding(seen, hint, Evidence(places=(target,)))
+    mistake = "no_init" if is_init else "no_such_function"
+    return mistaken(mistake, seen, Evidence(places=(target,)))
 
 
 @explanation(NoExecutable, only=PYTHON)
@@ -80,11 +73,11 @@ def installed_elsewhere(symptom: NoExecutable) -> Finding | None:
     if not symptom.misplaced or package.build_type != "ament_python":
         return None
     folder = f"$base/lib/{package.name}"
-    return Finding(
+    return mistaken(
+        "installed_elsewhere",
         symptom.misplaced,
-        f"setup.cfg beside setup.py must hold these four lines: [develop] / script_dir={folder} / "
-        f"[install] / install_scripts={folder}",
         _at(package, "setup.cfg", "script_dir"),
+        folder=folder,
     )
 
 
@@ -101,14 +94,8 @@ def not_installed_by_cmake(symptom: NoExecutable) -> Finding | None:
         seen = "CMakeLists.txt is empty"
     elif name in package.executables:
         seen = f"ROS does not find the package, so `ros2 run {package.name}` does not either"
-    line = f"install(TARGETS {name} DESTINATION lib/${{PROJECT_NAME}})"
-    script = worded(python=" (of a Python script only install(PROGRAMS ...))", cpp="")
-    return Finding(
-        seen,
-        f"CMakeLists.txt needs `add_executable({name} src/<file>.cpp)`, then {code(line)}{script}, "
-        "and `ament_package()` as its last line.",
-        _at(package, "CMakeLists.txt", "install"),
-    )
+    shown = _at(package, "CMakeLists.txt", "install")
+    return mistaken("not_installed_by_cmake", seen, shown, name=name)
 
 
 @explanation(NoExecutable, only=PYTHON)
@@ -117,10 +104,8 @@ def no_console_scripts(symptom: NoExecutable) -> Finding | None:
     if symptom.package.entry_points:
         return None
     entry = f"{symptom.name} = {symptom.package.name}.<your module>:main"
-    return Finding(
-        "setup.py defines no console_scripts",
-        f"Add to setup.py: entry_points={{'console_scripts': ['{entry}']}}.",
-        symptom.setup_py,
+    return mistaken(
+        "no_console_scripts", "setup.py defines no console_scripts", symptom.setup_py, entry=entry
     )
 
 
@@ -129,18 +114,18 @@ def other_console_scripts(symptom: NoExecutable) -> Finding:
     """setup.py gives the executable another name, or setup() does not get it."""
     name, scripts = symptom.name, [script for script, _ in symptom.package.entry_points]
     if name in scripts:
-        return Finding(
+        return mistaken(
+            "not_given_to_setup",
             f"setup.py defines {code(name)}, but the build did not install it",
-            "Give it to setup() in entry_points={'console_scripts': [...]}, and write this line in "
-            f"setup.cfg: install_scripts=$base/lib/{symptom.package.name}.",
             symptom.setup_py,
+            package=symptom.package.name,
         )
     match = nearest(name, scripts)
-    return Finding(
+    return mistaken(
+        "other_console_scripts",
         f"setup.py defines {code(match) if match else codes(scripts)}",
-        "The left side of an entry of console_scripts is the executable's name: write "
-        f"'{name} = ...'.",
         symptom.setup_py,
+        name=name,
     )
 
 
@@ -157,14 +142,9 @@ def why_nothing_to_run(package: PackageRecord) -> Finding | None:
         errors.append(error)
     if not errors:
         return None
-    hint = "Correct this line or the one before it"
-    if "null bytes" in errors[0].message:
-        hint = "Save this file as plain text in UTF-8, not in UTF-16"
-    return Finding(
-        f"Python cannot read {errors[0]}",
-        f"{hint}; `colcon build` prints the error too, but goes on.",
-        Evidence(places=tuple(dict.fromkeys(errors))),
-    )
+    mistake = "other_encoding" if "null bytes" in errors[0].message else "unreadable_module"
+    shown = Evidence(places=tuple(dict.fromkeys(errors)))
+    return mistaken(mistake, f"Python cannot read {errors[0]}", shown)
 
 
 def _modules(dotted: str) -> list[str]:

@@ -9,6 +9,7 @@ from itertools import product
 
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.explanation import explanation
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.no_messages import why_few, why_not_delivered
 from grader.diagnosis.process.not_called import (
     CalledLate,
@@ -22,7 +23,6 @@ from grader.diagnosis.wrong_value import factor_words
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.wording import code, counted, listing
-from grader.findings.words import LOG, SILENT_EXCEPT, worded
 from grader.measure.printed import (
     UNFILLED,
     Echo,
@@ -153,17 +153,11 @@ def no_history(symptom: NotLogged) -> Finding | None:
         durability, reliability = item.qos.durability, item.qos.reliability
         if durability in _KEEPS and reliability in _RESENDS:
             continue
-        return Finding(
+        return mistaken(
+            "no_history",
             f"{symptom.seen}: the messages were published before the subscription was there, and "
             f"it requests durability {durability} and reliability {reliability}. It matches the "
             "publisher, but gets only what is published from then on",
-            "A late subscription gets the kept messages only if it is transient_local too: "
-            "give create_subscription "
-            + worded(
-                python="a QoSProfile with durability=DurabilityPolicy.TRANSIENT_LOCAL and "
-                "reliability=ReliabilityPolicy.RELIABLE.",
-                cpp="rclcpp::QoS(10).reliable().transient_local().",
-            ),
             Evidence(moments=endpoints_seen(recording, (item,))),
         )
     return None
@@ -217,7 +211,7 @@ def output_dropped(symptom: NotLogged) -> Finding | None:
     return Finding.ours(
         f"nothing about {code(symptom.topic)} is in the output that was kept, but the process "
         f"wrote {dropped} bytes more",
-        "Write less: a line for each message is enough.",
+        remedy("output_dropped"),
     )
 
 
@@ -229,13 +223,9 @@ def only_some_logged(symptom: NotLogged) -> Finding | None:
         return None
     times_s = [recording.since_launch_s(echo.lines[-1].time_ns) for echo in found]
     written = listing(f"{time_s:.2f} s" for time_s in times_s)
-    return Finding(
+    return mistaken(
+        "only_some_logged",
         f"{symptom.seen}, written {written} after launch",
-        "Log in every call of the callback, or as often as is asked: an `if`, "
-        + worded(
-            python="once=True, skip_first=True and throttle_duration_sec=... leave lines out.",
-            cpp="RCLCPP_INFO_ONCE, ..._SKIPFIRST and ..._THROTTLE leave lines out.",
-        ),
         Evidence(
             moments=tuple(Moment(f"logged a message on {topic}", time_s) for time_s in times_s),
             log=tuple(line.text for echo in found for line in echo.lines)[:_LOG_LINES],
@@ -250,16 +240,10 @@ def no_f_string(symptom: NotLogged) -> Finding | None:
     unfilled = UNFILLED.search(logged_text(line.text)) if line else None
     if line is None or unfilled is None:
         return None
-    return Finding(
+    return mistaken(
+        "no_f_string",
         f"log lines follow messages on {code(symptom.topic)}, but they show {code(unfilled[0])} "
         f"instead of a value: {quote(line.text)}",
-        worded(
-            python="Python fills in braces only where an f stands before the quotes: "
-            "f'... {value}' instead of '... {value}'.",
-            cpp='RCLCPP_INFO(this->get_logger(), "x = %.2f", x) fills in %.2f, and %s for '
-            "text.c_str(). RCLCPP_INFO_STREAM and std::cout take values after <<, and neither "
-            "fills in braces.",
-        ),
         symptom.evidence(line),
     )
 
@@ -279,12 +263,12 @@ def wrong_sign_or_unit(symptom: NotLogged) -> Finding | None:
     if number < max(_ALIKE, symptom.needed):
         return None
     line = next(one[2] for one in found if one[:2] == (path, words))
-    return Finding(
+    return mistaken(
+        "logs_other_unit",
         f"log lines follow messages on {code(symptom.topic)}, but {code(path)} in them {words}: "
         f"{quote(line.text)}",
-        f"Log {code(f'msg.{path}')} as it is in the message: ROS has metres, seconds and radians "
-        "(REP-103).",
         symptom.evidence(line),
+        field=code(f"msg.{path}"),
     )
 
 
@@ -304,11 +288,13 @@ def other_values(symptom: NotLogged) -> Finding | None:
     names = dict.fromkeys(name for path in missing for name in Expression.of(path).fields)
     fields = listing(code(f"msg.{name}") for name in names)
     given = "is published" if symptom.own else "the callback is given"
-    return Finding(
+    return mistaken(
+        "other_values_logged",
         f"log lines follow messages on {code(symptom.topic)}, but none shows {values}: "
         f"{quote(line.text)}{how}",
-        f"Log the fields of the message that {given}: {fields}.",
         symptom.evidence(line),
+        given=given,
+        fields=fields,
     )
 
 
@@ -321,17 +307,11 @@ def nothing_logged(symptom: NotLogged) -> Finding:
         f"nothing is logged when messages come on {code(topic)}: the subscription is there, its "
         "type and its QoS match"
     )
-    hint = (
-        "Does the callback of this topic reach the line that logs the message? By default the "
-        f"output of {worded('debug()', 'RCLCPP_DEBUG')} is not shown, an {SILENT_EXCEPT} hides an "
-        "error, and an `if` may leave messages out."
-    )
     if symptom.own:
         seen = symptom.seen
-        hint = f"Log the message where it is published: {LOG}."
-    return Finding(
+    return mistaken(
+        "own_not_logged" if symptom.own else "nothing_logged",
         seen + (f"; the process wrote {quote(lines[0].text)}" if lines else ""),
-        hint,
         Evidence(
             moments=first_seen(recording, recording.carried(topic)),
             places=symptom.places,

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 from grader.diagnosis.destroyed_endpoint import why_unpublished, why_unsubscribed
 from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.process.not_called import NotCalled, never_spun
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen, first_seen
 from grader.findings.wording import code, codes, counted
-from grader.findings.words import type_in_code, worded
+from grader.findings.words import type_in_code
 from grader.measure.compatibility import compatibility_table, refusals, sides
 from grader.measure.declarations import timers, was_held_up
 from grader.recording.model import NS, Endpoint, Kind, Owner, Qos, Recording
@@ -144,12 +145,7 @@ class NotDelivered(OnTopic):
 
 def seconds_hint(period_s: float = 0.3) -> str:
     """What a timer takes as its period."""
-    return worded(
-        python="create_timer takes its period in seconds: "
-        f"{period_s:g} is {format_duration(period_s)}.",
-        cpp="create_wall_timer takes a period with its unit, such as 300ms: `300s` is 300 seconds. "
-        "Of a number make one with std::chrono::milliseconds(number).",
-    )
+    return remedy("seconds", number=f"{period_s:g}", period=format_duration(period_s))
 
 
 def why_silent(recording: Recording, topic: str) -> Finding:
@@ -181,10 +177,10 @@ def why_unreadable(recording: Recording, topic: str) -> Finding | None:
     number = recording.unreadable.get(topic, 0)
     if not number:
         return None
-    return Finding(
+    return mistaken(
+        "unreadable_message",
         f"{counted(number, 'message')} on {code(topic)} cannot be read: the bytes that were "
         "published are not a message of its type",
-        "Give publish() a message object, not bytes: it publishes bytes unchanged.",
         Evidence(
             moments=endpoints_seen(recording, recording.student_endpoints(Kind.PUBLISHER, topic))
         ),
@@ -198,10 +194,9 @@ def not_activated(symptom: NoMessages) -> Finding | None:
     said = tuple(line for line in lines if f"'{symptom.topic}'" in line)
     if not said:
         return None
-    return Finding(
+    return mistaken(
+        "not_activated",
         f"{symptom.seen}: the log says that its publisher is not activated",
-        "In on_activate() of the node call LifecycleNode::on_activate(state), which activates all "
-        "of its publishers, or publisher_->on_activate().",
         Evidence(moments=symptom.moments, log=said[:1]),
     )
 
@@ -221,13 +216,12 @@ def other_type(symptom: OnTopic) -> Finding | None:
     if not wanted or not found or (set(wanted) & set(found) and not misdefined):
         return None
     other = "with another definition" if misdefined else f"not {codes(wanted, last='or')}"
-    return Finding(
+    return mistaken(
+        "other_type",
         f"{symptom.seen}: the {symptom.kind.value} on {code(symptom.topic)} has the type "
         f"{codes(found)}, {other}",
-        "A publisher and a subscription communicate only if they use the same type: "
-        f"{code(type_in_code(wanted[0]))}. If you define the type yourself, its fields must be "
-        "as the task asks: types, names, array bounds and order.",
         Evidence(moments=endpoints_seen(symptom.recording, symptom.own)),
+        type=code(type_in_code(wanted[0])),
     )
 
 
@@ -249,11 +243,10 @@ def why_refused(symptom: OnTopic) -> Finding | None:
         return None
     other = "its reader" if symptom.kind is Kind.PUBLISHER else "the publisher"
     pair = symptom.refused[0]
-    return Finding(
+    return mistaken(
+        "refused_qos",
         f"{symptom.seen}: the {symptom.kind.value}'s QoS does not match {other} on "
         f"{code(symptom.topic)} ({', '.join(refusals(*pair))})",
-        "A subscription receives nothing from a publisher that offers less than it requests. A "
-        "number as QoS, such as 10, means reliable and volatile, and the default for the rest.",
         Evidence(
             moments=endpoints_seen(symptom.recording, symptom.own),
             tables=(compatibility_table(*pair),),

@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.not_built import why_not_built
 from grader.diagnosis.process.not_called import at_its_place
 from grader.diagnosis.process.process_exit import ended_early, why_crashed, why_ended
@@ -14,7 +15,7 @@ from grader.diagnosis.undeclared import why_never_appeared
 from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import nodes_seen, until_the_end
 from grader.findings.wording import code, codes
-from grader.findings.words import INIT, INPUT, SLEEP, Words, worded
+from grader.findings.words import INIT
 from grader.measure import declarations
 from grader.recording.interaction import EXECUTOR_SERVICES
 from grader.recording.model import Ending, Node, Process, Recording
@@ -131,25 +132,19 @@ def not_built(symptom: NoNode) -> Finding | None:
         return cause and cause.after("nothing was launched")
     if symptom.what or build is None or build.succeeded:
         return None
-    return Finding(
+    return mistaken(
+        "not_launched",
         "nothing was launched, because the packages did not build",
-        "Correct the build first: `colcon build` names the line.",
         Evidence(places=(build.culprit,) if build.culprit else ()),
     )
 
 
-_NAMED = Words(
-    python="The executable's name is the left side of an entry of console_scripts in setup.py.",
-    cpp="The executable's name is the first argument of add_executable(...) in CMakeLists.txt.",
-)
 _NOT_STARTED = {
-    "Exec format error": "A script begins with the line `#!/usr/bin/env python3`, and nothing "
-    "stands above it.",
-    "Permission denied": "Install a script with install(PROGRAMS ...), not install(FILES ...).",
-    "No such file": "The first line of the script names a program that is not here: write "
-    "`#!/usr/bin/env python3`, and save the file with the line ends of Linux.",
+    "Exec format error": "no_interpreter",
+    "Permission denied": "not_executable",
+    "No such file": "other_interpreter",
 }
-"""What the system says of a program that it cannot start -> what to do."""
+"""What the system says of a program that it cannot start -> the mistake."""
 
 
 @explanation(NoNode)
@@ -161,11 +156,11 @@ def no_executable(symptom: NoNode) -> Finding | None:
     packages = symptom.recording.submission.packages
     installed = [name for package in packages for name in package.executables]
     there = f"; installed are {codes(installed)}" if installed else ""
-    return Finding(
+    return mistaken(
+        next((one for words, one in _NOT_STARTED.items() if words in why), "no_executable"),
         f"{code(what)} could not be started: {why}{there}"
         if why
         else f"nothing was launched, because the executable does not exist{there}",
-        next((hint for words, hint in _NOT_STARTED.items() if words in why), str(_NAMED)),
     )
 
 
@@ -194,12 +189,9 @@ def main_does_not_come_to_it(symptom: NoNode) -> Finding:
     elif declarations.traced(recording, name):
         done = f"never called {INIT}"
     lines = tuple(line.text for line in recording.log if line.process == name)
-    cause = Finding(
+    cause = mistaken(
+        "main_does_not_come_to_it",
         f"the process {code(name)} ran until the end, but {done}",
-        f"main() must call {INIT} and create the node right after it. Look for a loop, {SLEEP} or "
-        f"{INPUT} before that, also "
-        + worded("at the top level of a module", "in the constructors of global objects")
-        + ": a launched node has no keyboard.",
         Evidence(
             moments=(until_the_end(recording, "still no node when the observation ended"),),
             log=lines[-_LOG_LINES:],
@@ -240,16 +232,9 @@ def other_name(symptom: OtherNode) -> Finding:
             how = ": upper and lower case differ"
         elif base == symptom.base:
             how = f": the name is right, but the node is in the namespace {code(space or '/')}"
-    return Finding(
+    return mistaken(
+        "other_node_name",
         f"{symptom.seen}{how}",
-        worded(
-            python="The node's name is the argument of "
-            f"super().__init__('{symptom.base}') in its constructor.",
-            cpp=f'The node\'s name is the argument of Node("{symptom.base}") in its '
-            "constructor's initialiser list.",
-        )
-        + " Upper and lower case matter, and a namespace (the argument or `__ns`) stands in front "
-        "of it. If it is another node of yours, look whether each executable runs its own "
-        "function.",
         Evidence(moments=nodes_seen(symptom.recording)),
+        base=symptom.base,
     )

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_answer import NoAnswer, why_late
 from grader.diagnosis.no_endpoint import SERVICE
 from grader.diagnosis.no_node import why_not_node, written_nodes
@@ -63,8 +64,8 @@ class NotDeclared(Symptom[Finding]):
 
     def cause(self, seen: str) -> Finding:
         """The cause for what is declared instead."""
-        hint = f"Call {declare_parameter(self.name)} in the node's constructor."
-        return Finding(seen, hint, Evidence(moments=answered_at(self.recording, self.asked)))
+        shown = Evidence(moments=answered_at(self.recording, self.asked))
+        return mistaken("not_declared_here", seen, shown, declare=declare_parameter(self.name))
 
 
 def why_not_declared(recording: Recording, node: str, name: str) -> Finding | None:
@@ -107,11 +108,12 @@ def why_not_taken(recording: Recording, names: Iterable[str]) -> Finding | None:
         {one for node in recording.student_nodes for one in declared(recording, node.name)}
     )
     others = f"; declared {'is' if len(there) == 1 else 'are'} {codes(there)}" if there else ""
-    return Finding(
+    return mistaken(
+        "not_taken",
         f"the launch gives {codes(lacking)}, but no node declares {_it(lacking)}{others}",
-        f"Call {declare_parameter(lacking[0])} in the node's constructor, and read it with "
-        f"{get_parameter(lacking[0])}. A parameter that is not declared is ignored.",
         Evidence(moments=answered_at(recording, answered)),
+        declare=declare_parameter(lacking[0]),
+        get=get_parameter(lacking[0]),
     )
 
 
@@ -140,12 +142,13 @@ def why_for_no_node(recording: Recording) -> Finding | None:
             continue
         right = lacking[like]
         place = SourceError(path, line, f"its values are for {key}")
-        return Finding(
+        return mistaken(
+            "for_no_node",
             f"{code(path)} gives values to {code(key)}, and there is no such node: found "
             f"{codes(nodes)}",
-            f"Write {code(right)} in this file, above `ros__parameters:`; {code('/**')} stands "
-            "for any node.",
             Evidence(nodes_seen(recording), (place,)),
+            right=code(right),
+            any=code("/**"),
         )
     return None
 
@@ -172,13 +175,9 @@ def why_services_silent(recording: Recording, calls: Iterable[Call]) -> Finding 
         return cause_of(NoAnswer(recording, what, SERVICE, *asked))
     if lost.error != NO_SERVER:
         return Finding.ours(f"{service} could not be asked: {lost.error}")
-    return Finding(
+    return mistaken(
+        "no_parameter_services",
         f"the node has no service {service}",
-        "Do not set "
-        + worded(
-            "start_parameter_services=False", "start_parameter_services(false) in the NodeOptions"
-        )
-        + ": the parameters of a node are read and set through its services.",
         evidence_at(recording, "asked", lost.requested_ns),
     )
 

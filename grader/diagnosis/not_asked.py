@@ -5,47 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from grader.diagnosis.explanation import cause_of, explanation
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.no_answer import why_raised, why_taken
 from grader.diagnosis.no_endpoint import ACTION_CLIENT, CLIENT, why_not_offered
 from grader.diagnosis.process.not_called import NotCalled, blocked_executor, never_spun
 from grader.diagnosis.process.process_exit import why_crashed
-from grader.diagnosis.process.standing import ASK_AND_RETURN
 from grader.findings.fields import brief, words
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.first_seen import until_the_end
 from grader.findings.wording import code
-from grader.findings.words import Words
 from grader.recording.interaction import Asked
 from grader.recording.model import Recording
 
-_WAIT = Words(
-    python="Before the first request wait for the server, client.wait_for_service(timeout_sec=1.0) "
-    "or wait_for_server(timeout_sec=1.0) of an action client: what is sent before is lost. Then "
-    "look whether the line that sends is reached.",
-    cpp="Before the first request wait for the server, client->wait_for_service(1s) or "
-    "wait_for_action_server(1s) of an action client: what is sent before is lost. Then look "
-    "whether the line that sends is reached.",
-)
-_ENDED = Words(
-    python="Look at the status that get_result_async() gives, and go on whatever it is.",
-    cpp="Look at result.code in result_callback, and go on whatever it is.",
-)
 _AFTER = {
-    "unanswered": Words(
-        python="Give up after some time: spin_until_future_complete() takes timeout_sec, and a "
-        "timer can look at future.done().",
-        cpp="Give up after some time: spin_until_future_complete() takes a timeout, and a timer "
-        "can look at future.wait_for(0s).",
-    ),
-    "rejected": Words(
-        python="Look at goal_handle.accepted first: a rejected goal has no result to wait for.",
-        cpp="Look first whether goal_response_callback got a goal handle: a rejected goal has "
-        "none, and no result to wait for.",
-    ),
-    "aborted": _ENDED,
-    "canceled": _ENDED,
+    "unanswered": "never_gives_up",
+    "rejected": "ignores_rejection",
+    "aborted": "ignores_status",
+    "canceled": "ignores_status",
 }
-"""What to try where nothing follows something that ended so."""
+"""The mistake where nothing follows something that ended so."""
 _MOST_ROWS = 50
 
 
@@ -111,11 +89,7 @@ def process_failed(symptom: NotAsked) -> Finding | None:
 def waits_in_a_callback(symptom: NotAsked) -> Finding | None:
     """call() or spin_until_future_complete() in a callback waits for an answer, and blocks it."""
     blocked = blocked_executor(symptom) if symptom.asked else None
-    hint = (
-        "A callback must not wait for an answer: the executor that called it has to take the "
-        f"answer in. {ASK_AND_RETURN}"
-    )
-    return blocked and replace(blocked, hint=hint)
+    return blocked and replace(blocked, hint=remedy("waits_in_a_callback"))
 
 
 @explanation(NotAsked, after=(blocked_executor,))
@@ -125,7 +99,7 @@ def stops_after_a_failure(symptom: NotAsked) -> Finding | None:
     if status not in _AFTER:
         return None
     seen = f"{symptom.seen}; nothing follows the last one, {status}"
-    return Finding(seen, str(_AFTER[status]), evidence(symptom.recording, symptom.asked))
+    return mistaken(_AFTER[status], seen, evidence(symptom.recording, symptom.asked))
 
 
 @explanation(NotAsked, general=True)
@@ -133,12 +107,11 @@ def too_few(symptom: NotAsked) -> Finding:
     """The request was sent before the server was found, or never."""
     recording, seen = symptom.recording, symptom.seen
     if symptom.asked:
-        hint = "Send the next one in the callback that takes the answer to the one before."
         taken = why_taken(recording, seen, symptom.since_ns, recording.stop_ns, 0.0)
-        return taken or Finding(seen, hint, evidence(recording, symptom.asked))
+        return taken or mistaken("too_few_asked", seen, evidence(recording, symptom.asked))
     moment = until_the_end(recording, "still nothing was asked")
-    return Finding(
-        f"{seen}, although the client was there", str(_WAIT), Evidence(moments=(moment,))
+    return mistaken(
+        "never_sent", f"{seen}, although the client was there", Evidence(moments=(moment,))
     )
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
-from grader.diagnosis.build_error import EMPTY_HINT, BuildError
+from grader.diagnosis.build_error import BuildError
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.findings.finding import Evidence, Finding, Status
 from grader.findings.wording import code, codes
-from grader.findings.words import worded
 from grader.machine.bootstrap import COMPILERS
 from grader.recording.submission import (
     EMPTY,
@@ -72,14 +72,8 @@ def no_workspace(symptom: NoPackage) -> Finding | None:
     problem = symptom.submission.problem
     if problem is None and symptom.names:
         return None
-    return Finding(
-        problem or "no package.xml was found",
-        "Hand in the packages that the task asks for, each of them once. colcon leaves out a "
-        "folder with a file COLCON_IGNORE in it."
-        if symptom.names
-        else "Hand in the workspace, its src folder or the package itself: a ROS package is a "
-        "folder with a package.xml.",
-    )
+    mistake = "not_once" if symptom.names else "no_workspace"
+    return mistaken(mistake, problem or "no package.xml was found")
 
 
 @explanation(NoPackage)
@@ -102,19 +96,11 @@ def other_package_name(symptom: NoPackage) -> Finding:
         if match in (None, item.name)
     )
     build_type = existing_package(symptom.submission, match).build_type if match else ""
-    others = "in project(...) of CMakeLists.txt"
-    if build_type not in _CMAKE:
-        others = worded(
-            python="in setup.py, setup.cfg, resource/ and the folder of the Python module",
-            cpp=others,
-        )
+    mistake = "other_cmake_name" if build_type in _CMAKE else "other_package_name"
+    apart = "" if match else f" {remedy('inside_another')}"
     seen = f"found package {code(match)}" if match else f"found {codes(symptom.names)} only"
-    return Finding(
-        seen + "".join(map(breach_of_rep_144, [match] if match else symptom.names)),
-        f"Write <name>{name}</name> in package.xml, and the same name {others}."
-        + ("" if match else " A package inside another one is not found: put them side by side."),
-        Evidence(places=places[:10]),
-    )
+    seen += "".join(map(breach_of_rep_144, [match] if match else symptom.names))
+    return mistaken(mistake, seen, Evidence(places=places[:10]), name=name, apart=apart)
 
 
 def why_misnamed(submission: SubmissionRecord, name: str) -> Finding | None:
@@ -143,10 +129,9 @@ def why_no_manifest(submission: SubmissionRecord, name: str) -> Finding | None:
 
 
 def _unusable(seen: str, errors: list[SourceError]) -> Finding:
-    hint = "Correct package.xml at the line that is named here."
-    if any(error.message == EMPTY for error in errors):
-        hint = EMPTY_HINT
-    return Finding(seen, hint, Evidence(places=tuple(errors)))
+    is_empty = any(error.message == EMPTY for error in errors)
+    mistake = "empty_file" if is_empty else "broken_package_xml"
+    return mistaken(mistake, seen, Evidence(places=tuple(errors)))
 
 
 def existing_package(submission: SubmissionRecord, name: str) -> PackageRecord:
@@ -162,9 +147,7 @@ def why_too_new(package: PackageRecord) -> Finding | None:
     if not package.newer_syntax:
         return None
     return Finding.ours(
-        f"the Python of this machine cannot read {package.newer_syntax[0]}",
-        "It is right in ROS 2 Jazzy, which has Python 3.12, so you lose no points. Tell your "
-        "instructor that it needs Python 3.12, or do without this syntax.",
+        f"the Python of this machine cannot read {package.newer_syntax[0]}", remedy("too_new")
     )
 
 
@@ -199,23 +182,10 @@ def build_takes_too_long(symptom: NotBuilt) -> Finding | None:
     begun = [one for one in build.failed_packages if _failed_itself(build, one)]
     if not build.timed_out or name not in (begun or build.failed_packages or [name]):
         return None
-    waits = worded(
-        python="input(), a sleep, a lock or a download in setup.py or CMakeLists.txt",
-        cpp="a sleep, a lock or a download in CMakeLists.txt",
-    )
-    computes = worded(
-        python="an endless loop or a long computation in setup.py or CMakeLists.txt",
-        cpp="an endless loop in CMakeLists.txt, and for templates and constexpr functions that "
-        "keep the compiler busy",
-    )
-    looked_for = {
-        None: f"Look for {worded('input(), ', '')}{computes}.",
-        True: f"It waited: look for {waits}.",
-        False: f"It kept computing: look for {computes}.",
-    }
-    return Finding(
+    mistakes = {None: "endless_build", True: "build_waits", False: "build_computes"}
+    return mistaken(
+        mistakes[build.waited],
         "`colcon build` did not finish within its time limit and was ended",
-        looked_for[build.waited],
         _evidence(build, name),
     )
 
@@ -254,10 +224,12 @@ def depends_on_another(symptom: NotBuilt) -> Finding:
     broken = [one for one in blamed if not _lacking(submission, build, one)]
     if broken:
         why = f": {build.culprit}" if build.culprit and broken == blamed else ""
-        return Finding(
+        return mistaken(
+            "depends_on_another",
             f"it was not built, because {codes(broken)} failed to build{why}",
-            f"Correct {codes(broken)} first: `colcon build --packages-select {broken[0]}`.",
             _evidence(build, broken[0]),
+            broken=codes(broken),
+            first=broken[0],
         )
     lacking = sorted({what for one in blamed for what in _lacking(submission, build, one)})
     return _not_here(lacking).after(f"it was not built, because it depends on {codes(blamed)}")
@@ -278,8 +250,7 @@ def _not_here(lacking: list[str]) -> Finding:
     return Finding.ours(
         f"it needs {codes(lacking)} to build: ROS 2 Jazzy has it, but it is missing or damaged on "
         "the machine that grades",
-        "You lose no points for it. Tell your instructor that a full ROS 2 Jazzy builds it"
-        f"{''.join(f', or {way}' for way in ways if way)}.",
+        remedy("not_here", ways="".join(f", or {way}" for way in ways if way)),
     )
 
 

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from grader.diagnosis.explanation import Symptom, explanation
+from grader.diagnosis.mistake import mistaken
 from grader.findings.finding import Finding
 from grader.findings.value import leaves, number_at
 from grader.findings.wording import code, codes, listing
@@ -59,10 +60,10 @@ def older_values(symptom: NotFollowing) -> Finding | None:
     late_s, source = _lag_s(symptom.derived, symptom.some), symptom.source
     if late_s is None:
         return None
-    return Finding(
+    return mistaken(
+        "older_values",
         f"the values are those of {source} {format_duration(late_s)} earlier",
-        f"Publish from the callback of {source}, or store its newest message there and publish "
-        "that. A callback that sleeps lets the newer ones wait.",
+        source=source,
     )
 
 
@@ -71,10 +72,7 @@ def different_moments(symptom: NotFollowing) -> Finding | None:
     """The fields are filled from different messages."""
     if symptom.bad:
         return None
-    return Finding(
-        f"the values are of different moments of {symptom.source}",
-        "Fill all fields from one message: `msg` of the callback.",
-    )
+    return mistaken("different_moments", f"the values are of different moments of {symptom.source}")
 
 
 @explanation(NotFollowing, general=True)
@@ -89,10 +87,12 @@ def other_values(symptom: NotFollowing) -> Finding:
         text = f"{code(derived.fields[index])} = {sample.values[index]:.4g} instead of "
         text += f"{newest[index]:.4g}"
         by_clause.setdefault(_clause(derived, seen, symptom.some, index), []).append(text)
-    return Finding(
+    return mistaken(
+        "other_values",
         "; ".join(listing(texts) + clause for clause, texts in by_clause.items()),
-        f"Set {codes(derived.fields[index] for index in bad)} in the callback of {source}, from "
-        f"{codes(derived.values[index] for index in bad)} of its message.",
+        fields=codes(derived.fields[index] for index in bad),
+        source=source,
+        values=codes(derived.values[index] for index in bad),
     )
 
 

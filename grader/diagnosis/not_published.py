@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from grader.diagnosis.explanation import explanation
-from grader.diagnosis.mistake import remedy
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.no_answer import why_raised
 from grader.diagnosis.no_messages import (
     FewMessages,
@@ -23,7 +23,6 @@ from grader.diagnosis.process.standing import where_it_stands
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import evidence_at, until_the_end
 from grader.findings.wording import code, counted, listing
-from grader.findings.words import SILENT_EXCEPT
 from grader.measure import declarations
 from grader.measure.declarations import is_compiled
 from grader.recording.model import NS, Kind, Recording
@@ -88,10 +87,9 @@ def publish_never_called(symptom: NoMessages) -> Finding | None:
     names = [timer.callback for timer in declarations.timers(symptom.recording)][:1]
     message = "this is called, and should publish"
     places = (defined_at(name, message, symptom.recording.submission) for name in names)
-    return Finding(
+    return mistaken(
+        "publish_never_called",
         f"{symptom.seen}: no line of the program calls publish()",
-        "A message is sent only by publish(msg) of the publisher: call it after the message is "
-        "filled. Logging a message does not send it.",
         Evidence(moments=symptom.moments, places=tuple(filter(None, places))),
     )
 
@@ -109,13 +107,7 @@ def no_answer(symptom: NoMessages) -> Finding | None:
     )
     return why_raised(recording, seen, sent[0].stamp_ns) or _where_it_stands(
         recording,
-        Finding(
-            seen,
-            "Is publish(msg) reached in the subscription's callback? Look for an `if` or a "
-            f"`return` before it. An {SILENT_EXCEPT} hides errors. Log a line right before "
-            "publish(msg) to see.",
-            evidence_at(recording, f"sent on {name}", sent[0].stamp_ns),
-        ),
+        mistaken("no_answer", seen, evidence_at(recording, f"sent on {name}", sent[0].stamp_ns)),
     )
 
 
@@ -128,10 +120,9 @@ def no_timer(symptom: NoMessages) -> Finding | None:
         return None
     return _where_it_stands(
         recording,
-        Finding(
+        mistaken(
+            "nothing_calls",
             f"{_idle(symptom)}, and the process declared no timer that would call publish()",
-            "Is publish(msg) reached? Look for a condition before it, and whether anything calls "
-            "the function that it stands in: a method runs only if it is called.",
             _idle_evidence(symptom),
         ),
     )
@@ -150,13 +141,7 @@ def publish_not_reached(symptom: NoMessages) -> Finding:
         although = f", although the process declared a timer of {listing(periods)}"
     return _where_it_stands(
         recording,
-        Finding(
-            _idle(symptom) + although,
-            "Is publish(msg) reached in the callback? Look for an `if` or a `return` before it. An "
-            f"{SILENT_EXCEPT} hides errors. Log a line at the beginning of the callback, and one "
-            "right before publish(msg): what is not logged is not reached.",
-            _idle_evidence(symptom),
-        ),
+        mistaken("publish_not_reached", _idle(symptom) + although, _idle_evidence(symptom)),
     )
 
 
@@ -166,11 +151,7 @@ def publishing_stopped(symptom: FewMessages) -> Finding:
     recording, evidence = symptom.recording, Evidence(moments=symptom.moments)
     period_s = [timer.period_s for timer in declarations.timers(recording)]
     if not period_s:
-        return Finding(
-            symptom.seen,
-            "Publish as long as the node runs: look for a counter or a condition that ends it.",
-            evidence,
-        )
+        return mistaken("publishing_stopped", symptom.seen, evidence)
     is_slow = symptom.needed * min(period_s) > symptom.watched_s
     return Finding(
         f"{symptom.seen}; the process declared a timer of "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from grader.diagnosis.mistake import mistaken
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.words import worded
 from grader.measure import declarations
@@ -26,13 +27,11 @@ def why_undeclared(recording: Recording, what: str) -> Finding:
             cpp="rosgrade could not see into this program",
         )
         return Finding.ours(f"{seen}: {why}")
-    method = worded("the method of rclpy's Node", "the method of rclcpp::Node")
-    return Finding(
+    return mistaken(
+        "undeclared",
         f"{seen}: it was created without {worded('rclpy', 'rclcpp')}, or in a program that was "
         "started without the environment of the first, or after the file descriptors of rosgrade "
         "were closed",
-        f"Create it with {method}, in the program that `ros2 run` starts. Keep its environment, "
-        "and close only the file descriptors that you opened.",
         Evidence(moments=(Moment("launched", 0.0),)),
     )
 
@@ -47,11 +46,9 @@ def why_never_appeared(recording: Recording, what: str) -> Finding:
     if not names and was_held_up(recording):
         return Finding.undecided(f"{seen}, while the machine was busy")
     changed = f": the program changed {', '.join(names)}, which nodes use to find each other"
-    cause = Finding(
+    cause = mistaken(
+        "never_appeared",
         seen + (changed if names else ""),
-        "A node must stay in the ROS domain that it is given. In the environment and in the code, "
-        "do not set ROS_DOMAIN_ID, domain_id, a discovery server or a profile of the middleware. "
-        + worded("Do not replace rclpy's methods.", "Do not define functions of rcl."),
         Evidence(moments=(Moment("launched", 0.0),)),
     )
     # What was created right before the end may not have been seen yet.

@@ -5,29 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.no_answer import NoAnswer, why_late, why_raised, why_taken
 from grader.diagnosis.no_endpoint import ACTION
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.fields import the_goal
 from grader.findings.finding import Evidence, Finding
-from grader.findings.words import Words, worded
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
 from grader.spec.unit import format_duration
 
 # Share of the time from the request to cancel until the end of the goal.
 _AT_THE_END = 0.8
-_TWO_THREADS = Words(
-    python="Spin with a MultiThreadedExecutor, and give the ActionServer a ReentrantCallbackGroup.",
-    cpp="handle_accepted must return at once: start a thread in it that executes the goal, "
-    "std::thread{std::bind(&Bot::execute, this, goal_handle)}.detach().",
-)
-_LOOK = Words(
-    python="In the loop of the execute callback: if goal_handle.is_cancel_requested, call "
-    "goal_handle.canceled() and return the result.",
-    cpp="In the loop of the execute callback: if goal_handle->is_canceling(), call "
-    "goal_handle->canceled(result) and return.",
-)
 
 
 @dataclass(frozen=True)
@@ -74,14 +63,8 @@ def cancel_refused(symptom: NotCanceled) -> Finding | None:
     """The server refuses to cancel: it has no cancel_callback that accepts."""
     if symptom.goal.cancel_accepted is not False or symptom.is_untaken:
         return None
-    return Finding(
-        f"the server refused to cancel {the_goal(symptom.goal)}",
-        worded(
-            python="Give the ActionServer a cancel_callback that returns CancelResponse.ACCEPT. "
-            "Without one rclpy refuses.",
-            cpp="Let handle_cancel of the server return rclcpp_action::CancelResponse::ACCEPT.",
-        ),
-        symptom.evidence,
+    return mistaken(
+        "cancel_refused", f"the server refused to cancel {the_goal(symptom.goal)}", symptom.evidence
     )
 
 
@@ -101,7 +84,7 @@ def executor_busy_with_the_goal(symptom: NotCanceled) -> Finding | None:
     goal, recording = symptom.goal, symptom.recording
     seen = f"{symptom.seen}: the server did not handle the request to cancel"
     text = f"{seen}: its executor is busy while the execute callback runs"
-    busy = Finding(text, str(_TWO_THREADS), symptom.evidence)
+    busy = mistaken("one_thread", text, symptom.evidence)
     if goal.result_ns is not None:
         return busy
     asked_ns, within_s = goal.canceled_ns or 0, symptom.within_s
@@ -113,11 +96,11 @@ def request_ignored(symptom: NotCanceled) -> Finding:
     """The loop of the execute callback never checks whether the goal should be canceled."""
     if symptom.goal.result_ns is not None:
         seen = f"{symptom.seen}, although the server agreed to cancel"
-        return Finding(seen, str(_LOOK), symptom.evidence)
+        return mistaken("ignores_cancel", seen, symptom.evidence)
     asked_ns = symptom.goal.canceled_ns or 0
     never = why_no_end(symptom.recording, symptom.seen, asked_ns, symptom.within_s)
     seen = f"{symptom.seen}: the execute callback goes on"
-    return never or Finding(seen, str(_LOOK), symptom.evidence)
+    return never or mistaken("ignores_cancel", seen, symptom.evidence)
 
 
 def why_no_end(recording: Recording, seen: str, asked_ns: int, within_s: float) -> Finding | None:
@@ -133,9 +116,4 @@ def ended_alone(recording: Recording, goal: Goal, evidence: Evidence) -> Finding
         f"{the_goal(goal)} {goal.status} {format_duration(lasted_s)} after it was accepted: too "
         "early for this check"
     )
-    return why_raised(recording, seen, goal.sent_ns) or Finding(
-        seen,
-        "The execute callback returns too early: it must work on the goal step by step, with a "
-        "pause after each step.",
-        evidence,
-    )
+    return why_raised(recording, seen, goal.sent_ns) or mistaken("ended_alone", seen, evidence)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from grader.diagnosis.build_error import EMPTY_HINT
-from grader.diagnosis.mistake import remedy
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.process.exceptions import import_of
 from grader.findings.finding import Evidence, Finding, Table
 from grader.findings.wording import code, codes
@@ -31,8 +30,8 @@ def why_unknown_imports(package: PackageRecord) -> Finding | None:
     for error in package.syntax_errors:
         if error.file not in read:
             seen = f"the imports cannot be read: {error}"
-            hint = EMPTY_HINT if error.message == EMPTY else remedy("unknown_imports")
-            return Finding(seen, hint, Evidence(places=(error,)))
+            mistake = "empty_file" if error.message == EMPTY else "unknown_imports"
+            return mistaken(mistake, seen, Evidence(places=(error,)))
     return None
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from grader.diagnosis.explanation import Symptom, explanation
-from grader.findings.words import EXCLUSIVE, REENTRANT, SPIN_NODE, worded
+from grader.diagnosis.mistake import remedy
 from grader.measure.callback_runs import Run
 from grader.measure.declarations import declares, executors
 from grader.recording.model import Recording
@@ -37,10 +37,7 @@ def other_executor_spins(symptom: OtherExecution) -> str | None:
     spun = dict(executors(symptom.recording))
     if not symptom.together or not declares(symptom.recording, "made") or MULTI in spun:
         return None
-    return (
-        f"The {MULTI} that was made never spins: {SPIN_NODE} uses another one, with one "
-        "thread. Call executor.add_node(node) and executor.spin()."
-    )
+    return remedy("other_executor_spins")
 
 
 @explanation(OtherExecution)
@@ -49,17 +46,10 @@ def one_group(symptom: OtherExecution) -> str | None:
     groups = {run.group for run in symptom.runs}
     if not symptom.together or len(groups) != 1 or not min(groups).startswith(GROUP):
         return None
-    group = worded("callback_group=...", "callback group")
-    return (
-        f"They are in one {EXCLUSIVE}, the node's default group if no {group} is given. Give them "
-        f"a {REENTRANT}, or each a group of its own."
-    )
+    return remedy("one_group")
 
 
 @explanation(OtherExecution, general=True)
 def other_executor_or_groups(symptom: OtherExecution) -> str:
     """Another kind of executor spins, or the callbacks are in other groups."""
-    return (
-        f"{SPIN_NODE} and a {SINGLE} run one callback at a time. When a {MULTI} spins, only "
-        f"callbacks of one {EXCLUSIVE} wait for each other."
-    )
+    return remedy("other_executor_or_groups")

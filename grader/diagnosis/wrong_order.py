@@ -9,10 +9,10 @@ from itertools import pairwise
 from typing import Any
 
 from grader.diagnosis.explanation import Symptom, explanation
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.findings.fields import wanted_text
 from grader.findings.finding import Finding
 from grader.findings.value import same
-from grader.findings.words import worded
 
 
 @dataclass(frozen=True)
@@ -46,12 +46,7 @@ def never_changes(symptom: WrongOrder) -> Finding | None:
     """The value never changes: it is not kept in the node, or never counted up."""
     if not symptom.steps or any(symptom.steps):
         return None
-    an_attribute = worded(
-        python="an attribute of the node, such as self.count",
-        cpp="a member of the node, such as count_",
-    )
-    hint = f"Keep the value in {an_attribute}, and change it in the timer's callback."
-    return Finding(": the value never changes", hint)
+    return mistaken("never_changes", ": the value never changes")
 
 
 @explanation(WrongOrder)
@@ -70,9 +65,9 @@ def starts_again(symptom: WrongOrder) -> Finding | None:
     found = symptom.found
     if not symptom.steps or found[0] not in found[1:] or not symptom.steps[0]:
         return None
-    return Finding(
+    return mistaken(
+        "starts_again",
         f": it goes back to the first value in message {found.index(found[0], 1) + 1}",
-        "Is the value reset, does it overflow, or do two publishers count?",
     )
 
 
@@ -84,5 +79,5 @@ def other_order(symptom: WrongOrder) -> Finding:
 
 def _each_once(symptom: WrongOrder) -> str:
     if symptom.step is None:
-        return "Publish the values that are asked for, each once and in this order."
-    return f"Change the value once for every message, by {plain(symptom.step)}."
+        return remedy("not_in_order")
+    return remedy("other_step", step=plain(symptom.step))

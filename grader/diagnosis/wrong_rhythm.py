@@ -15,7 +15,6 @@ from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.process.standing import slow_callback
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import counted, listing
-from grader.findings.words import worded
 from grader.measure import declarations
 from grader.measure.period import Interval, PeriodLimits, PeriodVerdict
 from grader.recording.model import NS, Kind, Recording
@@ -29,7 +28,6 @@ _OFF = 0.2
 _POWERS = (1e-6, 1e-3, 0.01, 0.1, 10.0, 100.0, 1e3, 1e6)
 _TIMES = range(2, 6)
 _TIMES_TOLERANCE = 0.08
-_ONCE = "Create one publisher and one timer in the constructor, and publish once in its callback."
 
 
 @dataclass(frozen=True)
@@ -73,12 +71,12 @@ def several_in_each_period(symptom: WrongRhythm) -> Finding | None:
     words = f"messages come {times} times as often as expected"
     publishers = symptom.recording.student_endpoints(Kind.PUBLISHER, symptom.topic)
     if len(publishers) > 1:
-        return Finding(f"{words}, from {len(publishers)} publishers on the topic", _ONCE)
+        return mistaken("one_timer", f"{words}, from {len(publishers)} publishers on the topic")
     if len(symptom.timers_s) == 1 and symptom.declares(average_s):
         words += f": the process declared a timer of {format_duration(symptom.timers_s[0])}"
         return Finding(words, seconds_hint(symptom.limits.period_s))
     several = f", and the process declared {len(symptom.timers_s)} timers"
-    return Finding(words + (several if len(symptom.timers_s) > 1 else ""), _ONCE)
+    return mistaken("one_timer", words + (several if len(symptom.timers_s) > 1 else ""))
 
 
 @explanation(WrongRhythm, concept="executors")
@@ -102,16 +100,11 @@ def condition_in_a_faster_timer(symptom: WrongRhythm) -> Finding | None:
         )
         if 2.0 * timer_s <= wanted_s and min(calls) > 1 and off_s <= _OFF * timer_s:
             some = listing(map(str, sorted(set(calls))), "or")
-            return Finding(
+            return mistaken(
+                "condition_in_a_faster_timer",
                 f"the process declared a timer of {format_duration(timer_s)}, and publishes in "
                 f"one of {some} calls",
-                "Give the timer the period itself, "
-                + worded(
-                    python=f"self.create_timer({wanted_s:g}, ...)",
-                    cpp=f"this->create_wall_timer({wanted_s:g}s, callback)",
-                )
-                + ", and publish in every call. A condition on the time is true only when the "
-                "timer calls next, so it comes late.",
+                seconds=f"{wanted_s:g}",
             )
     return None
 
@@ -121,13 +114,7 @@ def irregular(symptom: WrongRhythm) -> Finding | None:
     """The period is right, but not all intervals: a callback takes long, a condition, a loop."""
     if not symptom.verdict.period_good:
         return None
-    hint = "Publish in every call of the timer's callback, without a condition. "
-    if not symptom.timers_s:
-        timer = worded("self.create_timer(...)", "this->create_wall_timer(...)")
-        hint = f"Let a timer call the callback: {timer}. "
-    return Finding(
-        "", f"{hint}No callback may work or sleep for long: the timer has to wait for it."
-    )
+    return mistaken("irregular" if symptom.timers_s else "irregular_without_timer", "")
 
 
 @explanation(WrongRhythm)
@@ -153,12 +140,10 @@ def right_timer_too_late(symptom: WrongRhythm) -> Finding | None:
     right = symptom.declares(wanted_s)
     if not right or late_s < 0.0:
         return None
-    return Finding(
+    return mistaken(
+        "right_timer_too_late",
         f"{format_duration(late_s)} too long, although the process declared "
         f"{counted(len(right), 'timer')} of {format_duration(wanted_s)}",
-        "Keep callbacks short: no sleep, no loop that waits, no long computation. Create the timer "
-        "once, in the constructor: it goes on by itself, without timer.reset(). Publish in every "
-        "call of its callback.",
     )
 
 
@@ -172,15 +157,11 @@ def sleeping_loop(symptom: WrongRhythm) -> Finding | None:
     recording = symptom.recording
     no_timer = declarations.traced(recording) and not declarations.declares(recording, "timer")
     beginning = "the process declared no timer: " if no_timer else ""
-    return Finding(
+    return mistaken(
+        "sleeping_loop",
         f"{beginning}it looks like {format_duration(wanted_s)} of sleeping plus "
         f"{format_duration(median_s - wanted_s)} of work",
-        "Use a timer: "
-        + worded(
-            python=f"self.create_timer({wanted_s:g}, self.callback)",
-            cpp=f"timer_ = this->create_wall_timer({wanted_s:g}s, callback)",
-        )
-        + " keeps its period however long the callback takes.",
+        seconds=f"{wanted_s:g}",
     )
 
 
@@ -188,7 +169,7 @@ def sleeping_loop(symptom: WrongRhythm) -> Finding | None:
 def other_period(symptom: WrongRhythm) -> Finding:
     """Messages come too often or too rarely."""
     if symptom.verdict.median_s < symptom.limits.period_s:
-        return Finding("messages come too often", _ONCE)
+        return mistaken("one_timer", "messages come too often")
     return Finding(
         f"{format_duration(symptom.verdict.median_s)} instead of "
         f"{format_duration(symptom.limits.period_s)}",

@@ -8,13 +8,13 @@ from functools import cached_property
 
 from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.explanation import Symptom, explanation
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.no_messages import NoMessages, never_matched, why_silent
 from grader.diagnosis.process.process_exit import ended_early, why_crashed, why_ended
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import endpoints_seen
 from grader.findings.wording import code, codes, counted
-from grader.findings.words import Words, worded
 from grader.measure import declarations
 from grader.measure.compatibility import refusals
 from grader.measure.transforms import Sent, is_static, sent
@@ -22,16 +22,8 @@ from grader.recording.model import NS, Kind, Qos, Recording
 from grader.spec.nearest_name import nearest
 from grader.spec.unit import format_duration
 
-_STATIC = Words(
-    python="Use StaticTransformBroadcaster, or a publisher on /tf_static with QoSProfile(depth=1, "
-    "durability=DurabilityPolicy.TRANSIENT_LOCAL).",
-    cpp="Use StaticTransformBroadcaster, or a publisher on /tf_static with "
-    "rclcpp::QoS(1).transient_local().",
-)
-_MOVING = "Use TransformBroadcaster, or a publisher on /tf with the QoS 10."
 # A stamp may be that of the data that a transform is made of, or of the near future.
 _STAMP_S = 1.0
-_NAMES = "Set header.frame_id = '{0.parent}' and child_frame_id = '{0.child}', without slashes."
 
 
 @dataclass(frozen=True)
@@ -62,14 +54,15 @@ class NoTransform(Symptom[Finding], concept="frames"):
     @property
     def hint(self) -> str:
         """What publishes on the topic as tf2 requests it."""
-        return str(_STATIC) if is_static(self.topic) else _MOVING
+        return remedy("not_static" if is_static(self.topic) else "not_broadcast")
 
-    def instead(self, one: Sent | None, why: str, hint: str = _NAMES) -> Finding | None:
+    def instead(self, one: Sent | None, why: str, hint: str = "") -> Finding | None:
         """Another transform is there, if it is."""
         if one is None:
             return None
         seen = f"{edge(one.parent, one.child)} on {code(one.message.topic)} {why}"
-        return Finding(seen, hint.format(self), moment(self.recording, one, "sent"))
+        hint = hint or remedy("other_frames", parent=self.parent, child=self.child)
+        return Finding(seen, hint, moment(self.recording, one, "sent"))
 
 
 @dataclass(frozen=True)
@@ -124,10 +117,10 @@ def overwritten(symptom: NoTransform) -> Finding | None:
     kept = recording.on(topic)[-(depth or 0) :]
     if not is_static(topic) or not symptom.wanted or symptom.wanted[-1].message in kept:
         return None
-    return Finding(
+    return mistaken(
+        "overwritten",
         "a node that starts later does not get it: the publisher keeps "
         f"{counted(len(kept), 'message')}, and published others after it",
-        "Publish all static transforms in one message: sendTransform() takes a list.",
         moment(recording, symptom.wanted[-1], "sent"),
     )
 
@@ -180,11 +173,10 @@ def no_quaternion(symptom: BadTransform) -> Finding | None:
     *axis, w = (symptom.one.value["rotation"][part] for part in "xyzw")
     numbers = ", ".join(f"{part:.4g}" for part in (*axis, w))
     clause = ": w is not set" if w in (0.0, 1.0) and any(axis) else ""
-    return Finding(
+    return mistaken(
+        "no_quaternion",
         f"tf2 ignores the transform, for its quaternion (x, y, z, w) = ({numbers}) does not have "
         f"the length 1{clause}",
-        "Set all four: without a rotation w is 1; about the z axis z = sin(yaw / 2) and "
-        "w = cos(yaw / 2).",
         moment(symptom.recording, symptom.one, "ignored"),
     )
 
@@ -200,12 +192,9 @@ def wrong_stamp(symptom: BadTransform) -> Finding | None:
         return None
     off = f"{format_duration(abs(late_s))} {'before' if late_s > 0.0 else 'after'}"
     seen = f"the stamp is {off} the moment of publishing: always the same, or of another clock"
-    return Finding(
+    return mistaken(
+        "wrong_stamp",
         seen if stamp_ns else "the stamp is 0: it is not set",
-        "Set header.stamp = "
-        + worded("self.get_clock().now().to_msg()", "this->now()")
-        + " for each transform, or copy the stamp of the message that it is made of: tf2 looks "
-        "transforms up by their time.",
         moment(symptom.recording, symptom.one, "has a wrong stamp"),
     )
 

@@ -60,14 +60,14 @@ SPIN = Words("rclpy.spin()", "rclcpp::spin()")
 SPIN_NODE = Words("rclpy.spin(node)", "rclcpp::spin(node)")
 SLEEP = Words("time.sleep()", "std::this_thread::sleep_for()")
 MATH = Words("math.", "std::")
-INPUT = Words("input()", "std::cin")
-LOG = Words("self.get_logger().info('...')", 'RCLCPP_INFO(get_logger(), "...")')
 REENTRANT = Words("ReentrantCallbackGroup", "Reentrant callback group")
 EXCLUSIVE = Words("MutuallyExclusiveCallbackGroup", "MutuallyExclusive callback group")
-SILENT_EXCEPT = Words("`except: pass`", "empty `catch (...)`")
 TERMS = {name: term for name, term in vars().items() if isinstance(term, Words)} | {
     "ARROW": Words(".", "->"),
     "A_PROFILE": Words("a QoSProfile", "an rclcpp::QoS"),
+    "INPUT": Words("input()", "std::cin"),
+    "LOG": Words("self.get_logger().info('...')", 'RCLCPP_INFO(get_logger(), "...")'),
+    "SILENT_EXCEPT": Words("`except: pass`", "empty `catch (...)`"),
 }
 """Terms by the name that they have in the tables of hints."""
 

@@ -1,20 +1,22 @@
-"""The table of mistakes that a check sees at once."""
+"""The tables of mistakes, and of what to try."""
 
 from __future__ import annotations
 
 import ast
 import re
 from collections.abc import Iterator
+from importlib import import_module
 from string import Template
 
 import pytest
 
-from grader.diagnosis.mistake import TABLE, mistaken, remedy
+from grader.diagnosis.mistake import hints, mistaken, mistakes, remedy
 from grader.findings.words import TERMS, Words, speaking
 from grader.machine import resources
 from grader.recording.submission import CPP
+from grader.spec.source import read_source
 
-MISTAKES = {name: one for about in TABLE.values() for name, one in about.items()}
+MISTAKES = {name: one for about in mistakes().values() for name, one in about.items()}
 
 
 def sources() -> Iterator[ast.Module]:
@@ -37,28 +39,40 @@ def wanted(hint: str | Words) -> set[str]:
     texts = [hint] if isinstance(hint, str) else [hint.python, hint.cpp]
     found = [Template.pattern.findall(text) for text in texts]
     names = {one[1] or one[2] for some in found for one in some}
-    return {name for name in names if name not in TERMS}
+    # A dollar that stands for itself names nothing.
+    return names - {*TERMS, ""}
 
 
-def test_every_mistake_that_a_check_names_is_in_the_table() -> None:
-    assert {name for name, _ in named()} <= MISTAKES.keys()
+def test_every_mistake_that_is_named_is_in_a_table() -> None:
+    assert {name for name, _ in named()} <= hints().keys()
 
 
-def test_every_mistake_of_the_table_is_named_by_a_check() -> None:
+def test_every_mistake_of_the_tables_is_named() -> None:
     texts = {
         node.value
         for tree in sources()
         for node in ast.walk(tree)
         if isinstance(node, ast.Constant)
     }
-    assert MISTAKES.keys() <= texts
-    assert len(MISTAKES) == sum(map(len, TABLE.values()))
+    assert hints().keys() <= texts
+    assert len(MISTAKES) == sum(map(len, mistakes().values()))
 
 
-def test_a_check_gives_every_text_that_a_hint_asks_for() -> None:
+def test_no_two_mistakes_have_one_name() -> None:
+    explained = read_source(resources.root() / "grader/diagnosis/hints.yaml").data
+    names = [*MISTAKES, *(name for one in explained.values() for name in one)]
+    assert len(names) == len(set(names)) == len(hints())
+
+
+def test_each_hint_of_an_explanation_stands_below_its_module() -> None:
+    for module in read_source(resources.root() / "grader/diagnosis/hints.yaml").data:
+        assert import_module(f"grader.diagnosis.{module}")
+
+
+def test_every_text_that_a_hint_asks_for_is_given() -> None:
     for name, given in named():
         if "None" not in given:
-            assert wanted(MISTAKES[name].hint) <= given, name
+            assert wanted(hints()[name]) <= given, name
 
 
 @pytest.mark.parametrize("name", MISTAKES)

@@ -19,6 +19,7 @@ from grader.measure.motion.quantities import metres, speed
 from grader.checks.motion.robot_check import GoalParameters
 from grader.findings.first_seen import evidence_at
 from grader.findings.wording import counted, percent
+from grader.diagnosis.mistake import remedy
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.no_motion import why_cut_short
@@ -112,7 +113,7 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     misread = misread_yaw(run, parameters.position)
     if misread is not None:
         return Finding.failed(
-            expected, f"the commands do not follow the error: {misread}", str(misread.hint), evidence
+            expected, f"the commands do not follow the error: {misread}", remedy(misread.mistake), evidence
         )
     return Finding.failed(expected, observed, hint, evidence)
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.process.standing import stuck
 from grader.findings.finding import Evidence, Finding
 from grader.findings.first_seen import evidence_at
-from grader.findings.words import SLEEP
 from grader.measure.motion.command import VelocityCommand, commands
 from grader.measure.motion.quantities import speed, turn
 from grader.measure.motion.scan import newest
@@ -76,11 +76,7 @@ def no_scan_for_long(symptom: Contact) -> Finding | None:
     since_ns = symptom.step.time_ns - scan.stamp_ns if scan is not None else 0
     if since_ns <= _BLIND_NS:
         return None
-    return Finding(
-        f"; the last scan had come {since_ns / NS:.2f} s before",
-        "Without new scans the robot drives blindly. Store the time of the last scan, and let a "
-        "timer stop the robot when that is more than 1 s ago.",
-    )
+    return mistaken("no_scan_for_long", f"; the last scan had come {since_ns / NS:.2f} s before")
 
 
 @explanation(Contact)
@@ -89,12 +85,7 @@ def old_command(symptom: Contact) -> Finding | None:
     since_ns = symptom.step.time_ns - symptom.sent[-1].time_ns if symptom.sent else 0
     if since_ns <= _HELD_NS or not symptom.before.command_m_s:
         return None
-    return Finding(
-        f", sent {since_ns / NS:.2f} s before",
-        "The robot keeps the last command. Publish a command for every scan, or from a timer of "
-        "10 Hz or more. To stop, publish linear.x = 0.0. "
-        f"A {SLEEP} or a loop in a callback delays the command.",
-    )
+    return mistaken("old_command", f", sent {since_ns / NS:.2f} s before")
 
 
 @explanation(Contact)
@@ -109,13 +100,7 @@ def callback_in_a_loop(symptom: Contact) -> Finding | None:
 @explanation(Contact, general=True)
 def decided_to_drive(symptom: Contact) -> Finding:
     """The node continued to drive, or stopped too late."""
-    return Finding(
-        "",
-        "Log the range that you compare. Is it the beam straight ahead (angle 0) of the newest "
-        "scan? Is your limit in metres? When the range is below the limit, publish linear.x = 0.0. "
-        f"With a {SLEEP} in the callback or a slow timer, you decide by an old scan. A scan "
-        "comes every 0.2 s, and the robot needs time to brake. Let only one place publish.",
-    )
+    return mistaken("decided_to_drive", "")
 
 
 def _touch(recording: Recording) -> int | None:

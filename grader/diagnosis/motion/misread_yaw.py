@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from grader.findings.words import Words
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.steering import (
     MOST_BEHIND,
@@ -24,7 +23,6 @@ _GOOD_R2 = 0.97
 _RIGHT_R2 = 0.9
 # Readings differ by less where the robot hardly turns.
 _TURNED_RAD = 0.5
-_FORMULA = "yaw = atan2(2 (w z + x y), 1 - 2 (y y + z z))"
 
 
 @dataclass(frozen=True)
@@ -32,7 +30,7 @@ class Reading:
     """A way to read yaw, from the true one in rad."""
 
     words: str
-    hint: str | Words
+    mistake: str
     of: Callable[[float], float]
 
     def __str__(self) -> str:
@@ -41,43 +39,13 @@ class Reading:
 
 
 _READINGS = (
+    Reading("always 0", "yaw_of_another_order", lambda _: 0.0),
+    Reading("in degrees", "yaw_in_degrees", math.degrees),
+    Reading("half of the true yaw", "half_yaw", lambda yaw_rad: yaw_rad / 2.0),
+    Reading("z of the quaternion", "z_for_yaw", lambda yaw_rad: math.sin(yaw_rad / 2.0)),
+    Reading("the true yaw with the wrong sign", "negative_yaw", lambda yaw_rad: -yaw_rad),
     Reading(
-        "always 0",
-        Words(
-            python="The order of a quaternion in ROS is x, y, z, w. as_euler('xyz') and "
-            "euler_from_quaternion() return roll, pitch and yaw: yaw is the last of the three. "
-            f"{_FORMULA}. Compute it again in each callback: at the start it may have been 0.",
-            cpp="The order of a quaternion in ROS is x, y, z, w. getRPY() of tf2::Matrix3x3 gives "
-            "roll, pitch and yaw: yaw is the last of the three. "
-            f"{_FORMULA}. Compute it again in each callback: at the start it may have been 0.",
-        ),
-        lambda _: 0.0,
-    ),
-    Reading(
-        "in degrees",
-        "Angles in ROS are in radians (REP-103), and so is atan2's result: do not convert them.",
-        math.degrees,
-    ),
-    Reading(
-        "half of the true yaw",
-        f"A quaternion holds half of the angle: {_FORMULA}, or 2 * atan2(z, w) on flat ground.",
-        lambda yaw_rad: yaw_rad / 2.0,
-    ),
-    Reading(
-        "z of the quaternion",
-        f"z alone is the sine of half the angle: {_FORMULA}.",
-        lambda yaw_rad: math.sin(yaw_rad / 2.0),
-    ),
-    Reading(
-        "the true yaw with the wrong sign",
-        "Counter-clockwise is positive (REP-103), and 2 * asin(z) has the wrong sign when w is "
-        f"negative: {_FORMULA}.",
-        lambda yaw_rad: -yaw_rad,
-    ),
-    Reading(
-        "always between -90° and 90°",
-        f"asin and atan return angles from -90° to 90° only. Use atan2: {_FORMULA}.",
-        lambda yaw_rad: math.asin(math.sin(yaw_rad)),
+        "always between -90° and 90°", "yaw_by_asin", lambda yaw_rad: math.asin(math.sin(yaw_rad))
     ),
 )
 

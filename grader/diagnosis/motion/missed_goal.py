@@ -13,7 +13,6 @@ from grader.diagnosis.process.not_called import at_its_place
 from grader.diagnosis.process.standing import stuck
 from grader.findings.finding import Finding
 from grader.findings.first_seen import evidence_at
-from grader.findings.words import MATH
 from grader.measure.motion.approach import Approach, long_turns
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.quantities import metres, point, speed, turn
@@ -23,7 +22,6 @@ from grader.recording.simulated import Truth
 from grader.spec.unit import format_duration
 
 _ASTRAY_RAD = math.radians(30.0)
-_SIGN_HINT = "Look at the signs: dx = goal's x - x, dy = goal's y - y."
 
 
 @dataclass(frozen=True)
@@ -104,22 +102,17 @@ def wrong_place(symptom: GoalMissed) -> Finding | None:
             first.x_m + goal.x_m,
             first.y_m + goal.y_m,
             "the goal measured from where the robot started",
-            "The goal is in the frame of odometry: subtract the position that odometry reports.",
+            "from_the_start",
         ),
-        (
-            goal.y_m,
-            goal.x_m,
-            "the goal with x and y swapped",
-            "The goal's x belongs to position.x; atan2 takes y first.",
-        ),
-        (goal.x_m, -goal.y_m, "the goal with the sign of y changed", _SIGN_HINT),
-        (-goal.x_m, goal.y_m, "the goal with the sign of x changed", _SIGN_HINT),
+        (goal.y_m, goal.x_m, "the goal with x and y swapped", "swapped"),
+        (goal.x_m, -goal.y_m, "the goal with the sign of y changed", "wrong_sign"),
+        (-goal.x_m, goal.y_m, "the goal with the sign of x changed", "wrong_sign"),
     )
-    for x_m, y_m, words, hint in places:
+    for x_m, y_m, words, mistake in places:
         is_another = math.hypot(goal.x_m - x_m, goal.y_m - y_m) > 2.0 * symptom.position_m
         is_there = math.hypot(last.x_m - x_m, last.y_m - y_m) <= symptom.position_m
         if symptom.is_at_rest and is_another and is_there:
-            return symptom.cause(f": that is {words}", hint)
+            return symptom.cause(f": that is {words}", remedy(mistake))
     return None
 
 
@@ -134,7 +127,7 @@ def loop_in_a_callback(symptom: GoalMissed) -> Finding | None:
 def yaw_misread(symptom: GoalMissed) -> Finding | None:
     """The yaw is computed wrongly from the quaternion."""
     misread = None if symptom.is_at_rest else misread_yaw(symptom.run, symptom.position_m)
-    return symptom.cause(f": {misread}", str(misread.hint)) if misread else None
+    return symptom.cause(f": {misread}", remedy(misread.mistake)) if misread else None
 
 
 @explanation(GoalMissed, concept="angles")
@@ -152,11 +145,7 @@ def angle_not_wrapped(symptom: GoalMissed) -> Finding | None:
         if detours
         else f"it made {turns:.1f} full turns"
     )
-    return symptom.cause(
-        f": {turned}",
-        "Print yaw, the error and the command while it turns. Yaw follows the robot, from "
-        f"-pi to pi. The error is atan2(dy, dx) - yaw. {remedy('long_turn')}",
-    )
+    return symptom.cause(f": {turned}", remedy("angle_not_wrapped", remedy=remedy("long_turn")))
 
 
 @explanation(GoalMissed)
@@ -166,9 +155,7 @@ def drove_on(symptom: GoalMissed) -> Finding | None:
     if nearest_m > symptom.position_m:
         return None
     return symptom.cause(
-        f": it came as near as {metres(nearest_m)}, and drove on",
-        "Compare the distance in every callback, and publish linear.x = 0.0 when it is below "
-        "your tolerance.",
+        f": it came as near as {metres(nearest_m)}, and drove on", remedy("drove_on")
     )
 
 
@@ -177,12 +164,7 @@ def stopped_elsewhere(symptom: GoalMissed) -> Finding | None:
     """It stopped before the goal, or somewhere else."""
     if not symptom.is_at_rest:
         return None
-    return symptom.cause(
-        "",
-        "Print the goal that your node reads. Drive until "
-        f"{MATH}hypot(goal's x - x, goal's y - y) is below the tolerance, in metres, with x and y "
-        "from the newest odometry.",
-    )
+    return symptom.cause("", remedy("stopped_elsewhere"))
 
 
 @explanation(GoalMissed)
@@ -191,20 +173,10 @@ def drives_away(symptom: GoalMissed) -> Finding | None:
     began_m = symptom.run.distance_m(symptom.run.truth[0])
     if symptom.run.distance_m(symptom.last) <= began_m:
         return None
-    return symptom.cause(
-        f", farther than at the start ({metres(began_m)})",
-        "Print the direction of the goal, yaw and the command while it drives. The direction "
-        "changes with the position: it is atan2(dy, dx), dy first, with dx = goal's x - x, and "
-        "not atan(dy / dx). The error is this direction - yaw, and a positive error turns left. "
-        f"linear.x is a gain times {MATH}hypot(dx, dy), which is never negative.",
-    )
+    return symptom.cause(f", farther than at the start ({metres(began_m)})", remedy("drives_away"))
 
 
 @explanation(GoalMissed, general=True)
 def too_slow(symptom: GoalMissed) -> Finding:
     """It is on its way, but too slow, or it weaves from side to side."""
-    return symptom.cause(
-        f", after {format_duration(symptom.watched_s)}",
-        "If it drives to the goal, it is too slow: make the gain larger, within the robot's "
-        "limits. If it weaves from side to side, make the angular gain smaller.",
-    )
+    return symptom.cause(f", after {format_duration(symptom.watched_s)}", remedy("too_slow"))

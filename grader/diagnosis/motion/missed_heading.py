@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.mistake import remedy
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.findings.finding import Evidence, Finding
@@ -57,7 +58,7 @@ def off_course(symptom: HeadingMissed) -> Finding | None:
 def heading_misread(symptom: HeadingMissed) -> Finding | None:
     """The yaw is computed wrongly from the quaternion."""
     misread = misread_yaw(symptom.run, symptom.position_m)
-    return symptom.cause(f": {misread}", str(misread.hint)) if misread else None
+    return symptom.cause(f": {misread}", remedy(misread.mistake)) if misread else None
 
 
 @explanation(HeadingMissed, general=True)
@@ -68,10 +69,4 @@ def stopped_turning(symptom: HeadingMissed) -> Finding:
         words = f" and still turns at {turn(symptom.last.angular_rad_s)} when the observation ends"
     elif driven is not None and abs(turned_rad(symptom.run.truth[driven:])) < symptom.heading_rad:
         words = ": it has not turned since it arrived"
-    return symptom.cause(
-        words,
-        "At the goal's position, angular.z = gain * (goal's heading - yaw), normalised to "
-        "[-pi, pi], and 0.0 when this error is below the tolerance. Both are in radians already, "
-        "and counter-clockwise is positive (REP-103). Print yaw, the goal's heading and "
-        "angular.z: if the robot turns past the heading, make the gain smaller.",
-    )
+    return symptom.cause(words, remedy("stopped_turning"))

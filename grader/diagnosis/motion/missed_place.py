@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from grader.diagnosis.explanation import Symptom, explanation
+from grader.diagnosis.mistake import remedy
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.measure.motion.quantities import degrees, metres
@@ -18,8 +19,6 @@ from sim.motion import wrap_angle
 # A shorter way has no direction.
 _WAY_M = 0.1
 _TURN_RAD = math.radians(15.0)
-_SIDE_HINT = "A positive angular.z turns to the left (REP-103). Look at the sign of the turn."
-_END_HINT = "End the turn by the yaw of odometry, not by the time, and stop before you drive on."
 
 
 @dataclass(frozen=True)
@@ -84,8 +83,7 @@ def skipped(symptom: PlaceMissed) -> Finding | None:
         return None
     return symptom.cause(
         f"it went to {symptom.skipped_to} without {symptom.name} before",
-        "Take the places one after another: choose the next one only when the robot is at this "
-        "one.",
+        remedy("skipped"),
         f"nearest to {symptom.name}",
         min(symptom.way, key=symptom.distance_m),
     )
@@ -102,13 +100,13 @@ def turned_wrongly(symptom: PlaceMissed) -> Finding | None:
     room_rad = max(_TURN_RAD, math.atan2(symptom.reach_m, distance_m))
     if far_m < _WAY_M or abs(wrap_angle(turned - needed)) <= room_rad:
         return None
-    how, hint = "too far" if abs(turned) > abs(needed) else "too little", _END_HINT
+    how, mistake = "too far" if abs(turned) > abs(needed) else "too little", "other_turn"
     if min(abs(turned), abs(needed)) > _TURN_RAD and turned * needed < 0.0:
-        how, hint = "to the wrong side", _SIDE_HINT
+        how, mistake = "to the wrong side", "other_side"
     instead = _to(needed) if abs(needed) > _TURN_RAD else "straight ahead"
     return symptom.cause(
         f"on its way to {symptom.name} it turned {how}: {_to(turned)} instead of {instead}",
-        hint,
+        remedy(mistake),
         "drives off in another direction",
         next(step for step, one in zip(symptom.way, symptom.gone_m, strict=True) if one >= _WAY_M),
     )
@@ -123,8 +121,7 @@ def stopped_short(symptom: PlaceMissed) -> Finding | None:
         return None
     return symptom.cause(
         f"it stopped {metres(left_m)} from {symptom.name}",
-        "Drive until the distance to the place is below your tolerance. Measure it by odometry, "
-        "not by the time.",
+        remedy("stopped_short"),
         f"stopped before {symptom.name}",
         symptom.way[rest],
     )
@@ -136,7 +133,7 @@ def not_near(symptom: PlaceMissed) -> Finding:
     step = min(symptom.way, key=symptom.distance_m)
     return symptom.cause(
         f"it came within {metres(symptom.distance_m(step))} of {symptom.name}",
-        "Go on to the next place once the distance to this one is below your tolerance.",
+        remedy("not_near"),
         f"nearest to {symptom.name}",
         step,
     )

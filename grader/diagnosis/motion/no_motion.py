@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.mistake import remedy
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.no_messages import NoMessages, why_refused, why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
@@ -110,11 +110,10 @@ def why_rejected(recording: Recording) -> Finding | None:
         return None
     first = refused[0]
     were = "was" if len(refused) == 1 else "were"
-    return Finding(
+    return mistaken(
+        "not_finite",
         f"{counted(len(refused), 'command')} on {code(command_topic(recording))} {were} not finite "
         f"(first: {first.text}); the robot stops instead",
-        "A command must be finite: look for a division by zero, for a range of inf (nothing is "
-        "there), and for sqrt or acos of a number out of range.",
         evidence_at(recording, "command rejected", first.time_ns),
     )
 
@@ -166,12 +165,7 @@ def only_zeros(symptom: NotMoved) -> Finding | None:
         seen += f", but {codes(others)} {'is' if len(others) == 1 else 'are'} not"
     elif misread is not None:
         return Finding(f"{seen}; {misread.words}", str(misread.hint), symptom.evidence)
-    return Finding(
-        seen,
-        "Which branch of the callback publishes? Log what it compares. The speed ahead is "
-        "linear.x, the turn is angular.z.",
-        symptom.evidence,
-    )
+    return mistaken("only_zeros", seen, symptom.evidence)
 
 
 @explanation(NotMoved)
@@ -181,9 +175,7 @@ def integer_in_command(symptom: NotMoved) -> Finding | None:
     for field, number in (("linear.x", twist.linear_m_s), ("angular.z", twist.angular_rad_s)):
         if was_integer(number):
             return Finding(
-                f"{_STILL}: {misread_words(code(field))}",
-                remedy("float_field"),
-                symptom.evidence,
+                f"{_STILL}: {misread_words(code(field))}", remedy("float_field"), symptom.evidence
             )
     return None
 
@@ -197,9 +189,9 @@ def moves_too_late(symptom: NotMoved) -> Finding:
     lost_s = stolen_s(recording, begin_ns, recording.truth[-1].time_ns)
     if left_s < _SHORT_S <= left_s + lost_s:
         return Finding.held_up(f"{_STILL} until the end", lost_s)
-    return Finding(
+    return mistaken(
+        "moves_too_late",
         f"{_STILL}: the first command to move, {speed(first.twist.linear_m_s)} ahead, came "
         f"{format_duration(max(left_s, 0.0))} before the end",
-        "A speed below 1 mm/s, or a command that lasts only a moment, does not move the robot.",
         symptom.evidence,
     )

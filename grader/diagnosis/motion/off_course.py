@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from grader.diagnosis.mistake import mistaken
 from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short
 from grader.findings.finding import Finding
 from grader.findings.first_seen import evidence_at
-from grader.findings.words import SLEEP
 from grader.measure.motion.command import commands, is_zero
 from grader.measure.motion.track import speed_plot
 from grader.recording.model import NS, Recording
@@ -42,10 +42,9 @@ def why_unsteered(recording: Recording) -> Finding | None:
         return None
     when_s = recording.since_launch_s(begin_ns)
     until = " until the observation ended" if next_ns == end_ns else ""
-    return Finding(
+    return mistaken(
+        "unsteered",
         f"no command came for {format_duration(long_s)}{until}, from {when_s:.2f} s after launch "
         "on, and the robot kept moving by its last command",
-        f"Publish a command for each message of odometry. Look for {SLEEP} or a loop in a "
-        "callback, which delay the next one, and for a condition before publish().",
         evidence_at(recording, "no command from here on", begin_ns, speed_plot(recording)),
     )

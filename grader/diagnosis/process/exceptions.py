@@ -10,8 +10,9 @@ from string import Template
 from pydantic import Field
 
 from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
+from grader.diagnosis.mistake import remedy
 from grader.diagnosis.process.failure import Failure, Frame
-from grader.diagnosis.process.raised import READ_MESSAGE, student_place
+from grader.diagnosis.process.raised import student_place
 from grader.findings.wording import code, listing
 from grader.findings.words import Words
 from grader.recording.model import Recording
@@ -86,11 +87,6 @@ CPP_ROWS = [
     row.model_copy(update={"only": CPP})
     for row in read_source(Path(__file__).with_name("exceptions_cpp.yaml")).read(Table).exceptions
 ]
-_GDB = (
-    "Find the line with a debugger: `ros2 run --prefix 'gdb -ex run --args' PACKAGE EXECUTABLE`, "
-    "then `bt` for the functions that were being called. It names lines only if the program is "
-    "built with -g."
-)
 
 
 def import_of(name: str) -> str | None:
@@ -130,7 +126,7 @@ def no_such_field(symptom: Raised) -> str | None:
     # If it does have the field, this is another class of the same name.
     if found is None or not named or code(found[2]) in named:
         return None
-    return f"{code(found[1])} has the fields {listing(named[:_MOST_FIELDS])}."
+    return remedy("no_such_field", type=code(found[1]), fields=listing(named[:_MOST_FIELDS]))
 
 
 @explanation(Raised, only=PYTHON)
@@ -145,16 +141,20 @@ def own_module(symptom: Raised) -> str | None:
     if place is not None:
         package = place.rpartition("/")[0].replace("/", ".")
         written = code(f"from {package} import {name}")
-        return (
-            f"{code(f'{name}.py')} lies in your package: write {written} or "
-            f"{code(f'from {package}.{name} import ...')}."
+        return remedy(
+            "own_module",
+            file=code(f"{name}.py"),
+            written=written,
+            other=code(f"from {package}.{name} import ..."),
         )
     file, owner = _own_file(submission, f"{name}.py")
     if owner is None:
         return None
-    return (
-        f"The build did not install {code(file)}. Move it into the folder {code(owner.name)}, "
-        f"beside `__init__.py`, and write {code(f'from {owner.name} import {name}')}."
+    return remedy(
+        "module_not_installed",
+        file=code(file),
+        package=code(owner.name),
+        line=code(f"from {owner.name} import {name}"),
     )
 
 
@@ -168,11 +168,10 @@ def file_not_installed(symptom: Raised) -> str | None:
         return None
     path = file.removeprefix(owner.file(""))
     share = f"share/{owner.name}/{path.rpartition('/')[0]}".rstrip("/")
-    return (
-        "Programs run in another folder, and on other machines than yours. Install the file, "
-        f"{code(f'({share!r}, [{path!r}])')} in data_files of setup.py, and open "
-        f"{code(f'os.path.join(get_package_share_directory({owner.name!r}), {path!r})')} "
-        "(of ament_index_python.packages)."
+    return remedy(
+        "file_not_installed",
+        entry=code(f"({share!r}, [{path!r}])"),
+        path=code(f"os.path.join(get_package_share_directory({owner.name!r}), {path!r})"),
     )
 
 
@@ -195,9 +194,9 @@ for _row in (*CPP_ROWS, *TABLE.exceptions):
 def any_exception(symptom: Raised) -> str | None:
     """Any other exception: the line that raised it is named."""
     if student_place(symptom.failure, symptom.recording.submission):
-        return "Correct the line that is named here."
+        return remedy("named_line")
     if symptom.failure.compiled:
-        return _GDB
+        return remedy("debugger")
     if not symptom.failure.frames:
         return None
-    return str(READ_MESSAGE)
+    return remedy("read_message")

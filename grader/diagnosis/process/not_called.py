@@ -11,7 +11,7 @@ from grader.diagnosis.process.standing import Stand, slow_callback, unkept_futur
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.first_seen import until_the_end
 from grader.findings.wording import codes
-from grader.findings.words import SPIN, SPIN_NODE
+from grader.findings.words import SPIN
 from grader.measure import declarations
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Call, Process, Recording
@@ -113,14 +113,13 @@ def never_spun(symptom: NotCalled) -> Finding | None:
         return Finding(
             f"{symptom.seen}: an executor spins, but {codes(nodes)} was not added to it, so none "
             "of its callbacks runs",
-            "Add the node to the executor that spins, executor.add_node(node), or call "
-            f"{SPIN_NODE}.",
+            remedy("in_no_executor"),
             Evidence(moments=(until_the_end(recording, "no executor had the node"),)),
             concept="executors",
         )
     cause = Finding(
         f"{symptom.seen}: {SPIN} was never called, so no callback runs",
-        f"Call {SPIN_NODE} in main(). Nothing before it may wait or loop for ever.",
+        remedy("never_spun"),
         Evidence(moments=(until_the_end(recording, f"{SPIN} was still not called"),)),
         concept="executors",
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.mistake import mistaken, remedy
 from grader.diagnosis.process.exceptions import Raised
 from grader.diagnosis.process.failure import Failure
 from grader.diagnosis.process.missing_library import lacking_here
@@ -21,7 +22,7 @@ from grader.diagnosis.process.raised import (
 )
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.wording import code
-from grader.findings.words import INIT, SPIN, SPIN_NODE, Words, worded
+from grader.findings.words import SPIN, Words
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.recording.submission import PYTHON, SourceError
@@ -195,17 +196,8 @@ def main_returned(symptom: ProcessExit) -> Finding | None:
         how = " before a node was created"
     elif declarations.never_spun(recording, name):
         how = f" without {SPIN}"
-    return Finding(
-        f"{symptom.seen} with exit code 0: main() returned{how}",
-        f"main() must call {INIT} and create the node. {SPIN_NODE} keeps a node alive until "
-        "Ctrl-C. Look for what ends it: "
-        + worded(
-            python="spin_once() handles one round only; a daemon thread ends with main(); "
-            "rclpy.shutdown(), sys.exit() and os._exit() end everything.",
-            cpp="spin_some() handles what is there and returns; a detached thread ends with "
-            "main(); rclcpp::shutdown() and exit() end everything.",
-        ),
-        symptom.evidence,
+    return mistaken(
+        "main_returned", f"{symptom.seen} with exit code 0: main() returned{how}", symptom.evidence
     )
 
 
@@ -226,15 +218,12 @@ def launch_file_not_installed(symptom: ProcessExit) -> Finding | None:
     if found is None or symptom.failure is not None:
         return None
     name, package = found["file"], found["package"]
-    return Finding(
+    return mistaken(
+        "launch_file_not_installed",
         f"{symptom.seen}: the package {code(package)} installed no {code(name)}",
-        f"Name the launch file {code(name)}, and install it: "
-        + worded(
-            python=f"('share/{package}/launch', glob('launch/*')) in data_files of setup.py, or ",
-            cpp="",
-        )
-        + "install(DIRECTORY launch DESTINATION share/${PROJECT_NAME}) in CMakeLists.txt.",
         symptom.evidence,
+        name=code(name),
+        package=package,
     )
 
 
@@ -249,15 +238,10 @@ def parameter_file_unreadable(symptom: ProcessExit) -> Finding | None:
     own = [PurePosixPath(path) for path in symptom.recording.submission.files]
     alike = [path for path in own if path.parts[-2:] == parts[-2:]]
     file = str(alike[0]) if alike else parts[-1]
-    hint = "Correct the file at this line, or above it."
-    if "ros__parameters" in found["why"]:
-        hint = (
-            "Write `ros__parameters:`, with two underscores, below the node's name, and indent the "
-            "parameters below it."
-        )
-    return Finding(
+    is_key = "ros__parameters" in found["why"]
+    return mistaken(
+        "no_ros_parameters" if is_key else "broken_parameters",
         f"{symptom.seen}: ROS cannot read the parameter file {code(file)}: {found['why']}",
-        hint,
         replace(symptom.evidence, places=(SourceError(file, line, found["why"]),)),
     )
 
@@ -268,10 +252,7 @@ def ended_by_signal(symptom: ProcessExit) -> Finding | None:
     if symptom.failure is not None:
         return None
     killed, evidence = symptom.killed, symptom.evidence
-    hint = TABLE.hints.get(
-        killed.name if killed else "",
-        "Run it by hand with `ros2 run` and look at its last lines of output.",
-    )
+    hint = TABLE.hints.get(killed.name if killed else "", remedy("ended_by_signal"))
     return Finding(
         f"{symptom.seen} with {exit_words(symptom.process.exit_code)}", str(hint), evidence
     )
@@ -292,10 +273,10 @@ def service_without_response(symptom: ProcessExit) -> Finding | None:
         if one.process == name and one.data.get("serves") in services
     ]
     place = defined_at(calls[-1], str(failure), recording.submission) if calls else None
-    return Finding(
+    return mistaken(
+        "service_without_response",
         f"{symptom.seen} with {failure}: a service's callback did not return a response"
         f"{in_brackets(place)}",
-        "End the service's callback with `return response`: return the object that it was given.",
         replace(symptom.evidence, places=(place,) if place else ()),
     )
 
@@ -321,11 +302,12 @@ def hides_what_node_has(symptom: ProcessExit) -> Finding | None:
     name, place = next((pair for pair in places if _OF_NODE.fullmatch(pair[0])), ("", None))
     if place is None:
         return None
-    return Finding(
+    return mistaken(
+        "hides_what_node_has",
         f"{symptom.seen} with {failure}: your class replaces {code(name)} of Node"
         f"{in_brackets(place)}",
-        f"Node needs its own {code(name)}. Choose another name for yours.",
         replace(symptom.evidence, places=(place,)),
+        name=code(name),
     )
 
 
@@ -340,7 +322,7 @@ def machine_lacks_it(symptom: ProcessExit) -> Finding | None:
     return Finding.ours(
         f"{symptom.seen}: it uses {code(name)}{in_brackets(symptom.place)}: ROS 2 Jazzy has "
         "it, but it is not installed on the machine that grades",
-        f"You lose no points for it. Tell your instructor that it needs {needs}.",
+        remedy("machine_lacks_it", needs=needs),
     )
 
 

@@ -10,15 +10,10 @@ from itertools import takewhile
 from grader.diagnosis.process.crash import parse_crashes
 from grader.diagnosis.process.failure import Failure, Frame
 from grader.findings.wording import code
-from grader.findings.words import Words
 from grader.measure import declarations
 from grader.recording.model import Recording
 from grader.recording.submission import SourceError, SubmissionRecord
 
-READ_MESSAGE = Words(
-    python="Read the traceback from its last line upwards.",
-    cpp="Read the message of the exception: what() prints it.",
-)
 _HEADER = "Traceback (most recent call last):"
 _LINKS = (
     "During handling of the above exception, another exception occurred:",

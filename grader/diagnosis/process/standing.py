@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from grader.diagnosis.mistake import remedy
 from grader.diagnosis.process.raised import interrupted_call, submission_path
 from grader.findings.wording import code
-from grader.findings.words import INPUT, SPIN, SPIN_NODE, Words
+from grader.findings.words import SPIN
 from grader.measure.declarations import never_spun
 from grader.measure.standing import Standing, at_the_end, longest_callback
 from grader.recording.model import NS, Recording
@@ -15,55 +16,16 @@ from grader.recording.submission import SourceError
 from grader.spec.unit import format_duration
 
 _LONGEST_TEXT = 80
-ASK_AND_RETURN = Words(
-    python="Instead of call() or spin_until_future_complete() use call_async() or "
-    "send_goal_async(), return, and go on in the callback of future.add_done_callback().",
-    cpp="Instead of future.get() or spin_until_future_complete() give async_send_request() or "
-    "async_send_goal() a callback, return, and go on in that.",
-)
-# What a line waits for -> why that does not end in a callback, and what to do instead.
-_WAITS = (
-    (
-        r"\brate\w*\.sleep\(",
-        "A rate waits for a timer that the same executor must call, so it waits for ever.",
-        "Remove it: what calls the callback already sets the rhythm.",
-    ),
-    (
-        r"\.call\(",
-        "It waits for an answer that the executor can take in only when this callback has "
-        "returned.",
-        ASK_AND_RETURN,
-    ),
-    (
-        r"\bspin|future|\.done\(|\.result\(",
-        "Do not spin or wait for a future in a callback: what it waits for can come only when the "
-        "callback has returned. Return, and go on in the callback",
-        Words(
-            python="of future.add_done_callback().",
-            cpp="that async_send_request() or async_send_goal() is given.",
-        ),
-    ),
-    (
-        r"lock|acquire\(",
-        "Something holds this lock already, perhaps the same callback, and never releases it.",
-        "A callback that holds a lock must not call a method that takes it again.",
-    ),
-)
+# What a line waits for -> the mistake of waiting for it in a callback.
+_WAITS = {
+    r"\brate\w*\.sleep\(": "waits_for_a_rate",
+    r"\.call\(": "waits_for_an_answer",
+    r"\bspin|future|\.done\(|\.result\(": "waits_for_a_future",
+    r"lock|acquire\(": "waits_for_a_lock",
+}
 # What g++ says of a future that is not kept.
 _UNKEPT = re.compile(
     r"^(?P<file>[^\s:]+):(?P<line>\d{1,7}):.*ignoring return.*\basync\(", re.MULTILINE
-)
-_LOOP = (
-    "While a callback loops, it gets no new message. Write `if` in place of the loop, and return: "
-    "the callback is called again, and sees what is new then."
-)
-_SLEEP = (
-    "While a callback sleeps or works, the node calls nothing else. Do one short step and return: "
-    "the callback is called again."
-)
-_KEEP = (
-    "Keep the future in a member, `future_ = std::async(std::launch::async, ...)`: then the "
-    "callback returns at once."
 )
 
 
@@ -139,7 +101,9 @@ def unkept_future(recording: Recording) -> Stand | None:
         return None
     words = "the future that `std::async` returns waits in its destructor until the work is done"
     place = SourceError(found["file"], int(found["line"]), "this future is not kept")
-    return Stand(place, f"{words}: {_at(int(found['line']), '')}", _KEEP, in_callback=True)
+    return Stand(
+        place, f"{words}: {_at(int(found['line']), '')}", remedy("unkept_future"), in_callback=True
+    )
 
 
 def _stand(found: Standing, place: SourceError, words: str) -> Stand:
@@ -148,7 +112,7 @@ def _stand(found: Standing, place: SourceError, words: str) -> Stand:
 
 
 def _waits(text: str) -> bool:
-    return any(re.search(pattern, text) for pattern, *_ in _WAITS)
+    return any(re.search(pattern, text) for pattern in _WAITS)
 
 
 def _text(found: Standing) -> str:
@@ -177,17 +141,11 @@ def _words(function: str, line: int, text: str, when: str, in_callback: bool) ->
 
 def _hint(text: str, loop: str, in_callback: bool) -> str:
     if "input(" in text:
-        return (
-            "A launched node has no keyboard: take the value from a ROS parameter, not from "
-            f"{INPUT}."
-        )
+        return remedy("no_keyboard")
     if not in_callback:
-        return (
-            "Put one step of it into a callback, which is called again and again, and let main() "
-            f"go on to {SPIN_NODE}."
-        )
-    for pattern, why, instead in _WAITS:
+        return remedy("not_in_a_callback")
+    for pattern, mistake in _WAITS.items():
         if re.search(pattern, text) or re.search(pattern, loop):
-            return f"{why} {instead}"
+            return remedy(mistake)
     is_loop = loop or text.startswith(("while ", "for "))
-    return _LOOP if is_loop else _SLEEP
+    return remedy("loops" if is_loop else "sleeps")
