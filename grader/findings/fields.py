@@ -33,6 +33,16 @@ FieldTolerance = Annotated[
 ]
 
 
+def each_field(value: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    """What is asked of each field, by its path, such as ``linear.x``."""
+    for key, item in value.items():
+        name = f"{path}.{key}" if path else str(key)
+        if isinstance(item, Mapping) and not is_asked_of_text(item):
+            yield from each_field(item, name)
+        else:
+            yield name, item
+
+
 def unlike(
     value: Mapping[str, Any], wanted: Mapping[str, Any], tolerance: Tolerance
 ) -> tuple[Difference, ...]:
@@ -47,7 +57,9 @@ def unlike(
 
 def words(value: Mapping[str, Any]) -> str:
     """Write fields as ``a = 2, b = 3``; ``nothing`` for none."""
-    return ", ".join(f"{path} {_wanted(item)}" for path, item in _plain(value)) or "nothing"
+    return (
+        ", ".join(f"{path} {wanted_words(item)}" for path, item in each_field(value)) or "nothing"
+    )
 
 
 def within_words(tolerance: Tolerance) -> str:
@@ -63,7 +75,8 @@ def wanted_text(value: Any) -> str:
     return value if isinstance(value, str) and is_comparison(value) else value_text(value)
 
 
-def _wanted(value: Any) -> str:
+def wanted_words(value: Any) -> str:
+    """Write what is asked of a field: ``= 2``, ``> 0``, ``contains 'ready'``."""
     if is_asked_of_text(value):
         return text_words(value)
     text = wanted_text(value)
@@ -89,7 +102,7 @@ def the_goal(goal: Goal) -> str:
 
 def brief(value: Mapping[str, Any]) -> str:
     """Write a whole request or goal; of a long one only the fields that are not zero or empty."""
-    fields = list(_plain(value))
+    fields = list(each_field(value))
     if len(fields) <= _MOST_FIELDS:
         return words(value)
     shown = [f"{path} = {value_text(item)}" for path, item in fields if not _is_default(item)]
@@ -104,7 +117,7 @@ def _is_default(value: Any) -> bool:
 
 def fields_hint(what: str, value: Mapping[str, Any], wrong: Sequence[str]) -> str:
     """What to try where fields are wrong."""
-    if all(_is_default(item) for _, item in _plain(value)):
+    if all(_is_default(item) for _, item in each_field(value)):
         returned = worded(python=", and return it", cpp="")
         return (
             f"Set the fields of the {what} in the callback{returned}. Now every field has the "
@@ -124,12 +137,3 @@ def difference_table(title: str, found: Sequence[Difference]) -> Table:
     """The same as a table."""
     rows = ((item.field, _expected_text(item), value_text(item.observed)) for item in found)
     return Table(title, ("field", "expected", "observed"), tuple(rows)[:50])
-
-
-def _plain(value: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
-    for key, item in value.items():
-        name = f"{path}.{key}" if path else str(key)
-        if isinstance(item, Mapping) and not is_asked_of_text(item):
-            yield from _plain(item, name)
-        else:
-            yield name, item

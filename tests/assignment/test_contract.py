@@ -345,3 +345,28 @@ def test_a_rate_is_judged_and_told_in_the_table(write: Write) -> None:
     assert f"| how often | {often} |" in with_table(MARKER, loaded.assignment.contract)
     (wrong,) = found(write(text.replace("at_least: 9 Hz, at_most: 11 Hz", "at_least: 9 m")))
     assert wrong.startswith("13: contract.packages.bot.executables.drive.publishes./cmd_vel: ")
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ("{data: {contains: ready}}", "data that contains “ready”"),
+        ("{data: '!= 0'}", "data != 0"),
+        ("{data: 2.0}", "data = 2.0"),
+    ],
+)
+def test_what_is_asked_of_a_value_is_told_in_the_title_and_in_the_handout(
+    write: Write, asked: str, words: str
+) -> None:
+    said = f"reliability: reliable\n              value: {asked}"
+    text = GOOD.replace("reliability: reliable", said).replace(
+        "period: 2}", "period: 2, values: 1}"
+    )
+    kind = "String" if "contains" in asked else "Float64"
+    text = text.replace("geometry_msgs/msg/Twist", f"std_msgs/msg/{kind}")
+    place = write(text)
+    (place / "README.md").write_text("<!-- contract -->\n")
+    loaded = load_assignment(place)
+    assert f"Every message has {words}" in [one.title for one in loaded.checks]
+    field, _, rest = words.replace(" that", "").partition(" ")
+    assert f"| message | `{field}` {rest};" in make_handout(loaded).text

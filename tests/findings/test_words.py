@@ -18,7 +18,7 @@ from grader.assignment.load import list_assignments, load_assignment
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import NoParameters, Subject
 from grader.diagnosis.explanation import explanations
-from grader.diagnosis.mistake import TABLE, remedy
+from grader.diagnosis.mistake import mistakes, remedy
 from grader.diagnosis.process import exceptions
 from grader.findings.finding import Finding, Status
 from grader.findings.words import SPIN_NODE, Words, speaking
@@ -130,7 +130,7 @@ def test_mistakes_have_no_word_of_python_for_students_of_cpp() -> None:
     with speaking(CPP):
         left = [
             f"{name}: {found[0]!r}"
-            for about in TABLE.values()
+            for about in mistakes().values()
             for name, one in about.items()
             if one.only != PYTHON and (found := _OF_PYTHON.search(remedy(name)))
         ]

@@ -24,7 +24,9 @@ from grader.assignment.contract.model import (
     Server,
     Subscription,
 )
-from grader.findings.wording import listing, value_text
+from grader.findings.fields import each_field, wanted_words
+from grader.findings.text import is_asked_of_text
+from grader.findings.wording import listing
 from grader.findings.words import Words
 from grader.spec.document import Place
 
@@ -117,7 +119,8 @@ class Spot:
             found["period"] = str(period_of(self.part).get("period"))
             found["rate"] = rate_words(self.part)
             found["value"] = listing(
-                f"{name} = {value_text(value)}" for name, value in leaves(self.part.value)
+                f"{name}{' that' if is_asked_of_text(value) else ''} {wanted_words(value)}"
+                for name, value in each_field(self.part.value)
             )
         if isinstance(self.part, Interface):
             found["interface"], found["file"] = (
@@ -143,15 +146,6 @@ def rate_words(part: Publication) -> str:
     """How often messages come, such as ``at least 9 Hz and at most 11 Hz``."""
     limits = {"at_least": "at least", "at_most": "at most"}
     return listing(f"{text} {part.rate[key]}" for key, text in limits.items() if key in part.rate)
-
-
-def leaves(value: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """The fields of a message with their values, by path: ``linear.x``."""
-    for name, inside in value.items():
-        if isinstance(inside, Mapping):
-            yield from leaves(inside, f"{before}{name}.")
-        else:
-            yield f"{before}{name}", inside
 
 
 def _found(spot: Spot) -> dict[str, Any]:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from grader.assignment.contract.model import Connection, Contract, Declared, Program
-from grader.assignment.contract.standard import ANY, leaves, period_of, rate_words
+from grader.assignment.contract.standard import ANY, period_of, rate_words
+from grader.findings.fields import each_field, wanted_words
 from grader.findings.wording import codes, listing, value_text
 from grader.spec.document import Place
 
@@ -65,7 +66,9 @@ def _program(executable: str, program: Program, place: Place) -> Iterator[Row]:
         here = (*place, "publishes", topic)
         on = f" on `{topic}`" if len(program.publishes) > 1 else ""
         if part.value:
-            fields = listing(f"`{name}` = {_written(value)}" for name, value in leaves(part.value))
+            fields = listing(
+                f"`{name}` {wanted_words(one)}" for name, one in each_field(part.value)
+            )
             rest = "" if "rest" in part.value else "; all other fields keep their default"
             yield Row(f"message{on}", f"{fields}{rest}", here, ("sent", "values"))
         if part.count:

@@ -17,7 +17,6 @@ from typing import Any
 from xml.etree import ElementTree
 
 from grader.assignment.binding import BoundCheck
-from grader.assignment.contract.standard import leaves
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.mutant import (
     LANGUAGES,
@@ -32,6 +31,7 @@ from grader.assignment.mutant import (
 from grader.authoring.mutants import manifest
 from grader.authoring.mutants.manifest import Files, PackageFiles, misspelt
 from grader.errors import AssignmentError, Problem, UsageError
+from grader.findings.fields import each_field
 from grader.run.imposing.mistake import Mistake
 from grader.spec.nearest_name import nearest_or_all
 
@@ -419,7 +419,9 @@ def _count(run: _Run) -> Iterator[_Wrong]:
 
 def _equal(run: _Run) -> Iterator[_Wrong]:
     topic = run.given.topic
-    fields = [one for one in leaves(run.given.value) if isinstance(one[1], (bool, int, float, str))]
+    fields = [
+        one for one in each_field(run.given.value) if isinstance(one[1], (bool, int, float, str))
+    ]
     for path, _ in [one for one in fields if one[1] != ""][:1]:
         wrong = (("field", topic, path),)
         yield _Wrong("wrong_value", f"{path} has another value", topic, wrong)
