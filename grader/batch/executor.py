@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from grader.batch.worker import Given, Order, Parcel, grade_into, grade_remotely, unpack
 from grader.errors import GraderFault, RosgradeError, UsageError
 from grader.grading.grading import Grading
+from grader.grading.spine import HandedIn
 
 _CONNECT_S = 15
 _ANSWER_S = _CONNECT_S + 5.0
@@ -53,7 +54,7 @@ class LocalExecutor:
 
     def submit(self, key: str, path: Path, folder: Path, given: Given) -> Future[None]:
         """See :class:`BatchExecutor`."""
-        return self._pool.submit(grade_into, self._grading, key, path, folder, given)
+        return self._pool.submit(grade_into, self._grading, HandedIn(path, folder, key, given))
 
     def close(self) -> None:
         """See :class:`BatchExecutor`."""

@@ -15,9 +15,8 @@ from pathlib import Path
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.errors import GraderFault, SubmissionError
 from grader.grading.files import write_graded
-from grader.grading.graded import RECORDINGS_FOLDER
 from grader.grading.grading import Grading
-from grader.grading.spine import HandedIn, grade, run_and_judge
+from grader.grading.spine import HandedIn, grade
 from grader.machine import ros
 from grader.machine.resources import cache_folder
 from grader.machine.scratch import Scratch
@@ -44,11 +43,10 @@ Given = Mapping[str, str]
 """What the roster says for variables of the assignment, by their names."""
 
 
-def grade_into(grading: Grading, key: str, path: Path, folder: Path, given: Given) -> None:
+def grade_into(grading: Grading, handed_in: HandedIn) -> None:
     """Grade a submission and write report, result and recordings."""
     clock = Clock()
-    graded = grade(HandedIn(path, folder, key, given), grading)
-    write_graded(graded, folder, clock)
+    write_graded(grade(handed_in, grading), handed_in.folder, clock)
 
 
 def pack(path: Path, name: str = ".") -> bytes:
@@ -112,15 +110,10 @@ def grade_remotely(order: Order, parcel: Parcel) -> bytes:
     with Scratch("worker") as temporary:
         folder = temporary / "out"
         folder.mkdir()
-        if parcel.refused is not None:
-            clock = Clock()
-            prepared = parcel.refused.named(parcel.key)
-            graded = run_and_judge(prepared, grading, folder / RECORDINGS_FOLDER)
-            write_graded(graded, folder, clock)
-        else:
+        if parcel.refused is None:
             unpack(parcel.content, temporary / "in")
-            path = temporary / "in" / parcel.name
-            grade_into(grading, parcel.key, path, folder, parcel.given)
+        path = temporary / "in" / parcel.name
+        grade_into(grading, HandedIn(path, folder, parcel.key, parcel.given, parcel.refused))
         return pack(folder)
 
 

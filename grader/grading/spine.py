@@ -28,12 +28,14 @@ class HandedIn:
         folder: Of its report, with its recordings and its source.
         name: How the report calls it; by default as it is called itself.
         given: What the roster says for variables of the assignment, by their names.
+        refused: Why it is not read here, where that is known already.
     """
 
     path: Path
     folder: Path
     name: str | None = None
     given: Mapping[str, str] = field(default_factory=dict)
+    refused: Prepared | None = None
 
 
 def grade(handed_in: HandedIn, grading: Grading) -> Graded:
@@ -45,7 +47,8 @@ def grade(handed_in: HandedIn, grading: Grading) -> Graded:
 def take_in(handed_in: HandedIn, grading: Grading) -> Prepared:
     """Read a submission and build it."""
     given = tuple(sorted({**grading.loaded.given, **handed_in.given}.items()))
-    prepared = prepare(handed_in.path, grading.preparation(given, handed_in.folder / SOURCE_FOLDER))
+    how = grading.preparation(given, handed_in.folder / SOURCE_FOLDER)
+    prepared = handed_in.refused or prepare(handed_in.path, how)
     record = replace(prepared.record, id=handed_in.name or prepared.record.id, given=given)
     return replace(prepared, record=record)
 

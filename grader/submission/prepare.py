@@ -55,10 +55,6 @@ class Prepared:
     install: Path | None
     underlays: tuple[Path, ...] = ()
 
-    def named(self, name: str) -> Prepared:
-        """The same under another name."""
-        return replace(self, record=replace(self.record, id=name))
-
 
 @dataclass(frozen=True)
 class Preparation:

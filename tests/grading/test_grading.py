@@ -464,6 +464,19 @@ def test_a_limit_of_the_build_is_the_author_s(lesson: LoadedAssignment, tmp_path
     assert own.room.memory_bytes == 2**30
 
 
+def test_of_a_refused_submission_is_kept_what_the_roster_says_of_it(
+    lesson: LoadedAssignment, tmp_path: Path
+) -> None:
+    refused = dataclasses.replace(SUBMISSION, build=None, problem="an archive of 2 GiB")
+    grading = Grading(lesson, ScriptedRunner(), tmp_path / "cache")
+    parcel = HandedIn(
+        tmp_path / "a.zip", tmp_path / "out", "ana", {"n": "7"}, Prepared(refused, None)
+    )
+    record = spine.grade(parcel, grading).prepared.record
+    assert (record.id, record.given) == ("ana", (("n", "7"),))
+    assert record.problem == "an archive of 2 GiB"
+
+
 def test_a_regrade_says_who_gains_what_and_why(
     grade: Grade, lesson: LoadedAssignment, tmp_path: Path
 ) -> None:
