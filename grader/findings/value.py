@@ -196,7 +196,10 @@ def _other_kind(item: Any, value: Any) -> str:
 
 
 def unreachable(expected: Any, sample: Any, tolerance: float) -> str:
-    """Why a field can never have an expected value, to follow its name; nothing if it can."""
+    """Why a field can never have an expected value, such as ``is true or false, but ...``.
+
+    An empty text if it can.
+    """
     if _is_asked(expected, sample) or is_asked_of_text(expected):
         return ""
     if isinstance(expected, str) and isinstance(sample, str) and looks_like_a_condition(expected):

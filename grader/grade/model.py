@@ -112,10 +112,11 @@ class Grade:
 
     @property
     def names(self) -> dict[str, Names]:
-        """Wrong names to put right, by the scenario that needs it.
+        """Names to remap in the next run of each scenario.
 
-        A name that is wrong in one scenario is wrong wherever one of its programs is launched. What
-        lies in the namespace of a node follows it; what is wrong even then is put right by itself.
+        A name that is wrong in one scenario is remapped wherever one of its programs is launched.
+        A topic that is wrong only because the name or the namespace of its node is, is left out: it
+        follows its node.
         """
         programs = {
             scenario.id: {(launch.package, launch.program) for launch in scenario.launch}

@@ -53,9 +53,10 @@ class Unnamed:
 
 
 def _with_stand_ins(loaded: LoadedAssignment, submission: SubmissionRecord) -> SubmissionRecord:
-    """The submission with packages of wrong names in the places of those that are asked for.
+    """The submission, with the names of its packages that are misspelt.
 
-    Such a package has a name like the right one, or one of its executables.
+    If `bot_publisher` is asked for and there is only `bot_pubisher`, that one is judged, and the
+    wrong name costs one check. It is like the right one, or the package has one of the executables.
     """
     asked = {package.name: package for package in loaded.assignment.packages}
     lacking = {
@@ -93,8 +94,9 @@ def with_chosen_names(
     submission: SubmissionRecord,
     recordings: Mapping[str, Recording] = {},
 ) -> tuple[LoadedAssignment, SubmissionRecord, Unnamed | None]:
-    """The assignment with the names of a submission in it, and the submission with wrong ones told.
+    """Fill the student's own names in, and note in the submission which names are wrong.
 
+    An assignment may ask for ``group{n}_bot``, and this submission has ``group7_bot``.
     What is found only in runs is the author's example until recordings show exactly one such name.
     So is an executable of what was not built: that is told first.
 

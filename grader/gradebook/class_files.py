@@ -1,4 +1,4 @@
-"""The files about a whole class: the gradebook, the overview, and every report rendered again."""
+"""The files about a whole class: the gradebook and the overview."""
 
 from __future__ import annotations
 

@@ -22,7 +22,6 @@ class Graded:
     Attributes:
         recordings: By scenario id, as the others.
         runs: How often each scenario was run; runs that only put names right do not count.
-        faults: Why there is no recording of a scenario.
         references: Runs of the reference, to be drawn beside these.
         repeats: Why runs were repeated, one text for each.
     """

@@ -34,7 +34,7 @@ class Round:
     """Runs that were made together, and what judging says after them.
 
     Attributes:
-        runs: None in the round before the first, when only what was built is known.
+        runs: Empty in the first round, which judges only what was built.
         scenarios: With the names that are known by now; none where nothing can be run.
         names: By scenario id, wrong names that a run has to put right.
         undecided: By scenario id, why it could not be judged.
@@ -91,7 +91,7 @@ def _last_runs(rounds: Sequence[Round]) -> dict[str, Run]:
 
 
 def _names(scenario: Scenario, rounds: Sequence[Round]) -> Names:
-    """All wrong names that were ever known of a scenario: a run that puts them right shows none."""
+    """All wrong names of a scenario, of any round: a run that puts one right no longer shows it."""
     found = NO_NAMES
     for one in rounds:
         found = found | one.names.get(scenario.id, NO_NAMES)

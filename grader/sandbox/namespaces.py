@@ -104,7 +104,7 @@ class Rights:
     packets: PacketMonitor | None
 
 
-def enter(folder: Path, sentence: Callable[[], int | None]) -> Rights:
+def enter(folder: Path, signal_to_send: Callable[[], int | None]) -> Rights:
     """Go on as the first process of new namespaces; the caller becomes the one that waits.
 
     Returns only in the new process. It dies with the one that waits, and everything in its
@@ -112,8 +112,8 @@ def enter(folder: Path, sentence: Callable[[], int | None]) -> Rights:
 
     Args:
         folder: The cell's own; its parent holds those of all cells.
-        sentence: Called now and then by the one that waits: None to let the new process go on,
-            or the signal that it shall seem to have been ended by.
+        signal_to_send: Called now and then by the one that waits: None to let the new process go
+            on, or the signal that it shall seem to have been ended by.
     """
     uid, gid = os.getuid(), os.getgid()
     _call(
@@ -130,7 +130,7 @@ def enter(folder: Path, sentence: Callable[[], int | None]) -> Rights:
     Path("/proc/self/gid_map").write_text(f"{gid} {gid} 1")
     child = os.fork()
     if child:
-        _wait_for(child, sentence)
+        _wait_for(child, signal_to_send)
     _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     _mount_own(folder)
     _bring_up_loopback()
@@ -142,18 +142,18 @@ def enter(folder: Path, sentence: Callable[[], int | None]) -> Rights:
     return Rights(mounter, packets)
 
 
-def _wait_for(child: int, sentence: Callable[[], int | None]) -> None:
+def _wait_for(child: int, signal_to_send: Callable[[], int | None]) -> None:
     os.closerange(0, 256)
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGCHLD,))
     ended, status = os.waitpid(child, os.WNOHANG)
     while not ended:
         signal.sigtimedwait((signal.SIGCHLD,), _LOOK_S)
-        sentenced = sentence()
-        if sentenced is not None:
+        number = signal_to_send()
+        if number is not None:
             # To the first process of a namespace every other signal means nothing.
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
-            os.kill(os.getpid(), sentenced)
+            os.kill(os.getpid(), number)
         ended, status = os.waitpid(child, os.WNOHANG)
     if os.WIFSIGNALED(status):
         os.kill(os.getpid(), os.WTERMSIG(status))

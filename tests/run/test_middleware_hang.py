@@ -42,11 +42,11 @@ def cell(tmp_path: Path) -> Cell:
 def test_a_middleware_that_works_without_end_is_noticed(cell: Cell) -> None:
     monitor = HangMonitor(cell.folder)
     cell.is_seen(switches=50, received_s=3.0)
-    assert monitor.sentence() is None
+    assert monitor.signal_to_send() is None
     cell.is_seen(switches=50, received_s=7.0)
-    assert monitor.sentence() is None
+    assert monitor.signal_to_send() is None
     cell.is_seen(switches=50, received_s=8.5)
-    assert monitor.sentence() is ENDED_BY
+    assert monitor.signal_to_send() is ENDED_BY
 
 
 @pytest.mark.parametrize(("state", "more_switches"), [("S", 1), ("R", 0)])
@@ -57,12 +57,12 @@ def test_a_cell_that_goes_on_or_waits_for_a_cpu_does_not_hang(
     for look in range(20):
         switches = 50 + look * more_switches
         cell.is_seen(state=state, switches=switches, received_s=4.0 * look)
-        assert monitor.sentence() is None
+        assert monitor.signal_to_send() is None
 
 
 def test_a_cell_that_has_ended_does_not_hang(cell: Cell) -> None:
     monitor = HangMonitor(cell.folder / "ended")
-    assert monitor.sentence() is monitor.sentence() is None
+    assert monitor.signal_to_send() is monitor.signal_to_send() is None
 
 
 def order(scenario: Scenario) -> CellOrder:

@@ -40,8 +40,6 @@ from grader.spec.names import Thing
 from grader.spec.quantity import Duration, Frequency, Ratio
 from grader.spec.unit import format_duration
 
-# How soon a server must say whether it accepts a goal: its callback only decides.
-
 
 class ActionExists(Offered):
     """Parameters of action.exists."""

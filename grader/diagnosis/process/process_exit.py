@@ -31,12 +31,12 @@ from grader.spec.source import Model, read_source
 _LOG_LINES = 15
 # What a failure ends a compiled program by.
 _CRASHES = ("SIGSEGV", "SIGABRT", "SIGFPE", "SIGILL", "SIGBUS")
-# As `ros2 launch` says it.
 # What rcl says of a file that it is given by --params-file.
 _PARAMETER_FILE = re.compile(
     r"Couldn't parse params file: '--params-file (?P<file>[^']+)'\. Error: "
     r"(?P<why>.+?)(?: at line (?P<line>\d{1,6}))?, at \S+:\d+"
 )
+# As `ros2 launch` says it.
 _NO_LAUNCH_FILE = re.compile(
     r"file '(?P<file>[^']+)' was not found in the share directory of package '(?P<package>[^']+)'"
 )

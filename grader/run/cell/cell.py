@@ -235,7 +235,10 @@ class Cell:
         return Ending.FAULT if self._faults else ending
 
     def _pause(self) -> tuple[Pause, ...]:
-        """Let executors find nothing ready, for longer than two messages are apart."""
+        """Let executors call no callback, for longer than two messages are apart.
+
+        What is published meanwhile comes from a thread or a loop.
+        """
         length_s = min(_PAUSED_INTERVALS * self._probe.interval_s(), _MOST_PAUSE_S)
         length_s = max(length_s, _LEAST_PAUSE_S)
         began_ns = time.time_ns()

@@ -39,12 +39,12 @@ class HangMonitor:
         self._waiting: tuple[bytes, ...] = ()
         self._before_s = 0.0
 
-    def sentence(self) -> signal.Signals | None:
+    def signal_to_send(self) -> signal.Signals | None:
         """The signal to end the cell with, or None."""
         return ENDED_BY if self._lasts() else None
 
     def _lasts(self) -> bool:
-        """Whether the first thread has been waiting all the time that another one was busy."""
+        """Whether the main thread has not run at all while others used more than 5 s of CPU."""
         try:
             waiting = _switches((self._task / "status").read_bytes())
             if waiting and waiting == self._waiting:

@@ -268,7 +268,7 @@ def _become_cell(arguments: list[str], descriptors: list[int], *, private: bool)
         if private:
             # Run by the process that waits for the cell: the cell itself cannot while it hangs.
             monitor = HangMonitor(Path("/proc/1"))
-            rights = enter(folder, monitor.sentence)
+            rights = enter(folder, monitor.signal_to_send)
             folder = CELL
         status = main(folder, tuple(map(int, arguments[1:])), rights)
         sys.stdout.flush()
