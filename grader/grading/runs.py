@@ -38,7 +38,7 @@ class Runs:
         self._can_run = prepared.install is not None and unnamed is None
         self._recordings: dict[str, Recording] = {}
         self._faults: dict[str, str] = {}
-        self._result: Grade
+        self._grade: Grade
         for old in folder.glob("*.mcap"):
             old.unlink()
         write_whole(folder / SUBMISSION_FILE, to_json(record))
@@ -51,32 +51,33 @@ class Runs:
         self._make(sorted(together, key=lambda run: run.scenario.id not in first), len(together))
         self._make([run for run in runs if run.alone], 1)
 
-    def judged(self, runs: Sequence[Run]) -> Round:
-        """What is known after some runs, which were the last."""
-        result = self._result = judge_all(
+    def judge(self, runs: Sequence[Run]) -> Round:
+        """Judge all that is recorded by now, and say what is known after some runs, the last."""
+        grade = self._grade = judge_all(
             self._grading.loaded, self._record, self._recordings, self._faults
         )
-        if result.assignment != self._loaded.assignment:
+        if grade.assignment != self._loaded.assignment:
+            # Some names that students choose, such as that of a service, show only in a run.
             self._loaded, _, _ = with_chosen_names(
                 self._grading.loaded, self._record, self._recordings
             )
-        disturbed = result.disturbed_scenarios(Status.ERROR)
+        disturbed = grade.disturbed_scenarios(Status.ERROR)
         faulty = [name for name, recording in self._recordings.items() if recording.faults]
         return Round(
-            self._loaded.assignment.scenarios if self._can_run else (),
-            runs,
-            result.names,
-            {
+            scenarios=self._loaded.assignment.scenarios if self._can_run else (),
+            runs=runs,
+            names=grade.names,
+            undecided={
                 name: self._faults.get(name, "too disturbed").partition("\n")[0]
                 for name in (*disturbed, *faulty, *self._faults)
             },
-            result.disturbed_scenarios(Status.FAILED),
+            doubtful=grade.disturbed_scenarios(Status.FAILED),
         )
 
     def graded(self, rounds: Sequence[Round]) -> Graded:
         """The grade after all rounds."""
         return Graded(
-            self._result,
+            self._grade,
             self._prepared,
             self._recordings,
             {name: self._file(name) for name in self._recordings},

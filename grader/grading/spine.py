@@ -57,8 +57,8 @@ def run_and_judge(prepared: Prepared, grading: Grading, recordings: Path) -> Gra
     """Run and judge what was built, until all is decided or nothing more is tried."""
     runs = Runs(grading, prepared, recordings)
     # What is wrong in what was built is known before any run.
-    rounds = [runs.judged(())]
+    rounds = [runs.judge(())]
     while wanted := next_runs(rounds):
         runs.make(wanted)
-        rounds.append(runs.judged(wanted))
+        rounds.append(runs.judge(wanted))
     return runs.graded(rounds)
