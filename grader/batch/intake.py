@@ -13,22 +13,20 @@ from typing import Any
 import yaml
 
 from grader.batch.groups import with_groups
-from grader.batch.hand_in_time import (
-    CANVAS_TIMES,
-    NOT_KNOWN,
-    of_canvas,
-    of_metadata,
-    of_name,
-    timed,
-)
 from grader.batch.handed_in import (
+    CANVAS_TIMES,
     FOREIGN,
+    NOT_KNOWN,
     NOTHING,
     HandedIn,
     is_ignored,
+    of_canvas,
+    of_metadata,
+    of_name,
     only_archive,
     stem_of,
     submission_in,
+    timed,
 )
 from grader.batch.roster import Roster, Student
 from grader.batch.roster_match import matched, unique

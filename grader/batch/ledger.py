@@ -19,7 +19,7 @@ from grader.errors import RosgradeError, UsageError, machine_fault
 from grader.grading.files import RESULT_FILE
 from grader.grading.last_attempt import EARLIER, keep_earlier
 from grader.report.files import check_folder, file_version, folder_name, sync, write_whole
-from grader.report.model.class_result import for_class
+from grader.report.model.class_row import for_class
 from grader.report.model.result import read_result
 from grader.report.model.result_model import Result
 

@@ -33,8 +33,7 @@ from grader.cli import (
     underlay,
     watch,
 )
-from grader.cli.screen.console import print_error
-from grader.cli.screen.streams import lasting_streams
+from grader.cli.screen.console import lasting_streams, print_error
 from grader.errors import GraderFault, RosgradeError, machine_fault
 
 USAGE = 2

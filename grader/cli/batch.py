@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.arguments import assignment_argument
-from grader.cli.options import Quiet, SandboxChoice, Seed, assignment_places
+from grader.cli.options import Quiet, SandboxChoice, Seed, assignment_argument, assignment_places
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
 from grader.errors import UsageError
@@ -82,7 +81,7 @@ def batch(
     from grader.batch.worker import Order, make_grading
     from grader.gradebook.adjusting import ClassAdjustments, course_of
     from grader.gradebook.class_files import GRADES_FILE, all_standing, class_rows, write_class
-    from grader.gradebook.rendering import bring_up_to_date
+    from grader.gradebook.class_regrading import bring_up_to_date
     from grader.report.files import check_folder, refuse_inputs, refuse_part
     from grader.run.admission import Admission
 

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.arguments import recording_argument
-from grader.cli.options import Quiet
+from grader.cli.options import Quiet, recording_argument
 from grader.cli.screen.progress import Progress
 from grader.machine.resources import cache_folder
 

@@ -40,7 +40,7 @@ def report(
     from grader.errors import UsageError
     from grader.gradebook.adjusting import ClassAdjustments, course_of
     from grader.gradebook.class_files import all_standing, find_reports, write_class
-    from grader.gradebook.rendering import bring_up_to_date, render_again
+    from grader.gradebook.class_regrading import bring_up_to_date, render_again
     from grader.grading.files import REPORT_FILE, RESULT_FILE
     from grader.grading.graded import RECORDINGS_FOLDER
     from grader.report.files import refuse_inputs

@@ -11,13 +11,12 @@ from pathlib import Path
 
 from grader.batch.batch import Done
 from grader.batch.ledger import Entry, Ledger
-from grader.course.attempts import Ruled, ruled
-from grader.course.late import HandInTime
+from grader.course.attempts import HandInTime, Ruled, ruled
 from grader.course.load import Course, load_course
 from grader.errors import UsageError
 from grader.grading.attempts import attempts_of
+from grader.report.audience import VISIBLE_ONLY
 from grader.report.model.result_model import Result
-from grader.report.model.student import VISIBLE_ONLY
 from grader.review.adjust import adjusted
 from grader.review.model import ClassReview
 from grader.review.store import ReviewStore

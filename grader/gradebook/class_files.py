@@ -18,8 +18,7 @@ from grader.grading.files import REPORT_FILE, RESULT_FILE
 from grader.report.files import write_whole
 from grader.report.formats.gradebook import grades_csv
 from grader.report.html.overview import render_overview
-from grader.report.model.class_result import for_class
-from grader.report.model.class_row import ClassRow
+from grader.report.model.class_row import ClassRow, for_class
 from grader.report.model.cluster import clusters
 from grader.report.model.result import read_result
 from grader.report.model.result_model import Result

@@ -9,15 +9,15 @@ from pathlib import Path
 from grader.batch.ledger import Entry, Ledger
 from grader.gradebook.adjusting import ClassAdjustments
 from grader.gradebook.class_files import all_standing, class_rows
-from grader.gradebook.rendering import NOT_UP_TO_DATE, bring_up_to_date
+from grader.gradebook.class_regrading import NOT_UP_TO_DATE, bring_up_to_date
 from grader.grading.files import REPORT_FILE, STUDENT_FILE
+from grader.report.audience import for_student
 from grader.report.files import folder_name, write_whole
 from grader.report.formats.gradebook import why_no_score
 from grader.report.formats.mail import Letter, address
 from grader.report.formats.markdown import render_markdown
 from grader.report.model.class_row import RowStatus
 from grader.report.model.result_model import Result
-from grader.report.model.student import for_student
 from grader.report.text.explanation import summary
 from grader.spec.safe_text import one_line
 

@@ -14,11 +14,14 @@ from grader.batch.ledger import Entry, Ledger
 from grader.errors import RosgradeError, UsageError
 from grader.gradebook.adjusting import ClassAdjustments
 from grader.gradebook.class_files import INSTRUCTOR_FOLDER, all_standing, write_class
-from grader.gradebook.questions.rules import ask
-from grader.gradebook.questions.work import Work
-from grader.gradebook.similarity.fingerprints import all_hashes, fingerprints
-from grader.gradebook.similarity.page import MOST_PAIRS, render_similarity
-from grader.gradebook.similarity.pairs import find_pairs
+from grader.gradebook.questions import Work, ask
+from grader.gradebook.similarity import (
+    MOST_PAIRS,
+    all_hashes,
+    find_pairs,
+    fingerprints,
+    render_similarity,
+)
 from grader.grading.graded import RECORDINGS_FOLDER
 from grader.recording.mcap_reader import read_recording
 from grader.report.files import write_whole

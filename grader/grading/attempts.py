@@ -10,10 +10,10 @@ from pathlib import Path
 from grader.errors import RosgradeError
 from grader.grading.files import RESULT_FILE
 from grader.grading.last_attempt import EARLIER, keep_earlier
-from grader.report.model.class_result import for_class
+from grader.report.audience import for_student
+from grader.report.model.class_row import for_class
 from grader.report.model.result import read_result, result_json
 from grader.report.model.result_model import AttemptPart, Result
-from grader.report.model.student import for_student
 from grader.report.text.last_save import change, changed_checks
 from grader.spec.safe_text import one_line
 

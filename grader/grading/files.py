@@ -11,14 +11,14 @@ from grader import __version__
 from grader.errors import UsageError
 from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.grading.last_attempt import keep_replays, replays_before
+from grader.report.audience import VISIBLE_ONLY, for_student
 from grader.report.files import write_whole
 from grader.report.formats.foxglove import LAYOUT_FILE, render_layout
 from grader.report.html.report import render_report
-from grader.report.html.shown_source import ShownSource
+from grader.report.html.source_code import ShownSource
 from grader.report.model.facts import Clock, RunFacts
 from grader.report.model.result import make_result, result_json
 from grader.report.model.result_model import Result
-from grader.report.model.student import VISIBLE_ONLY, for_student
 from grader.submission.kept_source import SOURCE_FOLDER, read_source
 
 REPORT_FILE = "report.html"

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator
 from grader.errors import UsageError
 from grader.findings.finding import Status
 from grader.grade.model import points_for, still_open, total
-from grader.report.model.cause import cause
+from grader.report.model.cluster import cause
 from grader.report.model.result_model import AdjustmentPart, CommentPart, Result
 from grader.review.model import ClassReview, Given, ManualScore, StudentReview
 

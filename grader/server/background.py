@@ -11,8 +11,12 @@ from dataclasses import dataclass, field
 from grader.assignment.load import LoadedAssignment
 from grader.errors import RosgradeError
 from grader.gradebook.class_files import all_standing, write_class
-from grader.gradebook.class_regrading import Regraded, regrade_class, write_regraded
-from grader.gradebook.rendering import bring_up_to_date
+from grader.gradebook.class_regrading import (
+    Regraded,
+    bring_up_to_date,
+    regrade_class,
+    write_regraded,
+)
 from grader.server.reviewed_class import ReviewedClass
 
 _NOT_RUN = "the batch ended, and its result is the one of before"

@@ -22,14 +22,12 @@ from grader.gradebook.edited_assignment import load_before, new_place, with_text
 from grader.report.files import folder_name
 from grader.report.html.overview import render_overview
 from grader.report.html.page import environment, render_page
-from grader.report.html.shown_source import ShownSource
-from grader.report.html.source_code import code_lines
+from grader.report.html.source_code import ShownSource, code_lines
 from grader.report.model.class_row import ClassRow
 from grader.report.model.excerpt import places
 from grader.server.background import Background
 from grader.server.changes import change_cluster, change_student
-from grader.server.local import LocalServer
-from grader.server.posted import PROBLEMS, posted
+from grader.server.local import PROBLEMS, LocalServer, posted
 from grader.server.reviewed_class import ReviewedClass, ReviewedRow
 
 MOST_CLUSTERS = 60

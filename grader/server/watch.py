@@ -21,8 +21,7 @@ from grader.grading.files import RESULT_FILE
 from grader.report.files import write_whole
 from grader.report.model.result import read_result, result_json
 from grader.report.model.result_model import Result
-from grader.server.local import LocalServer
-from grader.server.posted import PROBLEMS, posted
+from grader.server.local import PROBLEMS, LocalServer, posted
 
 _NOT_YET = "The first report comes soon."
 

@@ -24,17 +24,16 @@ from grader.batch.roster import parse_roster
 from grader.errors import UsageError
 from grader.gradebook.adjusting import course_of
 from grader.gradebook.class_files import read_class, standing, write_class
-from grader.gradebook.class_regrading import regrade_class
-from grader.gradebook.rendering import bring_up_to_date
+from grader.gradebook.class_regrading import bring_up_to_date, regrade_class
 from grader.grading.files import REPORT_FILE, RESULT_FILE, STUDENT_FILE, write_graded
 from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.grading.regrading import find_recordings, regrade
 from grader.recording.model import to_json
 from grader.recording.submission import PackageRecord, SubmissionRecord
+from grader.report.audience import for_student
 from grader.report.files import write_whole
 from grader.report.model.class_row import ClassRow
 from grader.report.model.facts import Clock
-from grader.report.model.student import for_student
 from grader.review.model import Given, StudentReview
 from grader.review.store import ReviewStore
 from grader.submission.intake.locate import opened

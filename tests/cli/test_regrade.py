@@ -19,7 +19,7 @@ from grader.grading.graded import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.recording.mcap_writer import write_recording
 from grader.recording.model import to_json
 from grader.recording.submission import SubmissionRecord
-from grader.report.model.cause import cause
+from grader.report.model.cluster import cause
 from grader.report.model.facts import Clock
 from grader.report.model.result import read_result
 from grader.review.model import ClassReview, Comment, Forgiven, ManualScore, StudentReview

@@ -6,8 +6,7 @@ from datetime import datetime, timezone
 
 import pytest
 
-from grader.course.attempts import Ruled, ruled
-from grader.course.late import HandInTime
+from grader.course.attempts import HandInTime, Ruled, ruled
 from grader.course.load import Rules
 from grader.course.model import Attempts, Late
 from grader.report.model.result_model import Result

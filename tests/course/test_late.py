@@ -9,7 +9,7 @@ from zoneinfo import ZoneInfo
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.course.late import HandInTime, Lateness, lateness
+from grader.course.attempts import HandInTime, Lateness, lateness
 from grader.course.load import Rules
 from grader.course.model import Late
 

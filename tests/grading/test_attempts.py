@@ -3,9 +3,9 @@
 from grader.findings.finding import Finding
 from grader.grading.attempts import MOST_KEPT, attempts_of, with_history
 from grader.grading.files import RESULT_FILE
+from grader.report.audience import for_student
 from grader.report.files import write_whole
 from grader.report.model.result import read_result, result_json
-from grader.report.model.student import for_student
 from tests.grade.sample import Told
 from tests.report.sample import judged
 

@@ -19,7 +19,7 @@ from grader.recording.model import NS, Call, LogLine, Message, Node, Owner, Proc
 from grader.recording.submission import BuildRecord, SourceError, SubmissionRecord
 from grader.report.html.replay import Replay
 from grader.report.html.report import render_report
-from grader.report.html.shown_source import ShownSource
+from grader.report.html.source_code import ShownSource
 from grader.report.model.facts import RunFacts
 from grader.report.model.result import make_result
 from grader.report.model.result_model import AdjustmentPart, AttemptPart, CommentPart, Result

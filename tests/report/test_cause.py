@@ -3,9 +3,8 @@
 import pytest
 
 from grader.findings.finding import Finding
-from grader.report.model.cause import cause
 from grader.report.model.class_row import ClassRow
-from grader.report.model.cluster import clusters
+from grader.report.model.cluster import cause, clusters
 from grader.review.model import ClassReview, Forgiven
 from tests.grade.sample import Told
 from tests.report.sample import judged

@@ -8,7 +8,7 @@ from dataclasses import replace
 from grader.findings.finding import Evidence
 from grader.report.formats.gradebook import grades_csv
 from grader.report.html.overview import render_overview
-from grader.report.model.class_result import for_class
+from grader.report.model.class_row import for_class
 from grader.report.model.mistakes import reasons
 from grader.report.model.result import result_json
 from grader.report.model.result_model import Result

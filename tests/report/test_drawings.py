@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 from grader.findings.finding import Plot
 from grader.recording.model import Call, Declaration, Ending, Message, Process
 from grader.report.drawing.axes import Scale, ticks
-from grader.report.drawing.flags import Flag, place
 from grader.report.drawing.frames import draw_frames
 from grader.report.drawing.plot import draw_plot
 from grader.report.drawing.svg import NARROW, WIDE
-from grader.report.drawing.timeline import draw_timeline
+from grader.report.drawing.timeline import Flag, draw_timeline, place
 from tests.checks.test_tf import TF, TF_STATIC, TIMES, on, run, transform
 from tests.report.page import description, is_finite, marks, of_class, words
 from tests.report.sample import PROCESS, at, make_run

@@ -19,14 +19,12 @@ from grader.recording.submission import BuildRecord, SourceError
 from grader.report.drawing.callbacks import draw_callbacks
 from grader.report.drawing.cases import draw_cases
 from grader.report.drawing.motion import draw_motion, phases
-from grader.report.drawing.path import Target, draw_path
+from grader.report.drawing.path import Target, draw_path, targets
 from grader.report.drawing.plot import draw_plot
 from grader.report.drawing.svg import simplified
 from grader.report.drawing.timeline import draw_timeline
-from grader.report.html.comparison import SIGNS, align
-from grader.report.html.qos_table import pairs
 from grader.report.html.report import Gallery, build_lines
-from grader.report.model.target import targets
+from grader.report.html.tables import SIGNS, align, pairs
 from sim.motion import Pose
 from tests.checks.builder import drive, endpoint, node, on_odometry, output, reader, recording
 from tests.report.gallery import CALLS, CASES, DEFINITION, ahead_until

@@ -20,14 +20,13 @@ from grader.findings.finding import Evidence, Finding, Moment, Plot, Table
 from grader.grade import judge_all
 from grader.recording.submission import SourceError
 from grader.report import formats
-from grader.report.audience import RENDERERS, Audience
+from grader.report.audience import RENDERERS, Audience, for_student
 from grader.report.formats import gradescope
 from grader.report.formats.foxglove import render_layout
 from grader.report.formats.gradebook import grades_csv
 from grader.report.html.report import render_report
 from grader.report.model.class_row import ClassRow
 from grader.report.model.result import result_json
-from grader.report.model.student import for_student
 from grader.report.text.explanation import headline
 from tests.grade.sample import FAIL, Told, make_loaded, make_submission
 from tests.report.sample import Sample, judged, make_facts, make_run

@@ -6,11 +6,11 @@ import pytest
 
 from grader.errors import UsageError
 from grader.findings.finding import Finding
-from grader.report.model.cause import cause
+from grader.report.audience import for_student
 from grader.report.model.class_row import ClassRow, RowStatus
+from grader.report.model.cluster import cause
 from grader.report.model.result import result_json
 from grader.report.model.result_model import AdjustmentPart, Result
-from grader.report.model.student import for_student
 from grader.review.adjust import adjusted
 from grader.review.model import ClassReview, Comment, Forgiven, Given, ManualScore, StudentReview
 from tests.grade.sample import Told

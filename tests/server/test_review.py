@@ -18,7 +18,7 @@ from grader.assignment.load import load_assignment
 from grader.batch.ledger import Ledger
 from grader.gradebook.adjusting import ClassAdjustments
 from grader.gradebook.class_files import all_standing, read_class
-from grader.gradebook.rendering import bring_up_to_date
+from grader.gradebook.class_regrading import bring_up_to_date
 from grader.grading.files import RESULT_FILE
 from grader.report.files import folder_name
 from grader.report.model.result import read_result

@@ -9,8 +9,16 @@ from markupsafe import Markup
 
 from grader.findings.finding import Span
 from grader.findings.wording import counted
-from grader.report.drawing.axes import TIME_AXIS, Scale, time_axis
-from grader.report.drawing.lanes import LANE, SIDE, Bar, Lane, draw_lanes
+from grader.report.drawing.axes import (
+    LANE,
+    SIDE,
+    TIME_AXIS,
+    Bar,
+    Lane,
+    Scale,
+    draw_lanes,
+    time_axis,
+)
 from grader.report.drawing.svg import Figure, figure
 from grader.spec.safe_text import one_line
 

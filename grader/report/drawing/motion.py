@@ -18,12 +18,12 @@ from grader.report.drawing.axes import (
     LEFT,
     RIGHT,
     TIME_AXIS,
+    Bar,
     Scale,
     time_axis,
     unit_of,
     value_axis,
 )
-from grader.report.drawing.lanes import Bar
 
 STRIP, PANEL, BETWEEN = 18, 110, 34
 STRIDE = 4

@@ -16,10 +16,9 @@ from pydantic import AwareDatetime, BaseModel, ValidationError
 
 from grader.errors import UsageError
 from grader.findings.finding import Status
-from grader.report.audience import Audience, written_for
+from grader.report.audience import Audience, for_student, written_for
 from grader.report.formats import markdown
 from grader.report.model.result_model import CheckPart, Result
-from grader.report.model.student import for_student
 from grader.report.text import explanation
 
 _UNFINISHED = (

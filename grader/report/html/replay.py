@@ -18,8 +18,8 @@ from grader.measure.motion.quantities import metres
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
 from grader.report.drawing.ground_plan import places
-from grader.report.model.output import printed
-from grader.report.model.target import targets
+from grader.report.drawing.path import targets
+from grader.report.model.excerpt import printed
 from grader.spec.safe_text import one_line
 
 Replay = Mapping[str, Any]

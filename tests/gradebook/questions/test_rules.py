@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from grader.gradebook.questions.rules import ask
-from grader.gradebook.questions.work import Work
+from grader.gradebook.questions import Work, ask
 from grader.recording.event import Disturbance
 from grader.recording.model import NS, Recording
 from tests.checks.builder import (

@@ -12,8 +12,13 @@ import pytest
 
 from grader.assignment.load import load_assignment
 from grader.assignment.mutant import apply, load_mutants
-from grader.gradebook.similarity.fingerprints import all_hashes, fingerprints
-from grader.gradebook.similarity.pairs import FEWEST, find_pairs, shared_passages
+from grader.gradebook.similarity import (
+    FEWEST,
+    all_hashes,
+    find_pairs,
+    fingerprints,
+    shared_passages,
+)
 from grader.machine.scratch import Scratch
 from grader.submission.kept_source import read_source
 from tests.gradebook.similarity.copies import renamed

@@ -1,1 +1,0 @@
-"""Questions for oral exams, made by rules from what a submission's program is and did."""

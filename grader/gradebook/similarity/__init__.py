@@ -1,1 +1,0 @@
-"""Which submissions of a class are alike, after renaming and reformatting."""
