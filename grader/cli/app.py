@@ -1,8 +1,4 @@
-"""The command ``rosgrade``: its commands, and how errors end it.
-
-Exit codes: 0 full points, 1 points lost, 2 wrong use or bad YAML, 3 not graded (our fault or
-the machine's), 130 interrupted.
-"""
+"""The command ``rosgrade``: its commands, and how errors end it."""
 
 from __future__ import annotations
 
@@ -16,6 +12,8 @@ import typer
 
 from grader import __version__
 from grader.cli import (
+    NOT_GRADED,
+    USAGE,
     assignments,
     batch,
     catalogue,
@@ -36,8 +34,6 @@ from grader.cli import (
 from grader.cli.screen.console import lasting_streams, print_error
 from grader.errors import GraderFault, RosgradeError, machine_fault
 
-USAGE = 2
-NOT_GRADED = 3
 _COLLECT_EACH = 50_000
 """New containers from which on Python looks for garbage; 700 by default."""
 

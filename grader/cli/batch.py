@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from grader.cli import NOT_GRADED
 from grader.cli.options import Quiet, SandboxChoice, Seed, assignment_argument, assignment_places
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from grader.batch.batch import Done
     from grader.batch.executor import BatchExecutor
 
-NOT_GRADED = 3
 _AUTO = "auto"
 
 

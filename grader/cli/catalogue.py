@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from grader.cli import USAGE
 from grader.cli.screen.console import output_console, print_error, print_warning, say
 from grader.errors import RosgradeError
 from grader.findings.wording import counted
@@ -79,7 +80,7 @@ def validate(
             f"{counted(len(loaded.checks), 'check')}{tested}: valid"
         )
     if broken:
-        raise typer.Exit(2)
+        raise typer.Exit(USAGE)
 
 
 def schema(

@@ -7,38 +7,12 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from grader.cli.formats import (
-    Classroom50,
-    FormatFiles,
-    Formats,
-    Github,
-    GradescopeMetadata,
-    JunitFamily,
-    JunitFamilyName,
-    with_file_formats,
-)
-from grader.cli.options import (
-    AssignmentName,
-    Checks,
-    Chosen,
-    Hidden,
-    Quiet,
-    ReportFolder,
-    SandboxChoice,
-    Scenarios,
-    Seed,
-    Verbose,
-    assignment_places,
-    chosen_names,
-    chosen_sandbox,
-    file_option,
-    report_folder,
-)
+from grader.cli import NOT_GRADED, options
+from grader.cli.formats import CheckFormats, with_formats
 from grader.cli.screen.console import open_page, output_console, say
 from grader.cli.screen.progress import Progress, syntax_errors
 from grader.machine.resources import cache_folder
@@ -48,36 +22,31 @@ if TYPE_CHECKING:
     from grader.recording.model import Recording
     from grader.recording.submission import SubmissionRecord
 
-FULL_POINTS, POINTS_LOST, NOT_GRADED = 0, 1, 3
 
-
-@with_file_formats
+@with_formats
 def check(
-    assignment: AssignmentName,
+    assignment: options.AssignmentName,
     submission: Annotated[
         Path, typer.Argument(help="The submission: a folder, a .zip or a .tar.gz.")
     ] = Path(),
-    report: ReportFolder = None,
+    *,
+    report: options.ReportFolder = None,
     json_file: Annotated[
-        Path | None, file_option("--json", text="Also write the result to this file.")
+        Path | None, options.file_option("--json", text="Also write the result to this file.")
     ] = None,
-    scenario: Scenarios = None,
-    only: Checks = None,
-    seed: Seed = None,
-    chosen: Chosen = None,
-    hidden: Hidden = False,
-    files: FormatFiles = MappingProxyType({}),
-    junit_family: JunitFamilyName = JunitFamily.XUNIT2,
-    gradescope_metadata: GradescopeMetadata = None,
-    github: Github = False,
-    classroom50: Classroom50 = False,
-    sandbox: SandboxChoice = Choice.AUTO,
+    scenario: options.Scenarios = None,
+    only: options.Checks = None,
+    seed: options.Seed = None,
+    chosen: options.Chosen = None,
+    hidden: options.Hidden = False,
+    formats: CheckFormats,
+    sandbox: options.SandboxChoice = Choice.AUTO,
     keep: Annotated[
         bool,
         typer.Option("--keep", help="Keep colcon's install space in the report's folder."),
     ] = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
     open_report: Annotated[
         bool, typer.Option("--open", help="Open the report in a browser.")
     ] = False,
@@ -92,26 +61,23 @@ def check(
     from grader.run.runner import Runner
 
     clock = Clock()
-    report = report_folder(report, assignment)
+    report = options.report_folder(report, assignment)
     page = report / "report.html"
-    formats = Formats(files, junit_family, gradescope_metadata, github, classroom50)
     refuse_inputs(
-        (report, page, json_file, *files.values()),
-        (*assignment_places(assignment), submission, gradescope_metadata),
+        (report, page, json_file, *formats.files.values()),
+        (*options.assignment_places(assignment), submission, formats.gradescope_metadata),
     )
     with formats.grading():
         progress = Progress(quiet, verbose)
         runner = Runner(
             ros.find(),
             progress=_while_it_starts(progress.narrate),
-            sandbox=chosen_sandbox(sandbox, progress),
+            sandbox=options.chosen_sandbox(sandbox, progress),
             verbose=verbose,
         )
         runner.get_ready()
         try:
             # Imported while the cell gets ready.
-            from grader.assignment.load import load_assignment
-            from grader.assignment.selection import select, visible_part
             from grader.grading.files import claim
             from grader.grading.grading import Grading, Told
             from grader.grading.spine import HandedIn, grade
@@ -119,9 +85,7 @@ def check(
             from grader.submission.intake.locate import check_path
             from grader.submission.kept_source import SOURCE_FOLDER, read_source
 
-            whole = chosen_names(load_assignment(assignment), chosen)
-            shown = whole if hidden else visible_part(whole)
-            loaded = select(shown, tuple(only or ()), tuple(scenario or ()))
+            loaded = options.graded_part(assignment, chosen, only, scenario, hidden=hidden)
             check_path(submission)
             check_folder(report)
             claim(report, keep=keep)
@@ -158,8 +122,8 @@ def check(
     formats.write(result, submission)
     if open_report:
         open_page(page.resolve().as_uri())
-    status = FULL_POINTS if graded.grade.full_points or classroom50 else POINTS_LOST
-    raise typer.Exit(status if graded.grade.graded else NOT_GRADED)
+    status = options.exit_code(graded.grade)
+    raise typer.Exit(0 if formats.classroom50 and status != NOT_GRADED else status)
 
 
 Narrate = Callable[[str, Mapping[str, Any]], None]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from grader.cli import NOT_GRADED
 from grader.cli.screen.console import output_console
 
 
@@ -27,4 +28,4 @@ def doctor() -> None:
     console.print(table, markup=False)
     if not usable:
         console.print("\nSubmissions cannot be graded on this machine yet.")
-    raise typer.Exit(0 if usable else 3)
+    raise typer.Exit(0 if usable else NOT_GRADED)

@@ -11,7 +11,7 @@ import re
 import secrets
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from datetime import datetime, timezone
 from enum import Enum
 from functools import wraps
@@ -40,28 +40,6 @@ class JunitFamily(str, Enum):
     XUNIT1 = "xunit1"
 
 
-FormatFiles = Mapping[str, Path]
-"""Format -> file; :func:`with_file_formats` makes options of it."""
-JunitFamilyName = Annotated[
-    JunitFamily,
-    typer.Option(help="xunit2 is valid for Jenkins; xunit1 also has the student's file and line."),
-]
-GradescopeMetadata = Annotated[
-    Path | None, typer.Option(help="Gradescope's submission_metadata.json, with the due date.")
-]
-Github = Annotated[
-    bool,
-    typer.Option("--github", help="Write annotations, summary, outputs for GitHub Actions."),
-]
-Classroom50 = Annotated[
-    bool,
-    typer.Option(
-        "--classroom50",
-        help="Write Classroom 50's result.json and release-body.md here; always ends with 0.",
-    ),
-]
-
-
 _RENDERS = re.compile(r"^def render\(", re.MULTILINE)
 
 
@@ -80,45 +58,56 @@ def file_formats() -> dict[str, str]:
     }
 
 
-def with_file_formats(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command an option for each format, in place of its parameter ``files``."""
+def with_formats(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of the formats, in place of its parameter ``formats``."""
 
     @wraps(command)
-    def wrapped(**arguments: Any) -> None:
-        files = {name: arguments.pop(name) for name in options}
-        command(**arguments, files={name: file for name, file in files.items() if file})
+    def wrapped(**given: Any) -> None:
+        files = {name: given.pop(name) for name in to_file}
+        others = {name: given.pop(name) for name in others_of_kind}
+        files = {name: file for name, file in files.items() if file}
+        command(**given, formats=kind(files=files, **others))
 
-    options = {
+    hints = get_type_hints(command, include_extras=True)
+    kind = hints.pop("formats")
+    to_file = {
         name: Annotated[Path | None, file_option(f"--{name}", text=text)]
         for name, text in file_formats().items()
     }
-    hints = {**get_type_hints(command, include_extras=True), **options}
-    parameters: list[Parameter] = []
+    others_of_kind = {one.name: one.default for one in fields(kind)[1:]}
+    options = {**dict.fromkeys(to_file), **others_of_kind}
+    hints = {**hints, **get_type_hints(kind, include_extras=True), **to_file}
+    defaults: dict[str, Any] = {}
     for name, parameter in signature(command).parameters.items():
-        replaced = options if name == "files" else [name]
-        parameters += [
-            Parameter(
-                one,
-                Parameter.KEYWORD_ONLY,
-                default=None if name == "files" else parameter.default,
-                annotation=hints[one],
-            )
-            for one in replaced
-        ]
+        defaults |= options if name == "formats" else {name: parameter.default}
+    parameters = [
+        Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=hints[name])
+        for name, default in defaults.items()
+    ]
     wrapped.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
-    wrapped.__annotations__ = {one.name: one.annotation for one in parameters}
+    wrapped.__annotations__ = {name: hints[name] for name in defaults}
     return wrapped
 
 
 @dataclass(frozen=True)
 class Formats:
-    """What to write, and where to."""
+    """What to write, and to which files; every other field is an option of the command."""
 
     files: Mapping[str, Path] = field(default_factory=dict)
-    junit_family: JunitFamily = JunitFamily.XUNIT2
-    gradescope_metadata: Path | None = None
-    github: bool = False
-    classroom50: bool = False
+    junit_family: Annotated[
+        JunitFamily,
+        typer.Option(
+            help="xunit2 is valid for Jenkins; xunit1 also has the student's file and line."
+        ),
+    ] = JunitFamily.XUNIT2
+    gradescope_metadata: Annotated[
+        Path | None, typer.Option(help="Gradescope's submission_metadata.json, with the due date.")
+    ] = None
+    github: Annotated[
+        bool,
+        typer.Option("--github", help="Write annotations, summary, outputs for GitHub Actions."),
+    ] = False
+    classroom50 = False
 
     @contextmanager
     def grading(self) -> Iterator[None]:
@@ -158,6 +147,19 @@ class Formats:
             _tell_github(result, submission, os.environ)
         if self.classroom50:
             _write_classroom50(result, Path())
+
+
+@dataclass(frozen=True)
+class CheckFormats(Formats):
+    """What only ``check`` can write too."""
+
+    classroom50: Annotated[
+        bool,
+        typer.Option(
+            "--classroom50",
+            help="Write Classroom 50's result.json and release-body.md here; always ends with 0.",
+        ),
+    ] = False
 
 
 def _tell_github(result: Result, submission: Path | None, environment: Mapping[str, str]) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from grader.cli import NOT_GRADED, POINTS_LOST
 from grader.cli.screen.progress import Progress
 from grader.errors import UsageError
 from grader.machine import resources
@@ -18,6 +19,7 @@ from grader.sandbox.choice import Choice
 
 if TYPE_CHECKING:
     from grader.assignment.load import LoadedAssignment
+    from grader.grade import Grade
     from grader.sandbox.sandbox import Sandbox
 
 _ARCHIVES = (".zip", ".tar", ".gz", ".tgz", ".rar", ".7z")
@@ -129,6 +131,27 @@ def file_option(*names: str, text: str) -> Any:
     return typer.Option(*names, metavar="FILE", help=text, callback=read)
 
 
+def graded_part(
+    assignment: str,
+    chosen: list[str] | None,
+    only: list[str] | None,
+    scenario: list[str] | None,
+    *,
+    hidden: bool,
+) -> LoadedAssignment:
+    """What of an assignment is graded, as the options choose it."""
+    from grader.assignment.selection import select, visible_part
+
+    whole = chosen_names(assignment, chosen)
+    shown = whole if hidden else visible_part(whole)
+    return select(shown, tuple(only or ()), tuple(scenario or ()))
+
+
+def exit_code(grade: Grade) -> int:
+    """What a command that graded one submission ends with."""
+    return NOT_GRADED if not grade.graded else 0 if grade.full_points else POINTS_LOST
+
+
 def report_folder(chosen: Path | None, assignment: str) -> Path:
     """Where a report is written: each assignment has its own folder."""
     place = Path(assignment).resolve()
@@ -140,8 +163,11 @@ def assignment_places(name: str) -> tuple[Path, Path]:
     return Path(name), resources.assignments() / name
 
 
-def chosen_names(loaded: LoadedAssignment, chosen: list[str] | None) -> LoadedAssignment:
+def chosen_names(assignment: str, chosen: list[str] | None) -> LoadedAssignment:
     """The assignment with the values that were chosen for its variables."""
+    from grader.assignment.load import load_assignment
+
+    loaded = load_assignment(assignment)
     given = {name: value for name, _, value in (text.partition("=") for text in chosen or ())}
     if not given.keys() <= loaded.values.keys() or not all(given.values()):
         names = ", ".join(loaded.values) or "none"

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.options import Quiet, UsedAssignment
+from grader.cli import NOT_GRADED
+from grader.cli.options import Quiet, UsedAssignment, exit_code
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
 
 if TYPE_CHECKING:
     from grader.batch.ledger import Ledger
 
-NOT_GRADED = 3
 NOTHING_WRITTEN = "Nothing was written (--dry-run)."
 
 
@@ -82,8 +82,7 @@ def _one(path: Path, assignment: str | None, *, write: bool) -> None:
             history = partial(with_history, found.folder)
             write_graded(graded, found.folder, clock, amended=history)
             say(f"Report: {found.folder / REPORT_FILE}")
-    grade = graded.grade
-    raise typer.Exit(NOT_GRADED if not grade.graded else 0 if grade.full_points else 1)
+    raise typer.Exit(exit_code(graded.grade))
 
 
 def _class(batch: Ledger, assignment: str | None, quiet: bool, *, write: bool) -> None:

@@ -3,32 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated
 
 import typer
 
-from grader.cli.formats import (
-    FormatFiles,
-    Formats,
-    Github,
-    GradescopeMetadata,
-    JunitFamily,
-    JunitFamilyName,
-    with_file_formats,
-)
+from grader.cli.formats import Formats, with_formats
 from grader.cli.options import UsedAssignment
 from grader.cli.screen.console import print_warning, say
 
 
-@with_file_formats
+@with_formats
 def report(
     out: Annotated[Path, typer.Argument(help="A report folder, or the folder of a class.")],
     assignment: UsedAssignment = None,
-    files: FormatFiles = MappingProxyType({}),
-    junit_family: JunitFamilyName = JunitFamily.XUNIT2,
-    gradescope_metadata: GradescopeMetadata = None,
-    github: Github = False,
+    *,
+    formats: Formats,
 ) -> None:
     """Write reports again, also in other formats. Nothing is run or judged.
 
@@ -51,8 +40,7 @@ def report(
         with ledger.opened():
             regroup(ledger, rules)
     folders = find_reports(out)
-    formats = Formats(files, junit_family, gradescope_metadata, github)
-    if len(folders) > 1 and (files or gradescope_metadata or github):
+    if len(folders) > 1 and formats != Formats(junit_family=formats.junit_family):
         raise UsageError(
             f"{out} has {len(folders)} reports, and a file of such a format holds one: "
             "give the folder of one report"
@@ -61,8 +49,8 @@ def report(
     for key in adjust.vanished() if adjust is not None else ():
         print_warning(f"the review of {key} stays, but the class has no such student")
     for folder in folders:
-        read = [folder / RESULT_FILE, folder / RECORDINGS_FOLDER, gradescope_metadata]
-        refuse_inputs([folder / REPORT_FILE, *files.values()], read)
+        read = [folder / RESULT_FILE, folder / RECORDINGS_FOLDER, formats.gradescope_metadata]
+        refuse_inputs([folder / REPORT_FILE, *formats.files.values()], read)
         formats.write(render_again(folder, assignment, adjust))
         say(f"Report: {folder / REPORT_FILE}")
     if ledger is not None:

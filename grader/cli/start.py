@@ -28,7 +28,6 @@ def start(
 
     You write what it does. Existing files are never overwritten.
     """
-    from grader.assignment.load import load_assignment
     from grader.assignment.selection import with_values
     from grader.authoring.starter import write_starter
     from grader.grading.prerequisites import remedy_for_cpp
@@ -41,7 +40,7 @@ def start(
             remedy = str(fault)
         if remedy:
             print_warning(f"before C++ can be built here: {remedy}")
-    loaded = chosen_names(load_assignment(assignment), chosen)
+    loaded = chosen_names(assignment, chosen)
     loaded = with_values(loaded, {**loaded.values, **loaded.given})
     for name, variable in loaded.assignment.variables.items():
         if name not in loaded.given and not variable.is_of_runs:

@@ -11,23 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.options import (
-    AssignmentName,
-    Checks,
-    Chosen,
-    Hidden,
-    Port,
-    Quiet,
-    ReportFolder,
-    SandboxChoice,
-    Scenarios,
-    Seed,
-    Verbose,
-    assignment_places,
-    chosen_names,
-    chosen_sandbox,
-    report_folder,
-)
+from grader.cli import options
 from grader.cli.screen.console import open_page, output_console, print_error, say
 from grader.cli.screen.progress import Progress, syntax_errors
 from grader.machine.resources import cache_folder
@@ -50,20 +34,20 @@ if TYPE_CHECKING:
 
 
 def watch(
-    assignment: AssignmentName,
+    assignment: options.AssignmentName,
     submission: Annotated[
         Path, typer.Argument(help="Your package, workspace, or its src.")
     ] = Path(),
-    report: ReportFolder = None,
-    scenario: Scenarios = None,
-    only: Checks = None,
-    seed: Seed = None,
-    chosen: Chosen = None,
-    hidden: Hidden = False,
-    sandbox: SandboxChoice = Choice.AUTO,
-    port: Port = 0,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    report: options.ReportFolder = None,
+    scenario: options.Scenarios = None,
+    only: options.Checks = None,
+    seed: options.Seed = None,
+    chosen: options.Chosen = None,
+    hidden: options.Hidden = False,
+    sandbox: options.SandboxChoice = Choice.AUTO,
+    port: options.Port = 0,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
     open_report: Annotated[
         bool, typer.Option("--open", help="Open the report page in a browser.")
     ] = False,
@@ -74,8 +58,6 @@ def watch(
     changed since the last grade. The report page updates itself. A save during a run starts the run
     again. The files of the assignment are watched too.
     """
-    from grader.assignment.load import load_assignment
-    from grader.assignment.selection import select, visible_part
     from grader.grading.files import claim
     from grader.machine import ros
     from grader.report.files import check_folder, refuse_inputs
@@ -83,14 +65,10 @@ def watch(
     from grader.server.watch import ReportPage
     from grader.submission.intake.locate import check_path
 
-    def load() -> LoadedAssignment:
-        whole = chosen_names(load_assignment(assignment), chosen)
-        shown = whole if hidden else visible_part(whole)
-        return select(shown, tuple(only or ()), tuple(scenario or ()))
-
-    report = report_folder(report, assignment)
+    load = partial(options.graded_part, assignment, chosen, only, scenario, hidden=hidden)
+    report = options.report_folder(report, assignment)
     outputs = [report, report / "report.html"]
-    refuse_inputs(outputs, [*assignment_places(assignment), submission])
+    refuse_inputs(outputs, [*options.assignment_places(assignment), submission])
     loaded = load()
     check_path(submission)
     check_folder(report)
@@ -102,7 +80,7 @@ def watch(
         runner = Runner(
             ros.find(),
             progress=progress.narrate,
-            sandbox=chosen_sandbox(sandbox, progress),
+            sandbox=options.chosen_sandbox(sandbox, progress),
             verbose=verbose,
         )
         work = _Work(loaded, load, submission, report, seed, progress, runner, page)
