@@ -2,43 +2,90 @@
 
 from __future__ import annotations
 
+import ast
 import atexit
 import gc
 import signal
 import sys
 import traceback
+from importlib import import_module
+from pathlib import Path
+from typing import Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
 from grader import __version__
-from grader.cli import (
-    NOT_GRADED,
-    USAGE,
-    assignments,
-    batch,
-    catalogue,
-    check,
-    doctor,
-    export,
-    instructor,
-    regrade,
-    replay,
-    report,
-    review,
-    selftest,
-    sim,
-    start,
-    underlay,
-    watch,
-)
+from grader.cli import NOT_GRADED, USAGE
 from grader.cli.screen.console import lasting_streams, print_error
 from grader.errors import GraderFault, RosgradeError, machine_fault
 
 _COLLECT_EACH = 50_000
 """New containers from which on Python looks for garbage; 700 by default."""
+_COMMANDS = {
+    "list": "assignments.list_command",
+    "show": "assignments.show",
+    "start": "start.start",
+    "check": "check.check",
+    "watch": "watch.watch",
+    "batch": "batch.batch",
+    "regrade": "regrade.regrade",
+    "report": "report.report",
+    "review": "review.review",
+    "similar": "instructor.similar",
+    "questions": "instructor.questions",
+    "replay": "replay.replay",
+    "selftest": "selftest.selftest",
+    "new": "start.new",
+    "validate": "catalogue.validate",
+    "schema": "catalogue.schema",
+    "checks": "catalogue.checks",
+    "explain": "catalogue.explain",
+    "sim": "sim.sim",
+    "doctor": "doctor.doctor",
+    "export": "export.other_systems",
+    "underlay": "underlay.underlay",
+}
+"""Where each command is; a module with an ``app`` has commands of its own."""
+
+
+class _Commands(TyperGroup):
+    """All commands; only the module of the one that is called is imported."""
+
+    def __init__(self, **settings: Any) -> None:
+        """Know their names, in the order of the help."""
+        super().__init__(**{**settings, "commands": dict.fromkeys(_COMMANDS)})
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """What the help and the completion of a shell tell of a command."""
+        if cmd_name not in _COMMANDS:
+            return None
+        module, function = _COMMANDS[cmd_name].split(".")
+        source = ast.parse(Path(__file__).with_name(f"{module}.py").read_bytes())
+        found = (one for one in source.body if isinstance(one, ast.FunctionDef))
+        docs = {one.name: ast.get_docstring(one) for one in found}
+        return TyperCommand(cmd_name, help=docs[function], rich_markup_mode=None)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command itself, with its options."""
+        name, known, rest = super().resolve_command(ctx, args)
+        return name, known and _load(str(known.name)), rest
+
+
+def _load(name: str) -> Any:
+    module, function = _COMMANDS[name].split(".")
+    loaded = import_module(f"grader.cli.{module}")
+    commands = getattr(loaded, "app", None)
+    if commands is None:
+        commands = typer.Typer(add_completion=False, rich_markup_mode=None)
+        settings = {"allow_extra_args": name == "batch"}
+        commands.command(name, context_settings=settings)(getattr(loaded, function))
+    return typer.main.get_command(commands)
+
 
 app = typer.Typer(
     name="rosgrade",
+    cls=_Commands,
     help="Grade ROS 2 assignments: build the student's packages, run the real nodes, judge "
     "what was recorded.",
     no_args_is_help=True,
@@ -62,30 +109,6 @@ def _options(
     ),
 ) -> None:
     """Options before the command."""
-
-
-app.command("list")(assignments.list_command)
-app.command("show")(assignments.show)
-app.command("start")(start.start)
-app.command("check")(check.check)
-app.command("watch")(watch.watch)
-app.command("batch", context_settings={"allow_extra_args": True})(batch.batch)
-app.command("regrade")(regrade.regrade)
-app.command("report")(report.report)
-app.command("review")(review.review)
-app.command("similar")(instructor.similar)
-app.command("questions")(instructor.questions)
-app.command("replay")(replay.replay)
-app.add_typer(export.app, name="export")
-app.command("selftest")(selftest.selftest)
-app.command("new")(start.new)
-app.command("validate")(catalogue.validate)
-app.command("schema")(catalogue.schema)
-app.command("checks")(catalogue.checks)
-app.command("explain")(catalogue.explain)
-app.command("sim")(sim.sim)
-app.add_typer(underlay.app, name="underlay")
-app.command("doctor")(doctor.doctor)
 
 
 def main() -> None:

@@ -6,17 +6,20 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markdown import Markdown
+from rich.table import Table
 
+from grader.assignment.load import list_assignments, load_assignment
 from grader.cli.options import AssignmentName, file_option
 from grader.cli.screen.console import output_console, say
+from grader.errors import UsageError
+from grader.report.files import refuse_inputs, write_whole
+from grader.report.html.handout import Handout, make_handout, render_handout
+from grader.submission.underlay.ros2_command import absence_note
 
 
 def list_command() -> None:
     """List the assignments."""
-    from rich.table import Table
-
-    from grader.assignment.load import list_assignments, load_assignment
-
     table = Table(box=None, pad_edge=False)
     for column, side in (("ASSIGNMENT", "left"), ("POINTS", "right"), ("TITLE", "left")):
         table.add_column(column, justify="right" if side == "right" else "left")
@@ -42,12 +45,6 @@ def show(
 
     Shows only the number of hidden checks.
     """
-    from grader.assignment.load import load_assignment
-    from grader.errors import UsageError
-    from grader.report.files import refuse_inputs, write_whole
-    from grader.report.html.handout import Handout, make_handout, render_handout
-    from grader.submission.underlay.ros2_command import absence_note
-
     if out is not None and not html:
         raise UsageError("--out is for the page: add --html")
     loaded = load_assignment(assignment)
@@ -59,9 +56,6 @@ def show(
         write_whole(file, render_handout(handout))
         say(f"Handout: {file}")
         return
-    from rich.markdown import Markdown
-    from rich.table import Table
-
     if handout.text:
         console.print(Markdown(handout.text, hyperlinks=False))
         console.print()

@@ -5,25 +5,35 @@ from __future__ import annotations
 import signal
 import time
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from grader.assignment.load import load_assignment
+from grader.batch.batch import Batch, Done
+from grader.batch.executor import BatchExecutor, DaskExecutor, ExecutorLost, LocalExecutor
+from grader.batch.groups import strangers
+from grader.batch.intake import take_in, take_in_roster
+from grader.batch.ledger import Ledger, TakenFrom
+from grader.batch.roster import read_roster
+from grader.batch.used_assignment import in_use, load_used
+from grader.batch.worker import Order, make_grading
 from grader.cli import NOT_GRADED
 from grader.cli.options import Quiet, SandboxChoice, Seed, assignment_argument, assignment_places
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
 from grader.errors import UsageError
+from grader.gradebook.adjusting import ClassAdjustments, course_of
+from grader.gradebook.class_files import GRADES_FILE, all_standing, class_rows, copies, write_class
+from grader.gradebook.class_regrading import bring_up_to_date
 from grader.machine.scratch import Scratch
+from grader.report.files import check_folder, refuse_inputs, refuse_part
+from grader.report.model.class_row import RowStatus
+from grader.run.admission import Admission
 from grader.sandbox.choice import Choice
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from grader.batch.batch import Done
-    from grader.batch.executor import BatchExecutor
 
 _AUTO = "auto"
 
@@ -70,21 +80,6 @@ def batch(
     Writes a report for each submission, an overview (index.html) and grades.csv to OUT. Ends
     with 0 if every submission was graded, with good or bad grades, and with 3 if one was not.
     """
-    from grader.assignment.load import load_assignment
-    from grader.batch.batch import Batch
-    from grader.batch.executor import DaskExecutor, ExecutorLost, LocalExecutor
-    from grader.batch.groups import strangers
-    from grader.batch.intake import take_in, take_in_roster
-    from grader.batch.ledger import Ledger, TakenFrom
-    from grader.batch.roster import read_roster
-    from grader.batch.used_assignment import in_use, load_used
-    from grader.batch.worker import Order, make_grading
-    from grader.gradebook.adjusting import ClassAdjustments, course_of
-    from grader.gradebook.class_files import GRADES_FILE, all_standing, class_rows, write_class
-    from grader.gradebook.class_regrading import bring_up_to_date
-    from grader.report.files import check_folder, refuse_inputs, refuse_part
-    from grader.run.admission import Admission
-
     at_once = _at_once(jobs)
     if context.args:
         # What a shell makes of `class/*`.
@@ -207,9 +202,6 @@ def _said(done: Done) -> str:
 
 
 def _summary(done: Sequence[Done], wall_s: float) -> str:
-    from grader.gradebook.class_files import class_rows, copies
-    from grader.report.model.class_row import RowStatus
-
     rows = class_rows(done)
     scores = [row.score for row in rows if row.score is not None]
     count = Counter(row.status for row in rows)

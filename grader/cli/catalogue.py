@@ -8,11 +8,30 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markdown import Markdown
+from rich.table import Table
 
+from grader.assignment.contract.expand import plain
+from grader.assignment.lint_warnings import lint_warnings
+from grader.assignment.load import load_assignment
+from grader.assignment.own_check import all_checks
+from grader.assignment.schema import assignment_schema, mutants_schema
+from grader.authoring.documentation import check_markdown, explanations_markdown
+from grader.authoring.mutants.standard import every_mutant
 from grader.cli import USAGE
 from grader.cli.screen.console import output_console, print_error, print_warning, say
-from grader.errors import RosgradeError
+from grader.course.load import COURSE_FILE, load_course
+from grader.course.model import CourseFile
+from grader.errors import RosgradeError, UsageError
 from grader.findings.wording import counted
+from grader.grading.type_support import missing_underlays
+from grader.report.concepts import SCRIPT, STYLE, concepts
+from grader.report.files import write_whole
+from grader.report.html.page import render_page
+from grader.report.model.result import result_schema
+from grader.sandbox.python_tree import not_installed
+from grader.spec.document import write_yaml
+from grader.spec.nearest_name import did_you_mean, nearest_or_all
 
 
 class Document(str, Enum):
@@ -40,15 +59,6 @@ def validate(
 
     Shows the file and line of every mistake, and what is allowed there.
     """
-    from grader.assignment.contract.expand import plain
-    from grader.assignment.lint_warnings import lint_warnings
-    from grader.assignment.load import load_assignment
-    from grader.authoring.mutants.standard import every_mutant
-    from grader.course.load import COURSE_FILE, load_course
-    from grader.grading.type_support import missing_underlays
-    from grader.sandbox.python_tree import not_installed
-    from grader.spec.document import write_yaml
-
     if whole:
         for name in files:
             loaded = load_assignment(name)
@@ -87,11 +97,6 @@ def schema(
     document: Annotated[Document, typer.Argument(help="Which schema.")] = Document.ASSIGNMENT,
 ) -> None:
     """Print the JSON Schema of a file, for editors."""
-    from grader.assignment.own_check import all_checks
-    from grader.assignment.schema import assignment_schema, mutants_schema
-    from grader.course.model import CourseFile
-    from grader.report.model.result import result_schema
-
     make = {
         Document.ASSIGNMENT: lambda: assignment_schema(all_checks()),
         Document.MUTANTS: mutants_schema,
@@ -113,14 +118,6 @@ def explain(
     ] = False,
 ) -> None:
     """Explain an idea of ROS, such as QoS. A failed check names the idea to read."""
-    from rich.markdown import Markdown
-
-    from grader.errors import UsageError
-    from grader.report.concepts import SCRIPT, STYLE, concepts
-    from grader.report.files import write_whole
-    from grader.report.html.page import render_page
-    from grader.spec.nearest_name import nearest_or_all
-
     page = concepts().get(name)
     if page is None:
         known = nearest_or_all(name, concepts())
@@ -140,14 +137,6 @@ def checks(
     ] = False,
 ) -> None:
     """List the checks with their parameters, or the explanations."""
-    from rich.markdown import Markdown
-    from rich.table import Table
-
-    from grader.assignment.own_check import all_checks
-    from grader.authoring.documentation import check_markdown, explanations_markdown
-    from grader.errors import UsageError
-    from grader.spec.nearest_name import did_you_mean
-
     console = output_console()
     if explanations:
         console.print(Markdown("\n".join(explanations_markdown().values())))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import typer
+from rich.table import Table
 
 from grader.cli import NOT_GRADED
 from grader.cli.screen.console import output_console
+from grader.grading.prerequisites import diagnose
 
 
 def doctor() -> None:
@@ -14,10 +16,6 @@ def doctor() -> None:
     Starts two real nodes and measures how long discovery takes. Ends with 0 if submissions
     can be graded here, else with 3.
     """
-    from rich.table import Table
-
-    from grader.grading.prerequisites import diagnose
-
     console = output_console()
     table = Table("", "PART", "FOUND", box=None, pad_edge=False)
     usable = True

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from grader.assignment.load import load_assignment
+from grader.authoring import export
+from grader.authoring.course_kit import write_kit
+from grader.batch.ledger import BATCH_FILE
 from grader.cli.options import AssignmentName, ClassFolder, file_option
 from grader.cli.screen.console import print_error, print_warning, say
+from grader.errors import UsageError
 from grader.findings.wording import counted
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
+from grader.gradebook.class_files import find_reports, read_class
+from grader.gradebook.feedback import class_feedback, letters, write_files
+from grader.grading.files import RESULT_FILE
+from grader.report.files import refuse_inputs, refuse_part, write_whole
+from grader.report.formats.canvas_comments import carrier, upload_zip
+from grader.report.formats.gradebook import canvas_csv, grades_csv, read_canvas
+from grader.report.formats.mail import address, mail_csv, write_mbox
 
 Folder = Annotated[Path, typer.Option("--out", help="Folder to write to.")]
 Results = Annotated[Path, typer.Argument(help="Folder with the reports of a class.")]
@@ -28,19 +37,17 @@ Tag = Annotated[
 ]
 
 
-app = typer.Typer(
-    help="Write files for other systems: autograders and gradebooks.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
+app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
+
+
+@app.callback()
+def other_systems() -> None:
+    """Write files for other systems: autograders and gradebooks."""
 
 
 @app.command()
 def gradescope(assignment: AssignmentName, out: Folder = Path()) -> None:
     """Write the autograder zip for Gradescope."""
-    from grader.assignment.load import load_assignment
-    from grader.authoring import export
-
     say(f"Upload to Gradescope: {export.gradescope(load_assignment(assignment), out)}")
 
 
@@ -55,18 +62,12 @@ def github(
     tag: Tag = "",
 ) -> None:
     """Write the workflow for the template repository of an assignment."""
-    from grader.assignment.load import load_assignment
-    from grader.authoring import export
-
     say(f"Commit and push: {export.github(load_assignment(assignment), out, action, tag)}")
 
 
 @app.command()
 def classroom50(assignment: AssignmentName, out: Folder = Path()) -> None:
     """Write the autograder folder for a Classroom 50 classroom."""
-    from grader.assignment.load import load_assignment
-    from grader.authoring import export
-
     folder = export.classroom50(load_assignment(assignment), out)
     say(f"Copy its content to CLASSROOM/autograders/ASSIGNMENT/: {folder}")
 
@@ -85,9 +86,6 @@ def course(
     It holds rosgrade, the assignments without solutions and hidden checks, a set-up command, a
     GitHub workflow, a devcontainer, and a README.
     """
-    from grader.assignment.load import load_assignment
-    from grader.authoring.course_kit import write_kit
-
     kit = write_kit([load_assignment(name) for name in assignments], out, title, tag)
     say(f"Give this folder to your students, for example as a template repository: {kit}")
 
@@ -98,10 +96,6 @@ def csv(out: Results, output: File = Path("grades.csv")) -> None:
 
     For the folder of a batch, it has the columns and the rows of its grades.csv.
     """
-    from grader.gradebook.class_files import read_class
-    from grader.report.files import refuse_inputs, write_whole
-    from grader.report.formats.gradebook import grades_csv
-
     refuse_inputs([output], _read_of(out))
     rows = read_class(out)
     write_whole(output, grades_csv(rows))
@@ -129,11 +123,6 @@ def canvas(
 
     Ends with 1 if a student has no score in it, and says who and why.
     """
-    from grader.errors import UsageError
-    from grader.gradebook.class_files import read_class
-    from grader.report.files import refuse_inputs, write_whole
-    from grader.report.formats.gradebook import canvas_csv, read_canvas
-
     refuse_inputs([output, comments], [canvas, *_read_of(out)])
     try:
         text = canvas.read_text(encoding="utf-8-sig")
@@ -141,8 +130,7 @@ def canvas(
         raise UsageError(f"{canvas}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise UsageError(f"{canvas}: is not UTF-8: give the file as Canvas exported it") from error
-    export = read_canvas(text, str(canvas))
-    filled = canvas_csv(read_class(out), export, column)
+    filled = canvas_csv(read_class(out), read_canvas(text, str(canvas)), column)
     write_whole(output, filled.text)
     say(f"{output}: {len(filled.scored)} scores")
     for doubt in filled.doubts:
@@ -159,10 +147,6 @@ def _write_comments(file: Path, out: Path, scored: Sequence[str]) -> list[str]:
     Returns:
         Who gets none, and why.
     """
-    from grader.gradebook.feedback import class_feedback
-    from grader.report.files import write_whole
-    from grader.report.formats.canvas_comments import carrier, upload_zip
-
     comments, problems = {}, []
     for one in class_feedback(out)[0]:
         if one.entry.key not in scored and not one.result.submission.problem:
@@ -191,11 +175,6 @@ def mail(
     mail.mbox is for a mail program, mail.csv for mail merge. The addresses come from the roster
     with which the class was graded. Ends with 1 if a student gets no message, and says who and why.
     """
-    from grader.errors import UsageError
-    from grader.gradebook.feedback import class_feedback, letters
-    from grader.report.files import refuse_inputs, write_whole
-    from grader.report.formats.mail import address, mail_csv, write_mbox
-
     mbox, table = folder / "mail.mbox", folder / "mail.csv"
     refuse_inputs([mbox, table], _read_of(out))
     own = address(sender) if sender is not None else None
@@ -215,9 +194,6 @@ def feedback(out: ClassFolder, folder: Folder = Path("feedback")) -> None:
 
     Ends with 1 if a student gets none, and says who and why.
     """
-    from grader.gradebook.feedback import class_feedback, write_files
-    from grader.report.files import refuse_part
-
     refuse_part(folder, out / "submissions", f"the results in {out}")
     found, problems = class_feedback(out)
     for one in found:
@@ -234,8 +210,4 @@ def _end(problems: Sequence[str]) -> None:
 
 
 def _read_of(out: Path) -> list[Path]:
-    from grader.batch.ledger import BATCH_FILE
-    from grader.gradebook.class_files import find_reports
-    from grader.grading.files import RESULT_FILE
-
     return [out / BATCH_FILE, *(folder / RESULT_FILE for folder in find_reports(out))]

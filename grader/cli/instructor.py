@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from grader.batch.ledger import Ledger
+from grader.batch.used_assignment import load_used
 from grader.cli.options import ClassFolder, Quiet, UsedAssignment
 from grader.cli.screen.console import say
 from grader.cli.screen.progress import Progress
+from grader.findings.wording import counted
+from grader.gradebook.instructor import write_questions, write_similarity
 
 
 def similar(out: ClassFolder, assignment: UsedAssignment = None) -> None:
@@ -12,11 +16,6 @@ def similar(out: ClassFolder, assignment: UsedAssignment = None) -> None:
 
     Finds copies that were renamed, reordered and reformatted. The page is for the instructor only.
     """
-    from grader.batch.ledger import Ledger
-    from grader.batch.used_assignment import load_used
-    from grader.findings.wording import counted
-    from grader.gradebook.instructor import write_similarity
-
     ledger = Ledger(out)
     file, found = write_similarity(load_used(ledger, assignment, "similar"), ledger)
     say(f"{counted(found, 'pair')} of submissions that are alike: {file}")
@@ -27,11 +26,6 @@ def questions(out: ClassFolder, assignment: UsedAssignment = None, quiet: Quiet 
 
     They are made by rules from the recordings and the source. The page is for the instructor only.
     """
-    from grader.batch.ledger import Ledger
-    from grader.batch.used_assignment import load_used
-    from grader.findings.wording import counted
-    from grader.gradebook.instructor import write_questions
-
     ledger = Ledger(out)
     loaded = load_used(ledger, assignment, "questions")
     with Progress(quiet).shown() as progress:

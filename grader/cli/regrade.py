@@ -5,17 +5,26 @@ from __future__ import annotations
 import time
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from grader.assignment.load import load_assignment
+from grader.batch.ledger import Ledger
+from grader.batch.used_assignment import load_used
 from grader.cli import NOT_GRADED
 from grader.cli.options import Quiet, UsedAssignment, exit_code
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
-
-if TYPE_CHECKING:
-    from grader.batch.ledger import Ledger
+from grader.gradebook.class_files import GRADES_FILE, class_rows
+from grader.gradebook.class_regrading import regrade_class, write_regraded
+from grader.grading.attempts import with_history
+from grader.grading.files import REPORT_FILE, write_graded
+from grader.grading.regrading import compare, find_recordings, refuse_other, stored_assignment
+from grader.grading.regrading import regrade as judge_again
+from grader.report.model.facts import Clock, RunFacts
+from grader.report.model.result import make_result
+from grader.report.text.terminal import print_grade
 
 NOTHING_WRITTEN = "Nothing was written (--dry-run)."
 
@@ -40,8 +49,6 @@ def regrade(
     submission of a class, the whole class is judged. Then the gradebook and the overview are
     updated too, and the old results are kept.
     """
-    from grader.batch.ledger import Ledger
-
     batch = Ledger.around(path) if path.is_dir() else None
     if batch is not None:
         _class(batch, assignment, quiet, write=not dry_run)
@@ -50,15 +57,6 @@ def regrade(
 
 
 def _one(path: Path, assignment: str | None, *, write: bool) -> None:
-    from grader.assignment.load import load_assignment
-    from grader.grading.attempts import with_history
-    from grader.grading.files import REPORT_FILE, write_graded
-    from grader.grading.regrading import compare, find_recordings, refuse_other, stored_assignment
-    from grader.grading.regrading import regrade as judge_again
-    from grader.report.model.facts import Clock, RunFacts
-    from grader.report.model.result import make_result
-    from grader.report.text.terminal import print_grade
-
     found = find_recordings(path)
     words = ("regrade", str(path))
     loaded = load_assignment(
@@ -86,10 +84,6 @@ def _one(path: Path, assignment: str | None, *, write: bool) -> None:
 
 
 def _class(batch: Ledger, assignment: str | None, quiet: bool, *, write: bool) -> None:
-    from grader.batch.used_assignment import load_used
-    from grader.gradebook.class_files import GRADES_FILE, class_rows
-    from grader.gradebook.class_regrading import regrade_class, write_regraded
-
     began_s = time.monotonic()
     rows = []
     with batch.opened() as ledger:

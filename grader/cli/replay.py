@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from grader.assignment.load import load_assignment
 from grader.cli.options import Quiet, recording_argument
 from grader.cli.screen.progress import Progress
+from grader.errors import UsageError
+from grader.grade.judging import why_not_run
+from grader.grade.naming import with_chosen_names
+from grader.grading.regrading import find_recordings, stored_assignment
+from grader.grading.type_support import TypeSupport
+from grader.machine import ros
 from grader.machine.resources import cache_folder
+from grader.recording.mcap_reader import read_recording
+from grader.run.replay import replay as replay_recording
+from grader.run.replay import replay_scenario
+from grader.run.runner import RunRequest
+from grader.submission.intake.locate import check_path
+from grader.submission.prepare import Preparation, prepare
 
 
 def replay(
@@ -34,22 +48,6 @@ def replay(
 
     Ends with 0 when all messages were sent, 1 when the node ended early or never subscribed.
     """
-    from dataclasses import replace
-
-    from grader.assignment.load import load_assignment
-    from grader.errors import UsageError
-    from grader.grade.judging import why_not_run
-    from grader.grade.naming import with_chosen_names
-    from grader.grading.regrading import find_recordings, stored_assignment
-    from grader.grading.type_support import TypeSupport
-    from grader.machine import ros
-    from grader.recording.mcap_reader import read_recording
-    from grader.run.replay import replay as replay_recording
-    from grader.run.replay import replay_scenario
-    from grader.run.runner import RunRequest
-    from grader.submission.intake.locate import check_path
-    from grader.submission.prepare import Preparation, prepare
-
     recorded = read_recording(recording)
     found = find_recordings(recording)
     words = ("replay", str(recording), str(submission))

@@ -7,9 +7,18 @@ from typing import Annotated
 
 import typer
 
+from grader.batch.groups import regroup
+from grader.batch.ledger import Ledger
 from grader.cli.formats import Formats, with_formats
 from grader.cli.options import UsedAssignment
 from grader.cli.screen.console import print_warning, say
+from grader.errors import UsageError
+from grader.gradebook.adjusting import ClassAdjustments, course_of
+from grader.gradebook.class_files import all_standing, find_reports, write_class
+from grader.gradebook.class_regrading import bring_up_to_date, render_again
+from grader.grading.files import REPORT_FILE, RESULT_FILE
+from grader.grading.graded import RECORDINGS_FOLDER
+from grader.report.files import refuse_inputs
 
 
 @with_formats
@@ -24,16 +33,6 @@ def report(
     The options of the formats work for one report. For a class, this writes every report, the
     gradebook and the overview, with everything that you wrote in `rosgrade review`.
     """
-    from grader.batch.groups import regroup
-    from grader.batch.ledger import Ledger
-    from grader.errors import UsageError
-    from grader.gradebook.adjusting import ClassAdjustments, course_of
-    from grader.gradebook.class_files import all_standing, find_reports, write_class
-    from grader.gradebook.class_regrading import bring_up_to_date, render_again
-    from grader.grading.files import REPORT_FILE, RESULT_FILE
-    from grader.grading.graded import RECORDINGS_FOLDER
-    from grader.report.files import refuse_inputs
-
     ledger = Ledger.around(out)
     rules = course_of(ledger.out, None, ledger.read().assignment) if ledger is not None else None
     if ledger is not None and rules is not None:

@@ -12,6 +12,7 @@ import typer
 
 from grader.cli.options import ClassFolder, Port
 from grader.cli.screen.console import open_page, say
+from grader.server.review import ReviewServer
 
 
 def review(
@@ -28,8 +29,6 @@ def review(
     Shows reports with the source beside them, comments, points by a person, and failures with the
     same cause. It saves what you write in OUT/review/. Only this machine can open the page.
     """
-    from grader.server.review import ReviewServer
-
     initials = by or _initials()
     server = ReviewServer(out, initials, port)
     say(f"Review of {out} by {initials}: {server.url}")

@@ -4,22 +4,40 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
 
+from grader.assignment.load import LoadedAssignment, list_assignments, load_assignment
+from grader.assignment.mutant import CPP, PYTHON, reference_of
+from grader.authoring.mutants.selftest import (
+    Role,
+    Setup,
+    Trial,
+    TrialResult,
+    mutation_score,
+    trials,
+)
+from grader.authoring.mutants.selftest import selftest as run_selftest
 from grader.cli.options import Quiet, SandboxChoice, chosen_sandbox
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
+from grader.errors import UsageError
+from grader.grading.graded import Graded
+from grader.grading.grading import Grading
+from grader.grading.reference_run import keep_reference
+from grader.machine import ros
+from grader.machine.load import cpu_count
 from grader.machine.resources import cache_folder
+from grader.report.files import refuse_part
+from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from grader.assignment.load import LoadedAssignment
-    from grader.authoring.mutants.selftest import TrialResult
-    from grader.grading.graded import Graded
+from grader.spec.nearest_name import nearest_or_all
+from grader.submission.underlay.definition import find_underlay
+from grader.submission.underlay.store import UnderlayStore
 
 
 def selftest(
@@ -56,21 +74,6 @@ def selftest(
     checks that it names. The unchanged starter package must get at most 15 % of the points. Ends
     with 0 only if all of this is true.
     """
-    from grader.assignment.load import list_assignments, load_assignment
-    from grader.assignment.mutant import CPP, PYTHON, reference_of
-    from grader.authoring.mutants.selftest import Role, Setup, Trial, mutation_score, trials
-    from grader.authoring.mutants.selftest import selftest as run_selftest
-    from grader.errors import UsageError
-    from grader.grading.grading import Grading
-    from grader.grading.reference_run import keep_reference
-    from grader.machine import ros
-    from grader.machine.load import cpu_count
-    from grader.report.files import refuse_part
-    from grader.run.runner import Runner
-    from grader.spec.nearest_name import nearest_or_all
-    from grader.submission.underlay.definition import find_underlay
-    from grader.submission.underlay.store import UnderlayStore
-
     if cpp and record:
         raise UsageError(
             "--record keeps the recordings of the reference in Python: leave out --cpp"
@@ -130,9 +133,6 @@ def selftest(
 
 
 def _print(console: Console, assignment: str, results: list[TrialResult]) -> None:
-    from rich.markup import escape
-    from rich.table import Table
-
     table = Table("", assignment, "WHAT", "LOST", box=None, pad_edge=False)
     order = ("reference", "variant", "mutant", "starter")
     for result in sorted(results, key=lambda r: (order.index(r.trial.role.value), r.trial.id)):

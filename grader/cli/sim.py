@@ -7,6 +7,9 @@ from typing import Annotated
 
 import typer
 
+from sim.live import described, run
+from sim.simulation import make_simulation
+
 
 def sim(
     world: Annotated[Path, typer.Argument(help="World file (YAML).")],
@@ -31,8 +34,5 @@ def sim(
     Runs in real time. The robot subscribes to /cmd_vel and publishes /odom and /scan, like a
     TurtleBot3 in Gazebo.
     """
-    from sim.live import described, run
-    from sim.simulation import make_simulation
-
     simulation = make_simulation(*described(world, values or (), options, robot, pose), seed)
     run(simulation, domain_id=domain_id, duration=duration)

@@ -8,9 +8,14 @@ from typing import Annotated
 
 import typer
 
+from grader.assignment.selection import with_values
+from grader.authoring.scaffold import write_assignment
+from grader.authoring.starter import write_starter
 from grader.cli.options import AssignmentName, Chosen, chosen_names
 from grader.cli.screen.console import print_warning, say
 from grader.errors import GraderFault
+from grader.grading.prerequisites import remedy_for_cpp
+from grader.machine import ros
 
 
 def start(
@@ -28,11 +33,6 @@ def start(
 
     You write what it does. Existing files are never overwritten.
     """
-    from grader.assignment.selection import with_values
-    from grader.authoring.starter import write_starter
-    from grader.grading.prerequisites import remedy_for_cpp
-    from grader.machine import ros
-
     if cpp:
         try:
             remedy = remedy_for_cpp(ros.find())
@@ -76,8 +76,6 @@ def new(
     mistakes that must lose points. Change it step by step. Existing files are never
     overwritten.
     """
-    from grader.authoring.scaffold import write_assignment
-
     # A name alone is its own last part, and leaves the folder as it is.
     place = folder / name
     written = write_assignment(place.name or name, place.parent, cpp=cpp)

@@ -8,18 +8,28 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.table import Table
 
+from grader.assignment.load import load_assignment
 from grader.cli.options import Quiet, SandboxChoice, chosen_sandbox
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
 from grader.errors import UsageError
+from grader.grading.type_support import wanted_underlays
+from grader.machine import ros
 from grader.machine.resources import cache_folder
 from grader.sandbox.choice import Choice
+from grader.spec.nearest_name import nearest_or_all
+from grader.submission.underlay.definition import find_underlay, named_sets
+from grader.submission.underlay.ros2_command import write_command
+from grader.submission.underlay.store import UnderlayStore
 
-app = typer.Typer(
-    no_args_is_help=True,
-    help="Add what the ROS installation lacks: the command `ros2`, launch files, tf2, rclcpp.",
-)
+app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
+
+
+@app.callback()
+def underlay() -> None:
+    """Add what the ROS installation lacks: the command `ros2`, launch files, tf2, rclcpp."""
 
 
 @app.command()
@@ -51,13 +61,6 @@ def add(
     Every submission of an assignment that names them in `underlays` can use them. A package that
     ROS already has is not built. After an interruption, the command continues where it stopped.
     """
-    from grader.assignment.load import load_assignment
-    from grader.grading.type_support import wanted_underlays
-    from grader.machine import ros
-    from grader.submission.underlay.definition import find_underlay
-    from grader.submission.underlay.ros2_command import write_command
-    from grader.submission.underlay.store import UnderlayStore
-
     found = [find_underlay(given) for given in what or ()]
     if assignment is not None:
         found += wanted_underlays(load_assignment(assignment), submission)
@@ -78,12 +81,6 @@ def add(
 @app.command("list")
 def list_command() -> None:
     """List the named sets, and what is built for this ROS installation."""
-    from rich.table import Table
-
-    from grader.machine import ros
-    from grader.submission.underlay.definition import find_underlay, named_sets
-    from grader.submission.underlay.store import UnderlayStore
-
     store = UnderlayStore(cache_folder(), ros.find())
     kept = [one for one, _ in store.installed()]
     names = Counter(one.name for one in kept)
@@ -108,11 +105,6 @@ def remove(
     names: Annotated[list[str], typer.Argument(metavar="NAME", help="As `list` shows it.")],
 ) -> None:
     """Remove underlays from this machine; their sources stay."""
-    from grader.machine import ros
-    from grader.spec.nearest_name import nearest_or_all
-    from grader.submission.underlay.ros2_command import write_command
-    from grader.submission.underlay.store import UnderlayStore
-
     installation = ros.find()
     store = UnderlayStore(cache_folder(), installation)
     for name in names:

@@ -3,34 +3,44 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
+from rich.console import Console
 
+from grader.assignment.load import LoadedAssignment
 from grader.cli import options
 from grader.cli.screen.console import open_page, output_console, print_error, say
 from grader.cli.screen.progress import Progress, syntax_errors
+from grader.errors import RosgradeError
+from grader.findings.finding import Status
+from grader.grade.early import judge_early
+from grader.grading.attempts import with_history
+from grader.grading.files import claim, write_graded
+from grader.grading.graded import Graded
+from grader.grading.grading import Grading, Told
+from grader.grading.spine import HandedIn, grade
+from grader.grading.watching import Ended, Step, Watching
+from grader.machine import ros
 from grader.machine.resources import cache_folder
+from grader.recording.model import Recording
+from grader.recording.submission import SubmissionRecord
+from grader.report.files import check_folder, refuse_inputs
+from grader.report.model.facts import Clock
+from grader.report.model.result_model import Result
+from grader.report.text.explanation import score
+from grader.report.text.last_save import early_line, failed_scenarios, what_changed
+from grader.report.text.terminal import print_changes, print_grade
+from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from rich.console import Console
-
-    from grader.assignment.load import LoadedAssignment
-    from grader.errors import RosgradeError
-    from grader.grading.graded import Graded
-    from grader.grading.grading import Grading
-    from grader.recording.model import Recording
-    from grader.recording.submission import SubmissionRecord
-    from grader.report.model.result_model import Result
-    from grader.run.runner import Runner
-    from grader.server.watch import ReportPage
+from grader.server.watch import ReportPage
+from grader.submission.intake.locate import check_path
+from grader.submission.kept_source import SOURCE_FOLDER, read_source
 
 
 def watch(
@@ -58,13 +68,6 @@ def watch(
     changed since the last grade. The report page updates itself. A save during a run starts the run
     again. The files of the assignment are watched too.
     """
-    from grader.grading.files import claim
-    from grader.machine import ros
-    from grader.report.files import check_folder, refuse_inputs
-    from grader.run.runner import Runner
-    from grader.server.watch import ReportPage
-    from grader.submission.intake.locate import check_path
-
     load = partial(options.graded_part, assignment, chosen, only, scenario, hidden=hidden)
     report = options.report_folder(report, assignment)
     outputs = [report, report / "report.html"]
@@ -112,10 +115,6 @@ class _Work:
     before: Result | None = None
 
     def begin(self) -> None:
-        from grader.errors import RosgradeError
-        from grader.grading.grading import Grading, Told
-        from grader.report.text.last_save import failed_scenarios
-
         self.runner.get_ready()
         try:
             self.loaded, self.problem = self.load(), None
@@ -132,8 +131,6 @@ class _Work:
         )
 
     def grade(self) -> Graded:
-        from grader.grading.spine import HandedIn, grade
-
         assert self.grading is not None
         if self.problem is not None:
             raise self.problem
@@ -142,10 +139,6 @@ class _Work:
 
     def tell_early(self, record: SubmissionRecord, recordings: Mapping[str, Recording]) -> None:
         """Tell what is certain already: lines that Python cannot read, and what failed last."""
-        from grader.findings.finding import Status
-        from grader.grade.early import judge_early
-        from grader.report.text.last_save import early_line
-
         known = syntax_errors(record, self.submission)
         if (
             record.build
@@ -162,8 +155,6 @@ class _Work:
 
     def amended(self, result: Result) -> Result:
         """A result with earlier attempts, and hints that are counted if the author wants it."""
-        from grader.grading.attempts import with_history
-
         result = with_history(self.report, result)
         counts = (result.hints_opened or {}) if self.loaded.assignment.count_hints else None
         return result.model_copy(update={"hints_opened": counts})
@@ -177,14 +168,6 @@ class _Work:
 
 
 def _follow(work: _Work, page: ReportPage, console: Console) -> None:
-    from grader.grading.files import write_graded
-    from grader.grading.watching import Ended, Step, Watching
-    from grader.report.model.facts import Clock
-    from grader.report.text.explanation import score
-    from grader.report.text.last_save import what_changed
-    from grader.report.text.terminal import print_changes, print_grade
-    from grader.submission.kept_source import SOURCE_FOLDER, read_source
-
     clock = Clock()
     with ExitStack() as shown:
         watching = Watching(work.submission, work.report, work, work.loaded.folder)

@@ -41,7 +41,8 @@ def test_named_commands_and_options_exist(page: str) -> None:
         command: Any = typer.main.get_command(app)
         while hasattr(command, "commands") and words and not words[0].startswith("-"):
             assert words[0] in command.commands, line
-            command = command.commands[words.pop(0)]
+            context = command.make_context("rosgrade", [], resilient_parsing=True)
+            _, command, words = command.resolve_command(context, words)
         known = {option for parameter in command.params for option in parameter.opts}
         asked = {word.partition("=")[0] for word in words if re.match(r"--?[a-z]", word)}
         assert asked <= known | {"-h", "--help"}, line
