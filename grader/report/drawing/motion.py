@@ -13,17 +13,7 @@ from markupsafe import Markup
 from grader.measure.motion.track import REST_M_S, REST_RAD_S
 from grader.recording.model import Recording
 from grader.recording.simulated import Truth
-from grader.report.drawing import svg
-from grader.report.drawing.axes import (
-    LEFT,
-    RIGHT,
-    TIME_AXIS,
-    Bar,
-    Scale,
-    time_axis,
-    unit_of,
-    value_axis,
-)
+from grader.report.drawing import axes, svg
 
 STRIP, PANEL, BETWEEN = 18, 110, 34
 STRIDE = 4
@@ -54,12 +44,12 @@ def draw_motion(recording: Recording, name: str) -> svg.Figure | None:
     )
 
     def draw(width: float) -> tuple[float, list[Markup]]:
-        x = Scale(0.0, max(times_s[-1], 0.1), LEFT, width - RIGHT)
+        x = axes.Scale(0.0, max(times_s[-1], 0.1), axes.LEFT, width - axes.RIGHT)
         content, bottom = _strip(found, x), float(STRIP)
         for speed in speeds:
             content += _panel(speed, x.all_clipped(times_s), x.end, bottom + BETWEEN)
             bottom += BETWEEN + PANEL
-        return bottom + TIME_AXIS, [*content, *time_axis(x, bottom, width)]
+        return bottom + axes.TIME_AXIS, [*content, *axes.time_axis(x, bottom, width)]
 
     caption = (
         "Solid: the true speed. Dashed: the command that was in force. Dotted: the limit of the "
@@ -72,16 +62,16 @@ def draw_motion(recording: Recording, name: str) -> svg.Figure | None:
     return svg.figure(name, title, caption, draw, f"{caption} The robot {described}.")
 
 
-def phases(recording: Recording) -> list[Bar]:
+def phases(recording: Recording) -> list[axes.Bar]:
     """Divide a run into what the robot did, in words."""
-    found: list[Bar] = []
+    found: list[axes.Bar] = []
     end_s = recording.since_launch_s(recording.truth[0].time_ns)
     for what, group in groupby(recording.truth, key=_what):
         begin_s, end_s = end_s, recording.since_launch_s(list(group)[-1].time_ns)
         if found and (end_s - begin_s < SHORTEST_S or found[-1].kind == what):
             found[-1] = replace(found[-1], end_s=end_s)
         else:
-            found.append(Bar(begin_s, end_s, what))
+            found.append(axes.Bar(begin_s, end_s, what))
     return found
 
 
@@ -92,7 +82,7 @@ def _what(step: Truth) -> str:
     return "drives" if drives else "turns" if turns else "rests"
 
 
-def _strip(found: Sequence[Bar], x: Scale) -> list[Markup]:
+def _strip(found: Sequence[axes.Bar], x: axes.Scale) -> list[Markup]:
     drawn = []
     for phase in found:
         begin, end = x.clipped(phase.begin_s), x.clipped(phase.end_s)
@@ -122,16 +112,16 @@ def _panel(speed: _Speed, at: Sequence[float], end: float, top: float) -> list[M
     limits = [sign * most for sign, reach in reached if reach > 0.5 * most]
     low, high = min([low, *limits]), max([high, *limits])
     room = 0.08 * (high - low) or 0.05 * most or 0.05
-    y = Scale(low - room, high + room, top + PANEL, top)
+    y = axes.Scale(low - room, high + room, top + PANEL, top)
     # The labels of limits go over the lines, which run through that of the lower limit.
     labels = [
-        svg.label(f"limit {one:.3g}{unit_of(title)}", end, y(one) - 4, anchor="end")
+        svg.label(f"limit {one:.3g}{axes.unit_of(title)}", end, y(one) - 4, anchor="end")
         for one in limits
     ]
     return [
         svg.label(title, 0, y.end - 8),
-        *value_axis(y, LEFT, end),
-        *(svg.line(LEFT, y(one), end, y(one), "limit") for one in limits),
+        *axes.value_axis(y, axes.LEFT, end),
+        *(svg.line(axes.LEFT, y(one), end, y(one), "limit") for one in limits),
         svg.curve(_steps(at, y.all_clipped(commands)), "command"),
         svg.curve(list(zip(at, y.all_clipped(true), strict=True)), "true"),
         *labels,
