@@ -24,7 +24,7 @@ from grader.grading.regrading import find_recordings, regrade
 from grader.recording.model import to_json
 from grader.report.files import write_whole
 from grader.report.model.facts import Clock
-from grader.report.model.grade_part import grade_json
+from grader.report.model.result import grade_json
 from grader.report.model.result_model import Result
 from grader.review.store import ReviewStore
 from grader.spec.nearest_name import did_you_mean

@@ -14,13 +14,19 @@ import typer
 
 from grader.assignment.load import load_assignment
 from grader.batch.batch import Batch, Done
-from grader.batch.executor import BatchExecutor, DaskExecutor, ExecutorLost, LocalExecutor
+from grader.batch.executor import (
+    BatchExecutor,
+    DaskExecutor,
+    ExecutorLost,
+    LocalExecutor,
+    Order,
+    make_grading,
+)
 from grader.batch.groups import strangers
 from grader.batch.intake import take_in, take_in_roster
 from grader.batch.ledger import Ledger, TakenFrom
 from grader.batch.roster import read_roster
 from grader.batch.used_assignment import in_use, load_used
-from grader.batch.worker import Order, make_grading
 from grader.cli import NOT_GRADED
 from grader.cli.options import Quiet, SandboxChoice, Seed, assignment_argument, assignment_places
 from grader.cli.screen.console import output_console, say

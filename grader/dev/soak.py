@@ -2,7 +2,7 @@
 
 The class is made of references and mutants in random order, in Python and, where rclcpp is there,
 in C++. Each is built while processes load every CPU, in bursts or all the time. Each grade (see
-:mod:`grader.report.model.grade_part`) is compared with the one that the same submission got alone
+:mod:`grader.report.model.result`) is compared with the one that the same submission got alone
 on the machine before.
 """
 
@@ -30,7 +30,7 @@ from grader.machine import ros
 from grader.machine.load import cpu_count
 from grader.machine.resources import cache_folder
 from grader.machine.scratch import Scratch
-from grader.report.model.grade_part import differences
+from grader.report.model.result import differences
 from grader.run.admission import Admission
 from grader.run.runner import Runner
 from grader.sandbox.choice import Choice

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.report.model.grade_part import grade_json
+from grader.report.model.result import grade_json
 from grader.sandbox.sandbox import Sandbox
 from tests.attacks.attack import Attack
 from tests.attacks.test_hostile import ATTACKS, HONEST, grade_class

@@ -25,7 +25,7 @@ from grader.grading.grading import Grading
 from grader.batch.intake import take_in
 from grader.batch.ledger import Ledger
 from grader.findings.finding import Status
-from grader.report.model.grade_part import grade_json
+from grader.report.model.result import grade_json
 from grader.report.model.result import result_json
 from grader.report.model.result_model import Result
 from grader.run.process.descendants import descendants

@@ -15,13 +15,19 @@ import pytest
 
 from grader.assignment.load import load_assignment
 from grader.batch.batch import Batch, Done
-from grader.batch.executor import BatchExecutor, DaskExecutor, ExecutorLost, LocalExecutor
+from grader.batch.executor import (
+    BatchExecutor,
+    DaskExecutor,
+    ExecutorLost,
+    LocalExecutor,
+    Order,
+    make_grading,
+)
 from grader.batch.intake import take_in
 from grader.batch.ledger import Ledger
-from grader.batch.worker import Order, make_grading
 from grader.errors import UsageError
 from grader.machine import resources
-from grader.report.model.grade_part import grade_json
+from grader.report.model.result import grade_json
 from grader.sandbox.choice import Choice
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]

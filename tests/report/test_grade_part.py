@@ -9,7 +9,7 @@ import pytest
 from pydantic import BaseModel
 
 from grader.findings.finding import Evidence
-from grader.report.model.grade_part import GRADE, differences, grade_json
+from grader.report.model.result import GRADE, differences, grade_json
 from grader.report.model.result_model import CheckPart, Result
 from tests.report.sample import lost_points
 

@@ -18,7 +18,7 @@ from grader.recording.model import (
     Qos,
     Recording,
 )
-from grader.report.model.remarks import remarks
+from grader.report.model.result import remarks
 from grader.spec.names import Names, Thing, WrongName
 from tests.grade.sample import make_recording
 

@@ -35,8 +35,7 @@ from grader.grading.grading import Grading
 from grader.grading.spine import HandedIn, grade
 from grader.machine.scratch import Scratch
 from grader.report.model.facts import RunFacts
-from grader.report.model.grade_part import grade_json
-from grader.report.model.result import make_result
+from grader.report.model.result import grade_json, make_result
 from grader.report.text.words import counted_points, number
 from grader.run.imposing.mistake import Mistake
 from grader.spec.unit import format_duration

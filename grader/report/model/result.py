@@ -1,22 +1,34 @@
-"""``result.json``: the grade for programs. Stable: a change of meaning raises ``schema``."""
+"""``result.json``: the grade for programs. Stable: a change of meaning raises ``schema``.
+
+The same submission graded again, on a busier machine or beside other submissions, gets the same
+grade, byte for byte. Times, paths, logs, observed figures and the evidence that holds
+them are measurements: they are never twice the same.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from bisect import bisect_left
+from collections.abc import Iterator, Mapping
+from difflib import unified_diff
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
+from grader.checks.topic.topic import PROBE, Untouched
 from grader.errors import UsageError
 from grader.findings.finding import Status
+from grader.findings.wording import code, codes, counted
 from grader.grade.model import CheckResult, Grade, ScenarioFinding
-from grader.recording.model import NS, Recording
+from grader.measure.transforms import TRANSFORMS
+from grader.recording.model import NS, Kind, Owner, Recording
 from grader.report.model import result_model as model
 from grader.report.model.facts import RunFacts
 from grader.report.model.mistakes import first_to_fix
-from grader.report.model.remarks import remarks
 from grader.report.model.result_model import SCHEMA, Result
+
+_FLOOD = 1000
+"""Messages within a second on one topic; the fastest sensors send fewer."""
 
 
 def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFacts) -> Result:
@@ -132,3 +144,108 @@ def _scenario(recording: Recording, facts: RunFacts) -> model.ScenarioPart:
         remarks=remarks(recording),
         runs=facts.runs.get(name, 1),
     )
+
+
+def remarks(recording: Recording) -> tuple[str, ...]:
+    """Say what is conspicuous about a run, one sentence each.
+
+    A limit of the sandbox that was reached is reported elsewhere (``Recording.breaches``).
+    """
+    names = f"so that everything else could be judged: {codes(map(str, recording.names.wrong))}"
+    renamed = (f"this run corrected wrong names, {names}",) if recording.names else ()
+    return (*renamed, *_posing(recording), *_excess(recording), *_tricks(recording))
+
+
+def _posing(recording: Recording) -> Iterator[str]:
+    """Names of the probe and topics of the robot, unless the assignment asks for them."""
+    for node in recording.student_nodes:
+        if node.name.rpartition("/")[2] == PROBE:
+            name = code(node.name)
+            yield f"a node of the submission is called {name}, like the node that watches the run"
+    heard = [e for e in recording.endpoints if e.owner is Owner.PROBE]
+    # A robot is not the only one to publish transforms.
+    wanted = {e.topic for e in heard if recording.scene is None or e.type == TRANSFORMS}
+    taken: dict[str, set[str]] = {}
+    for endpoint in recording.student_endpoints(Kind.PUBLISHER):
+        if endpoint.topic in set(Untouched().topics) - wanted:
+            taken.setdefault(endpoint.node, set()).add(endpoint.topic)
+    for node_name, topics in sorted(taken.items()):
+        yield f"the node {code(node_name)} publishes on {codes(sorted(topics))}, which robots do"
+
+
+def _excess(recording: Recording) -> Iterator[str]:
+    """Another domain, and more messages or output than a robot needs."""
+    others = recording.environment.get("other_domains")
+    if others:
+        yield f"the submission joined another ROS domain: {others}"
+    for topic, messages in recording.messages.items():
+        times = [message.stamp_ns for message in messages]
+        numbers = [*range(len(messages))]
+        if len(recording.student_endpoints(Kind.PUBLISHER, topic)) == 1:
+            # A publisher numbers its messages: of a flood most are lost on the way.
+            numbers = [message.sequence for message in messages]
+        lasts = (bisect_left(times, time + NS) - 1 for time in times)
+        most = max((numbers[last] - numbers[i] + 1 for i, last in enumerate(lasts)), default=0)
+        if most > _FLOOD:
+            yield f"{most} messages were sent on {code(topic)} within 1 s"
+    for process in recording.processes:
+        if process.dropped_bytes:
+            left_out = counted(process.dropped_bytes, "byte")
+            yield f"{code(process.name)} printed {left_out} more than rosgrade keeps"
+
+
+def _tricks(recording: Recording) -> Iterator[str]:
+    if not any(breach.what == "forged report" for breach in recording.breaches):
+        for process in dict.fromkeys(item.process for item in recording.declared("foreign")):
+            yield (
+                f"{code(process)} wrote into the channel through which rosgrade reports from "
+                "inside a process; such a report is never proof"
+            )
+    # Such libraries are perhaps missing where a class is graded.
+    modules = recording.environment.get("unlisted", "").split()
+    if modules:
+        has_none = recording.environment.get("sandbox", "none") == "none"
+        here = "without a sandbox" if has_none else "in the system's Python, as ROS is sourced"
+        yield (
+            f"the code imports {codes(modules)}, found {here}: elsewhere, Python has only "
+            "the standard library, ROS 2, `numpy`, and what the assignment allows"
+        )
+
+
+_FINDING = frozenset({"scenario", "status", "expected", "hint", "concept"})
+_CHECK = _FINDING | {
+    "id",
+    "title",
+    "points",
+    "max_points",
+    "visibility",
+    "author_hint",
+    "further_hints",
+    "waits_for",
+}
+GRADE: dict[str, Any] = {
+    "assignment": {"id", "sha256"},
+    # Its name is not among it: the same submission of another student gets the same grade.
+    "submission": {"sha256", "problem"},
+    "score": True,
+    "max_score": True,
+    "graded": True,
+    "first_to_fix": True,
+    "checks": {
+        "__all__": {**dict.fromkeys(_CHECK, True), "other_scenarios": {"__all__": set(_FINDING)}}
+    },
+    "withheld": True,
+    "scenarios": {"__all__": {"id", "seed"}},
+    "build": {"succeeded", "failed_packages"},
+}
+"""What of the model :class:`Result` is the grade, as pydantic's ``include``."""
+
+
+def grade_json(result: Result) -> str:
+    """The grade of a result as JSON; keys are always in the same order."""
+    return result.model_dump_json(by_alias=True, include=GRADE, indent=2) + "\n"
+
+
+def differences(one: str, other: str) -> list[str]:
+    """The lines that differ between two grades, with the lines around them."""
+    return list(unified_diff(one.splitlines(), other.splitlines(), lineterm=""))
