@@ -9,22 +9,21 @@ from __future__ import annotations
 import os
 import re
 import secrets
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, make_dataclass
 from datetime import datetime, timezone
 from enum import Enum
-from functools import wraps
 from importlib import import_module
-from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from grader.cli.options import file_option
 from grader.errors import GraderFault
 from grader.report import formats
+from grader.report.files import write_whole
 
 if TYPE_CHECKING:
     from grader.report.model.result_model import Result
@@ -58,42 +57,21 @@ def file_formats() -> dict[str, str]:
     }
 
 
-def with_formats(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of the formats, in place of its parameter ``formats``."""
-
-    @wraps(command)
-    def wrapped(**given: Any) -> None:
-        files = {name: given.pop(name) for name in to_file}
-        others = {name: given.pop(name) for name in others_of_kind}
-        files = {name: file for name, file in files.items() if file}
-        command(**given, formats=kind(files=files, **others))
-
-    hints = get_type_hints(command, include_extras=True)
-    kind = hints.pop("formats")
-    to_file = {
-        name: Annotated[Path | None, file_option(f"--{name}", text=text)]
-        for name, text in file_formats().items()
-    }
-    others_of_kind = {one.name: one.default for one in fields(kind)[1:]}
-    options = {**dict.fromkeys(to_file), **others_of_kind}
-    hints = {**hints, **get_type_hints(kind, include_extras=True), **to_file}
-    defaults: dict[str, Any] = {}
-    for name, parameter in signature(command).parameters.items():
-        defaults |= options if name == "formats" else {name: parameter.default}
-    parameters = [
-        Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=hints[name])
-        for name, default in defaults.items()
-    ]
-    wrapped.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
-    wrapped.__annotations__ = {name: hints[name] for name in defaults}
-    return wrapped
+_FILES = file_formats()
+_Files: Any = make_dataclass(
+    "_Files",
+    [
+        (name, Annotated[Path | None, file_option(f"--{name}", text=text)], None)
+        for name, text in _FILES.items()
+    ],
+    frozen=True,
+)
 
 
 @dataclass(frozen=True)
-class Formats:
-    """What to write, and to which files; every other field is an option of the command."""
+class Formats(_Files):  # type: ignore[misc]
+    """What to write, and for each of the formats to which file."""
 
-    files: Mapping[str, Path] = field(default_factory=dict)
     junit_family: Annotated[
         JunitFamily,
         typer.Option(
@@ -109,6 +87,12 @@ class Formats:
     ] = False
     classroom50 = False
 
+    @property
+    def files(self) -> dict[str, Path]:
+        """Format -> file, of those that were asked for."""
+        wanted = {name: getattr(self, name) for name in _FILES}
+        return {name: file for name, file in wanted.items() if file}
+
     @contextmanager
     def grading(self) -> Iterator[None]:
         """A context in which GitHub Actions obeys no command in what a student's code prints."""
@@ -118,7 +102,6 @@ class Formats:
 
             classroom50.identity(os.environ)
         if "gradescope" in self.files:
-            from grader.report.files import write_whole
             from grader.report.formats import gradescope
 
             write_whole(self.files["gradescope"], gradescope.unfinished())
@@ -134,8 +117,6 @@ class Formats:
 
     def write(self, result: Result, submission: Path | None = None) -> None:
         """Write everything that was asked for."""
-        from grader.report.files import write_whole
-
         own: dict[str, dict[str, Any]] = {
             "junit": {"xunit1": self.junit_family is JunitFamily.XUNIT1},
             "gradescope": {"metadata": self.gradescope_metadata},
@@ -198,7 +179,6 @@ def _append(file: Path, text: str) -> None:
 
 
 def _write_classroom50(result: Result, folder: Path) -> None:
-    from grader.report.files import write_whole
     from grader.report.formats import classroom50
 
     who = {**classroom50.identity(os.environ), "datetime": _committed(folder)}

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
@@ -78,20 +81,9 @@ ReportFolder = Annotated[
         "rosgrade-report/ASSIGNMENT."
     ),
 ]
-Scenarios = Annotated[
-    list[str] | None, typer.Option(metavar="ID", help="Run only this scenario; may be repeated.")
-]
-Checks = Annotated[
-    list[str] | None,
-    typer.Option(metavar="ID", help="Judge only this check and what it requires; may be repeated."),
-]
 Seed = Annotated[
     int | None,
     typer.Option(metavar="N", help="Seed of random values; by default made from the submission."),
-]
-Hidden = Annotated[
-    bool,
-    typer.Option("--hidden", help="Also run and show hidden checks: for instructors."),
 ]
 Chosen = Annotated[
     list[str] | None,
@@ -131,20 +123,61 @@ def file_option(*names: str, text: str) -> Any:
     return typer.Option(*names, metavar="FILE", help=text, callback=read)
 
 
-def graded_part(
-    assignment: str,
-    chosen: list[str] | None,
-    only: list[str] | None,
-    scenario: list[str] | None,
-    *,
-    hidden: bool,
-) -> LoadedAssignment:
-    """What of an assignment is graded, as the options choose it."""
-    from grader.assignment.selection import select, visible_part
+@dataclass(frozen=True)
+class Part:
+    """Which part of an assignment is graded, and with which values."""
 
-    whole = chosen_names(assignment, chosen)
-    shown = whole if hidden else visible_part(whole)
-    return select(shown, tuple(only or ()), tuple(scenario or ()))
+    scenario: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ID", help="Run only this scenario; may be repeated."),
+    ] = None
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ID", help="Judge only this check and what it requires; may be repeated."
+        ),
+    ] = None
+    seed: Seed = None
+    chosen: Chosen = None
+    hidden: Annotated[
+        bool,
+        typer.Option("--hidden", help="Also run and show hidden checks: for instructors."),
+    ] = False
+
+    def of(self, assignment: str) -> LoadedAssignment:
+        """This part of an assignment."""
+        from grader.assignment.selection import select, visible_part
+
+        whole = chosen_names(assignment, self.chosen)
+        shown = whole if self.hidden else visible_part(whole)
+        return select(shown, tuple(self.only or ()), tuple(self.scenario or ()))
+
+
+def expanded(command: Callable[..., None]) -> Callable[..., None]:
+    """Let a parameter of a command that is a dataclass stand for an option for each field."""
+
+    @wraps(command)
+    def wrapped(**given: Any) -> None:
+        for name, kind in kinds.items():
+            given[name] = kind(**{one.name: given.pop(one.name) for one in fields(kind)})
+        command(**given)
+
+    hints = get_type_hints(command, include_extras=True)
+    kinds: dict[str, Any] = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
+    defaults: dict[str, Any] = {}
+    for name, parameter in signature(command).parameters.items():
+        if name in kinds:
+            hints |= get_type_hints(kinds[name], include_extras=True)
+            defaults |= {one.name: one.default for one in fields(kinds[name])}
+        else:
+            defaults[name] = parameter.default
+    parameters = [
+        Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=hints[name])
+        for name, default in defaults.items()
+    ]
+    wrapped.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    wrapped.__annotations__ = {name: hints[name] for name in defaults}
+    return wrapped
 
 
 def exit_code(grade: Grade) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -43,17 +43,15 @@ from grader.submission.intake.locate import check_path
 from grader.submission.kept_source import SOURCE_FOLDER, read_source
 
 
+@options.expanded
 def watch(
     assignment: options.AssignmentName,
     submission: Annotated[
         Path, typer.Argument(help="Your package, workspace, or its src.")
     ] = Path(),
+    *,
     report: options.ReportFolder = None,
-    scenario: options.Scenarios = None,
-    only: options.Checks = None,
-    seed: options.Seed = None,
-    chosen: options.Chosen = None,
-    hidden: options.Hidden = False,
+    part: options.Part,
     sandbox: options.SandboxChoice = Choice.AUTO,
     port: options.Port = 0,
     quiet: options.Quiet = False,
@@ -68,11 +66,10 @@ def watch(
     changed since the last grade. The report page updates itself. A save during a run starts the run
     again. The files of the assignment are watched too.
     """
-    load = partial(options.graded_part, assignment, chosen, only, scenario, hidden=hidden)
     report = options.report_folder(report, assignment)
     outputs = [report, report / "report.html"]
     refuse_inputs(outputs, [*options.assignment_places(assignment), submission])
-    loaded = load()
+    loaded = part.of(assignment)
     check_path(submission)
     check_folder(report)
     claim(report, keep=False)
@@ -80,13 +77,9 @@ def watch(
         page = ReportPage(report / "report.html", port)
         stack.callback(page.close)
         progress = Progress(quiet, verbose, page.show_phase)
-        runner = Runner(
-            ros.find(),
-            progress=progress.narrate,
-            sandbox=options.chosen_sandbox(sandbox, progress),
-            verbose=verbose,
-        )
-        work = _Work(loaded, load, submission, report, seed, progress, runner, page)
+        place = options.chosen_sandbox(sandbox, progress)
+        runner = Runner(ros.find(), progress=progress.narrate, sandbox=place, verbose=verbose)
+        work = _Work(assignment, part, loaded, submission, report, progress, runner, page)
         stack.callback(work.close)
         console = output_console()
         say(f"Report page: {page.url}")
@@ -102,11 +95,11 @@ def watch(
 class _Work:
     """Grades the submission, each time with the warm processes of the time before."""
 
+    assignment: str
+    part: options.Part
     loaded: LoadedAssignment
-    load: Callable[[], LoadedAssignment]
     submission: Path
     report: Path
-    seed: int | None
     progress: Progress
     runner: Runner
     page: ReportPage
@@ -117,7 +110,7 @@ class _Work:
     def begin(self) -> None:
         self.runner.get_ready()
         try:
-            self.loaded, self.problem = self.load(), None
+            self.loaded, self.problem = self.part.of(self.assignment), None
         except RosgradeError as error:
             # Shown as the end of the grading: the student corrects it and saves again.
             self.problem = error
@@ -125,7 +118,7 @@ class _Work:
             self.loaded,
             self.runner,
             cache_folder(),
-            seed=self.seed,
+            seed=self.part.seed,
             first=failed_scenarios(self.before) if self.before is not None else (),
             told=Told(self.progress.say, partial(self.progress.output, "build"), self.tell_early),
         )
