@@ -13,15 +13,8 @@ from typing import Annotated
 import typer
 
 from grader.assignment.load import load_assignment
+from grader.batch import executor as executors
 from grader.batch.batch import Batch, Done
-from grader.batch.executor import (
-    BatchExecutor,
-    DaskExecutor,
-    ExecutorLost,
-    LocalExecutor,
-    Order,
-    make_grading,
-)
 from grader.batch.groups import strangers
 from grader.batch.intake import take_in, take_in_roster
 from grader.batch.ledger import Ledger, TakenFrom
@@ -111,10 +104,10 @@ def batch(
     named, loaded = loaded, in_use(Ledger(out), loaded)
     refuse_part(out, loaded.folder, f"the assignment in {loaded.folder}")
     rules = course_of(out, course, loaded.assignment.id)
-    order = Order(str(loaded.folder.resolve()), loaded.sha256, seed, sandbox)
+    order = executors.Order(str(loaded.folder.resolve()), loaded.sha256, seed, sandbox)
     admission = Admission(cells=at_once)
     # Before anything is read or written: without a sandbox there is no batch.
-    grading = make_grading(order, loaded, admission) if scheduler is None else None
+    grading = executors.make_grading(order, loaded, admission) if scheduler is None else None
     began_s = time.monotonic()
     with Scratch("batch") as staging, Progress(quiet).shown() as progress:
         if grading is not None and not quiet:
@@ -148,11 +141,11 @@ def batch(
             # What people wrote must be readable before anything is run.
             for key in ClassAdjustments(ledger).vanished():
                 progress.note(f"the review of {key} stays, but the class has no such student")
-            executor: BatchExecutor | None = None
+            executor: executors.BatchExecutor | None = None
             if to_do and scheduler is not None:
-                executor = DaskExecutor(scheduler, order)
+                executor = executors.DaskExecutor(scheduler, order)
             elif to_do and grading is not None:
-                executor = LocalExecutor(grading, admission.most)
+                executor = executors.LocalExecutor(grading, admission.most)
             done: list[Done] = []
             known = [e for e in entries if e.key not in to_do and ledger.result(e.key) is not None]
             progress.begin("grading", len(entries), already=len(known))
@@ -160,7 +153,7 @@ def batch(
                 for item in work.grade(to_do, executor):
                     done.append(item)
                     progress.advance(item.entry.key, _said(item), fresh=item.fresh)
-            except (KeyboardInterrupt, ExecutorLost):
+            except (KeyboardInterrupt, executors.ExecutorLost):
                 # A second Ctrl-C takes away nothing of what is written because of the first.
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
                 signal.signal(signal.SIGTERM, signal.SIG_IGN)

@@ -17,15 +17,9 @@ from grader.errors import RosgradeError, UsageError
 from grader.grade.model import total
 from grader.gradebook.adjusting import ClassAdjustments
 from grader.gradebook.class_files import GRADES_FILE, NO_RESULT, all_standing, write_class
+from grader.grading import regrading
 from grader.grading.files import RESULT_FILE, write_graded, write_report
 from grader.grading.last_attempt import keep_earlier
-from grader.grading.regrading import (
-    compare,
-    find_recordings,
-    refuse_other,
-    regrade,
-    stored_assignment,
-)
 from grader.report.audience import VISIBLE_ONLY
 from grader.report.files import write_whole
 from grader.report.model.facts import Clock, RunFacts
@@ -75,14 +69,16 @@ def render_again(
     Args:
         amended: What is added to the results of its class now.
     """
-    found = find_recordings(folder)
+    found = regrading.find_recordings(folder)
     result = found.result or read_result(folder / RESULT_FILE)
     used = result.assignment
     words = ("report", str(folder))
-    loaded = _load(assignment or stored_assignment(folder, used.id, used.location, *words))
+    loaded = _load(
+        assignment or regrading.stored_assignment(folder, used.id, used.location, *words)
+    )
     refuse_changed(folder, used.sha256, loaded)
     shown = visible_part(loaded) if result.withheld.checks else loaded
-    graded = regrade(select(shown, tuple(check.id for check in result.checks)), found)
+    graded = regrading.regrade(select(shown, tuple(check.id for check in result.checks)), found)
     before = {check.id: check.status for check in result.checks}
     changed = [one.id for one in graded.grade.results if before.get(one.id) is not one.status]
     if changed:
@@ -127,7 +123,7 @@ def regrade_class(
     adjust = ClassAdjustments(ledger)
     # What people wrote must be readable before anything is written.
     adjust.vanished()
-    refuse_other(ledger.out, written.assignment, loaded)
+    regrading.refuse_other(ledger.out, written.assignment, loaded)
     for row in all_standing(ledger):
         if row.result is not None:
             yield _regrade(loaded, ledger, row.entry, row.result, adjust, write=write)
@@ -157,13 +153,13 @@ def _regrade(
 ) -> Regraded:
     folder = ledger.folder(entry.key)
     try:
-        found = find_recordings(folder)
+        found = regrading.find_recordings(folder)
     except RosgradeError as error:
         why = str(error).partition("\n")[0]
         noted = entry.with_problem(f"not judged again: {why}")
         return Regraded(Done(noted, before, fresh=False), before, problem=why)
-    graded = regrade(loaded, found)
-    changes = tuple(compare(before, graded.grade))
+    graded = regrading.regrade(loaded, found)
+    changes = tuple(regrading.compare(before, graded.grade))
     if not write:
         facts = RunFacts(before.started, before.duration_s)
         after = make_result(graded.grade, graded.recordings, facts)

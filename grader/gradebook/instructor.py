@@ -12,16 +12,10 @@ from grader.assignment.mutant import CPP, LANGUAGES, reference_of
 from grader.authoring.starter import starter_files
 from grader.batch.ledger import Entry, Ledger
 from grader.errors import RosgradeError, UsageError
+from grader.gradebook import similarity
 from grader.gradebook.adjusting import ClassAdjustments
 from grader.gradebook.class_files import INSTRUCTOR_FOLDER, all_standing, write_class
 from grader.gradebook.questions import Work, ask
-from grader.gradebook.similarity import (
-    MOST_PAIRS,
-    all_hashes,
-    find_pairs,
-    fingerprints,
-    render_similarity,
-)
 from grader.grading.graded import RECORDINGS_FOLDER
 from grader.recording.mcap_reader import read_recording
 from grader.report.files import write_whole
@@ -37,11 +31,15 @@ def write_similarity(loaded: LoadedAssignment, ledger: Ledger) -> tuple[Path, in
     names = {key: ", ".join(one.name or one.key for one in found) for key, found in same.items()}
     known = _known(loaded)
     own = {
-        key: prints.keys() - known for key in same if (prints := fingerprints(_files(ledger, key)))
+        key: prints.keys() - known
+        for key in same
+        if (prints := similarity.fingerprints(_files(ledger, key)))
     }
-    pairs = find_pairs(own, {key: found[0].team for key, found in same.items() if found[0].team})
-    shown = {key for pair in pairs[:MOST_PAIRS] for key in (pair.first, pair.second)}
-    page = render_similarity(
+    pairs = similarity.find_pairs(
+        own, {key: found[0].team for key, found in same.items() if found[0].team}
+    )
+    shown = {key for pair in pairs[: similarity.MOST_PAIRS] for key in (pair.first, pair.second)}
+    page = similarity.render_similarity(
         loaded.assignment.title,
         pairs,
         {key: _files(ledger, key) for key in shown},
@@ -95,10 +93,10 @@ def _known(loaded: LoadedAssignment) -> set[int]:
     for language in LANGUAGES:
         # An assignment may be for Python only, or have no reference.
         with suppress(UsageError):
-            known |= all_hashes(starter_files(loaded, cpp=language is CPP))
+            known |= similarity.all_hashes(starter_files(loaded, cpp=language is CPP))
         with suppress(UsageError):
             reference = reference_of(loaded.assignment.id, loaded.folder, language)
-            known |= all_hashes(read_source(reference).files)
+            known |= similarity.all_hashes(read_source(reference).files)
     return known
 
 

@@ -9,16 +9,7 @@ from markupsafe import Markup
 
 from grader.findings.finding import Span
 from grader.findings.wording import counted
-from grader.report.drawing.axes import (
-    LANE,
-    SIDE,
-    TIME_AXIS,
-    Bar,
-    Lane,
-    Scale,
-    draw_lanes,
-    time_axis,
-)
+from grader.report.drawing import axes
 from grader.report.drawing.svg import Figure, figure
 from grader.spec.safe_text import one_line
 
@@ -44,25 +35,25 @@ def draw_callbacks(spans: Sequence[Span], name: str) -> Figure | None:
     end_s = max(call.end_s for calls in shown for call in calls)
     room_s = 0.02 * (end_s - begin_s) or 0.05
     lanes = [_lane(calls) for calls in shown]
-    bottom = LANE * len(lanes) + 4
+    bottom = axes.LANE * len(lanes) + 4
 
     def draw(width: float) -> tuple[float, list[Markup]]:
-        x = Scale(max(0.0, begin_s - room_s), end_s + room_s, SIDE, width - SIDE)
-        return bottom + TIME_AXIS, [
-            *draw_lanes(lanes, x, 0, width),
-            *time_axis(x, bottom, width),
+        x = axes.Scale(max(0.0, begin_s - room_s), end_s + room_s, axes.SIDE, width - axes.SIDE)
+        return bottom + axes.TIME_AXIS, [
+            *axes.draw_lanes(lanes, x, 0, width),
+            *axes.time_axis(x, bottom, width),
         ]
 
     return figure(name, "Callbacks over time", _caption(rows), draw)
 
 
-def _lane(calls: Sequence[Span]) -> Lane:
+def _lane(calls: Sequence[Span]) -> axes.Lane:
     lasted_ms = median_high(call.end_s - call.begin_s for call in calls) * 1e3
-    return Lane(
+    return axes.Lane(
         calls[0].name,
         f"{counted(len(calls), 'call')}, {lasted_ms:.0f} ms each",
         [
-            Bar(call.begin_s, call.end_s, "span wrong" if call.wrong else "span")
+            axes.Bar(call.begin_s, call.end_s, "span wrong" if call.wrong else "span")
             for call in calls[:MOST_BARS]
         ],
     )

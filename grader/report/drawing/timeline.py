@@ -10,16 +10,7 @@ from markupsafe import Markup
 from grader.diagnosis.no_endpoint import OWN_TOPICS
 from grader.findings.wording import counted, listing
 from grader.recording.model import NS, Call, LogLine, Owner, Process, Recording
-from grader.report.drawing.axes import (
-    LANE,
-    SIDE,
-    TIME_AXIS,
-    Bar,
-    Lane,
-    Scale,
-    draw_lanes,
-    time_axis,
-)
+from grader.report.drawing import axes
 from grader.report.drawing.svg import LETTER, Figure, figure, fitted, label, line
 from grader.report.model.excerpt import printed
 from grader.spec.safe_text import one_line
@@ -49,7 +40,7 @@ class PlacedFlag(NamedTuple):
         return self.extent[0] < self.x
 
 
-def place(flags: Sequence[Flag], scale: Scale) -> list[PlacedFlag]:
+def place(flags: Sequence[Flag], scale: axes.Scale) -> list[PlacedFlag]:
     """Give every flag, by time, a row, so that no text meets another.
 
     Each goes below all texts before it that it would meet: so the leader of a later one begins
@@ -71,7 +62,9 @@ def place(flags: Sequence[Flag], scale: Scale) -> list[PlacedFlag]:
     return sorted(placed, key=lambda one: (one.flag.time_s, one.x))
 
 
-def draw_flags(flags: Sequence[Flag], scale: Scale, below: float) -> tuple[list[Markup], float]:
+def draw_flags(
+    flags: Sequence[Flag], scale: axes.Scale, below: float
+) -> tuple[list[Markup], float]:
     """Draw flags with leaders that go on through what is drawn below.
 
     Args:
@@ -113,11 +106,11 @@ def draw_timeline(recording: Recording, moments_s: Sequence[float], name: str) -
     lanes += _of_what_went_wrong(recording, moments_s)
 
     def draw(width: float) -> tuple[float, list[Markup]]:
-        scale = Scale(0.0, end_s, SIDE, width - SIDE)
-        content, top = draw_flags(flags, scale, LANE * len(lanes))
-        bottom = top + LANE * len(lanes) + 6
-        content += draw_lanes(lanes, scale, top, width)
-        return bottom + TIME_AXIS, [*content, *time_axis(scale, bottom, width)]
+        scale = axes.Scale(0.0, end_s, axes.SIDE, width - axes.SIDE)
+        content, top = draw_flags(flags, scale, axes.LANE * len(lanes))
+        bottom = top + axes.LANE * len(lanes) + 6
+        content += axes.draw_lanes(lanes, scale, top, width)
+        return bottom + axes.TIME_AXIS, [*content, *axes.time_axis(scale, bottom, width)]
 
     caption = "Each stroke is one event; × marks what went wrong, or what a finding points at."
     if any(_held(recording, topic) for topic in recording.messages):
@@ -163,22 +156,24 @@ def _since(recording: Recording, times_ns: Iterable[int]) -> list[float]:
     return [recording.since_launch_s(time_ns) for time_ns in times_ns]
 
 
-def _bar(recording: Recording, begin_ns: int, end_ns: int | None) -> list[Bar]:
+def _bar(recording: Recording, begin_ns: int, end_ns: int | None) -> list[axes.Bar]:
     """A bar until a time, or until the end of the run where that is None."""
     end_ns = recording.end_ns if end_ns is None else end_ns
     since = recording.since_launch_s
-    return [Bar(since(begin_ns), since(max(begin_ns, end_ns)))]
+    return [axes.Bar(since(begin_ns), since(max(begin_ns, end_ns)))]
 
 
-def _of_processes(recording: Recording) -> Iterator[Lane]:
+def _of_processes(recording: Recording) -> Iterator[axes.Lane]:
     """When processes and nodes were there, and when their endpoints came and went."""
     for process in recording.processes:
         bars = _bar(recording, process.started_ns, process.exited_ns)
-        yield Lane(process.name, f"ran for {bars[0].end_s - bars[0].begin_s:.2f} s", bars)
+        yield axes.Lane(process.name, f"ran for {bars[0].end_s - bars[0].begin_s:.2f} s", bars)
     for node in recording.student_nodes[:MOST_NODES]:
         vanished = node.vanished_ns is not None and node.vanished_ns < recording.stop_ns
         note = "in the graph until it vanished" if vanished else "in the graph to the end"
-        yield Lane(f"node {node.name}", note, _bar(recording, node.appeared_ns, node.vanished_ns))
+        yield axes.Lane(
+            f"node {node.name}", note, _bar(recording, node.appeared_ns, node.vanished_ns)
+        )
     own = [
         item
         for item in recording.endpoints
@@ -190,7 +185,7 @@ def _of_processes(recording: Recording) -> Iterator[Lane]:
         if item.vanished_ns is not None and item.vanished_ns < recording.stop_ns
     ]
     if own:
-        yield Lane(
+        yield axes.Lane(
             "publishers and subscriptions",
             f"{counted(len(own), 'endpoint')} came, {len(gone) or 'none'} went",
             ticks=_since(recording, [item.appeared_ns for item in own]),
@@ -198,12 +193,12 @@ def _of_processes(recording: Recording) -> Iterator[Lane]:
         )
 
 
-def _of_topics(recording: Recording) -> Iterator[Lane]:
+def _of_topics(recording: Recording) -> Iterator[axes.Lane]:
     found = [(topic, _held(recording, topic), all_) for topic, all_ in recording.messages.items()]
     sent = [(f"to {topic}", " sent", all_) for topic, all_ in recording.sent.items()]
     for name, rest, messages in sorted(found) + sorted(sent):
         ticks = _since(recording, [one.stamp_ns for one in messages])
-        yield Lane(name, f"{counted(len(messages), 'message')}{rest}", ticks=ticks)
+        yield axes.Lane(name, f"{counted(len(messages), 'message')}{rest}", ticks=ticks)
 
 
 def _held(recording: Recording, topic: str) -> str:
@@ -220,7 +215,7 @@ def _held(recording: Recording, topic: str) -> str:
     return f", held {longest_s:.2f} s"
 
 
-def _of_requests(recording: Recording) -> Iterator[Lane]:
+def _of_requests(recording: Recording) -> Iterator[axes.Lane]:
     """Calls of services, and goals."""
     found: dict[str, list[Call]] = {}
     for call in recording.calls:
@@ -235,7 +230,7 @@ def _of_requests(recording: Recording) -> Iterator[Lane]:
         notes = [f"{len(lost)} without an answer"] if lost else []
         notes += [f"{cut_off} cut off by the end"] if cut_off else []
         others = [call.requested_ns for call in calls if call.requested_ns not in lost]
-        yield Lane(
+        yield axes.Lane(
             service,
             ", ".join([counted(len(calls), "call"), *(notes or ["all answered"])]),
             ticks=_since(recording, others),
@@ -244,7 +239,7 @@ def _of_requests(recording: Recording) -> Iterator[Lane]:
     for goal in recording.goals:
         end_ns = recording.stop_ns if goal.result_ns is None else goal.result_ns
         became = "rejected" if goal.accepted is False else goal.status or "no result"
-        yield Lane(
+        yield axes.Lane(
             goal.action,
             f"goal: {became}, {counted(len(goal.feedback), 'message')} of feedback",
             _bar(recording, goal.sent_ns, end_ns),
@@ -252,7 +247,7 @@ def _of_requests(recording: Recording) -> Iterator[Lane]:
         )
 
 
-def _of_what_went_wrong(recording: Recording, moments_s: Sequence[float]) -> Iterator[Lane]:
+def _of_what_went_wrong(recording: Recording, moments_s: Sequence[float]) -> Iterator[axes.Lane]:
     """Output with its errors, limits that were reached, and what findings point at."""
     lines = printed(recording)
     # How a right node words its end after Ctrl+C is up to it.
@@ -260,13 +255,13 @@ def _of_what_went_wrong(recording: Recording, moments_s: Sequence[float]) -> Ite
     bad = [entry.time_ns for entry in running if _complains(entry)]
     note = counted(len(lines), "line") + (f", {counted(len(bad), 'error')}" if bad else "")
     times_s = _since(recording, [entry.time_ns for entry in lines])
-    yield Lane("output", note, ticks=times_s, crosses=_since(recording, bad))
+    yield axes.Lane("output", note, ticks=times_s, crosses=_since(recording, bad))
     if recording.breaches:
         reached = listing(breach.what for breach in recording.breaches)
         times_s = _since(recording, [breach.time_ns for breach in recording.breaches])
-        yield Lane("limits of the sandbox", f"reached: {reached}", crosses=times_s)
+        yield axes.Lane("limits of the sandbox", f"reached: {reached}", crosses=times_s)
     if moments_s:
-        yield Lane("findings", counted(len(moments_s), "moment"), crosses=moments_s)
+        yield axes.Lane("findings", counted(len(moments_s), "moment"), crosses=moments_s)
 
 
 def _complains(entry: LogLine) -> bool:
