@@ -50,13 +50,11 @@ def targets(
                 pose = _GOAL.validate_python(check.with_["goal"]).pose(values)
                 found.setdefault((pose, "goal"), Target(pose, radius_m))
             for number, place in enumerate(_PLACES.validate_python(check.with_.get("places", ()))):
-                one = Target(_middle(place), radius_m, str(number + 1), place[2:] and place)
+                x_m, y_m = (place[0] + place[-2]) / 2.0, (place[1] + place[-1]) / 2.0
+                zone = place[2:] and place
+                one = Target(Pose(x_m, y_m, 0.0), radius_m, str(number + 1), zone)
                 found.setdefault((one.pose, one.label), one)
     return tuple(found.values())
-
-
-def _middle(place: Place) -> Pose:
-    return Pose((place[0] + place[-2]) / 2.0, (place[1] + place[-1]) / 2.0, 0.0)
 
 
 STRIDE = 5
@@ -112,7 +110,8 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> svg
     outline = svg.simplified(
         [(step.x_m, step.y_m) for step in (*truth[::stride], truth[-1])], TOLERANCE_M
     )
-    gone_m = [*accumulate(map(_step_m, truth, truth[1:]), initial=0.0)]
+    steps_m = (math.hypot(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in pairwise(truth))
+    gone_m = [*accumulate(steps_m, initial=0.0)]
     touched = [b for a, b in pairwise([None, *truth]) if b and b.contact and not (a and a.contact)]
     stopped = _stopped(truth, scene)
     shown = [*outline, *(corner for one in targets for corner in one.corners)]
@@ -159,10 +158,6 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> svg
         caption = f"The robot did not move.{goal}"
     title = f"Path of the robot in the scenario {recording.scenario}"
     return svg.figure(name, title, caption, draw)
-
-
-def _step_m(before: Truth, step: Truth) -> float:
-    return math.hypot(step.x_m - before.x_m, step.y_m - before.y_m)
 
 
 def _robot(step: Truth, scene: Scene, class_: str) -> list[Markup]:
