@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import shlex
+import subprocess
+import sys
 from typing import Any
 
 import pytest
@@ -46,3 +48,19 @@ def test_named_commands_and_options_exist(page: str) -> None:
         known = {option for parameter in command.params for option in parameter.opts}
         asked = {word.partition("=")[0] for word in words if re.match(r"--?[a-z]", word)}
         assert asked <= known | {"-h", "--help"}, line
+
+
+def test_the_help_of_a_command_begins_with_its_line_in_the_list() -> None:
+    command: Any = typer.main.get_command(app)
+    context = command.make_context("rosgrade", [], resilient_parsing=True)
+    for name in command.list_commands(context):
+        _, called, rest = command.resolve_command(context, [name])
+        assert (called.help, rest) == (command.get_command(context, name).help, []), name
+
+
+def test_the_list_of_commands_imports_none_of_them() -> None:
+    program = (
+        "import sys; from grader.cli.app import app; app(['--help'], standalone_mode=False); "
+        "sys.exit(any(name in sys.modules for name in ('pydantic', 'grader.cli.check')))"
+    )
+    subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=True, capture_output=True)
