@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from itertools import count
+
 import pytest
 
 from grader.report.html import source_code
@@ -50,3 +53,9 @@ def test_a_text_that_takes_its_grammar_long_is_shown_whole_without_colours(
 ) -> None:
     monkeypatch.setattr(source_code, "MOST_S", 0.0)
     assert shown("def a(): ...\n\ndef b(): ...\n").endswith("\n\ndef b(): ...")
+
+
+def test_a_busy_machine_takes_no_colours_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    colored = shown("def a(): ...\n\ndef b(): ...\n")
+    monkeypatch.setattr(time, "monotonic", count(0.0, 60.0).__next__)
+    assert shown("def a(): ...\n\ndef b(): ...\n") == colored

@@ -18,8 +18,8 @@ from grader.spec.safe_text import visible
 LONGEST_LINE = 2_000
 """Characters of a line that are shown."""
 MOST_S = 1.0
-"""Time for colours; what is left of the file after it is shown without. Grammars are patterns, and
-a text of nothing but blanks takes some of them minutes."""
+"""CPU time for colours; what is left of the file after it is shown without. Grammars are patterns,
+and a text of nothing but blanks takes some of them minutes."""
 _GRAMMARS = {
     "python": (".py",),
     "cpp": (".c", ".cc", ".cpp", ".cxx", ".h", ".hpp"),
@@ -61,7 +61,7 @@ def _pieces(path: str, text: str) -> Iterator[tuple[str, str]]:
     from pygments.lexers import get_lexer_by_name
     from pygments.token import STANDARD_TYPES, Token
 
-    file, done, end_s = PurePosixPath(path), 0, time.monotonic() + MOST_S
+    file, done, end_s = PurePosixPath(path), 0, time.thread_time() + MOST_S
     defined = (Token.Name.Function, Token.Name.Class, Token.Name.Tag, Token.Name.Decorator)
     for grammar, endings in _GRAMMARS.items():
         if file.suffix.lower() in endings or file.name in endings:
@@ -69,7 +69,7 @@ def _pieces(path: str, text: str) -> Iterator[tuple[str, str]]:
                 color = "f" if kind in defined else STANDARD_TYPES.get(kind, "")[:1]
                 yield color if color in "cfkms" else "", piece
                 done += len(piece)
-                if time.monotonic() > end_s:
+                if time.thread_time() > end_s:
                     break
     yield "", text[done:]
 
