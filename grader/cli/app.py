@@ -23,8 +23,8 @@ from grader.errors import GraderFault, RosgradeError, machine_fault
 _COLLECT_EACH = 50_000
 """New containers from which on Python looks for garbage; 700 by default."""
 _COMMANDS = {
-    "list": "assignments.list_command",
-    "show": "assignments.show",
+    "list": "list_command.list_command",
+    "show": "show.show",
     "start": "start.start",
     "check": "check.check",
     "watch": "watch.watch",
@@ -40,7 +40,7 @@ _COMMANDS = {
     "validate": "catalogue.validate",
     "schema": "catalogue.schema",
     "checks": "catalogue.checks",
-    "explain": "catalogue.explain",
+    "explain": "explain.explain",
     "sim": "sim.sim",
     "doctor": "doctor.doctor",
     "export": "export.other_systems",

@@ -19,19 +19,16 @@ from grader.assignment.schema import assignment_schema, mutants_schema
 from grader.authoring.documentation import check_markdown, explanations_markdown
 from grader.authoring.mutants.standard import every_mutant
 from grader.cli import USAGE
-from grader.cli.screen.console import output_console, print_error, print_warning, say
+from grader.cli.screen.console import output_console, print_error, print_warning
 from grader.course.load import COURSE_FILE, load_course
 from grader.course.model import CourseFile
 from grader.errors import RosgradeError, UsageError
 from grader.findings.wording import counted
 from grader.grading.type_support import missing_underlays
-from grader.report.concepts import SCRIPT, STYLE, concepts
-from grader.report.files import write_whole
-from grader.report.html.page import render_page
 from grader.report.model.result import result_schema
 from grader.sandbox.python_tree import not_installed
 from grader.spec.document import write_yaml
-from grader.spec.nearest_name import did_you_mean, nearest_or_all
+from grader.spec.nearest_name import did_you_mean
 
 
 class Document(str, Enum):
@@ -109,25 +106,6 @@ def schema(
         "$id": f"urn:rosgrade:schema:{document.value}:1",
     }
     typer.echo(json.dumps({**head, **make()}, indent=2))
-
-
-def explain(
-    name: Annotated[str, typer.Argument(help="One idea; by default a list of all.")] = "index",
-    html: Annotated[
-        bool, typer.Option("--html", help="Write the page with its picture, to open in a browser.")
-    ] = False,
-) -> None:
-    """Explain an idea of ROS, such as QoS. A failed check names the idea to read."""
-    page = concepts().get(name)
-    if page is None:
-        known = nearest_or_all(name, concepts())
-        raise UsageError(f"nothing to explain is called {name!r}.{known}")
-    if html:
-        styles = ("report.css", "handout.css", STYLE)
-        write_whole(Path(f"{name}.html"), render_page("concept.html.j2", styles, SCRIPT, page=page))
-        say(f"Page: {name}.html")
-        return
-    output_console().print(Markdown(page.plain, hyperlinks=False))
 
 
 def checks(

@@ -1,4 +1,4 @@
-"""``rosgrade list`` and ``rosgrade show``."""
+"""``rosgrade show``: the handout of an assignment."""
 
 from __future__ import annotations
 
@@ -9,26 +9,13 @@ import typer
 from rich.markdown import Markdown
 from rich.table import Table
 
-from grader.assignment.load import list_assignments, load_assignment
+from grader.assignment.load import load_assignment
 from grader.cli.options import AssignmentName, file_option
 from grader.cli.screen.console import output_console, say
 from grader.errors import UsageError
 from grader.report.files import refuse_inputs, write_whole
 from grader.report.html.handout import Handout, make_handout, render_handout
 from grader.submission.underlay.ros2_command import absence_note
-
-
-def list_command() -> None:
-    """List the assignments."""
-    table = Table(box=None, pad_edge=False)
-    for column, side in (("ASSIGNMENT", "left"), ("POINTS", "right"), ("TITLE", "left")):
-        table.add_column(column, justify="right" if side == "right" else "left")
-    for name in list_assignments():
-        loaded = load_assignment(name)
-        points = sum(one.spec.points for one in loaded.checks) + loaded.withheld.points
-        points += sum(item.points for item in loaded.assignment.manual)
-        table.add_row(name, f"{points:g}", loaded.assignment.title)
-    output_console().print(table)
 
 
 def show(
