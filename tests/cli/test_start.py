@@ -88,12 +88,12 @@ def test_a_new_assignment_is_valid_and_leaves_no_doubt(rosgrade: Rosgrade, tmp_p
     assert written.returncode == 0, written.stderr
     ended = rosgrade("validate", tmp_path / "course" / "lesson")
     assert ended.returncode == 0
-    assert ended.stdout.endswith("1 scenario, 9 checks, 23 mutants: valid\n")
+    assert ended.stdout.endswith("1 scenario, 9 checks, 28 mutants: valid\n")
     assert ended.stderr == ""
     rosgrade("new", "both", "--cpp")
     ended = rosgrade("validate", "both")
     assert ended.returncode == 0 and ended.stderr == ""
-    assert ended.stdout.endswith("1 scenario, 9 checks, 41 mutants: valid\n")
+    assert ended.stdout.endswith("1 scenario, 9 checks, 56 mutants: valid\n")
 
 
 @pytest.mark.parametrize("name", ["course/lesson", "./course/lesson/", "{here}/course/lesson"])

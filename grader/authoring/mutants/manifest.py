@@ -1,7 +1,8 @@
-"""Mistakes in package.xml, setup.py and CMakeLists.txt, made in any package that is right.
+"""Mistakes in the files of a package, made in any package that is right.
 
-Each function takes the files of a package and gives those that are different, None for one that is
-gone; nothing where the package has no place for the mistake.
+Each function is called like the mutant that it makes, and its docstring is the mutant's title. It
+takes the files of a package and gives those that are different, None for one that is gone; nothing
+where the package has no place for the mistake.
 """
 
 from __future__ import annotations
@@ -10,19 +11,143 @@ import ast
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from xml.etree import ElementTree
+from functools import cached_property
+from pathlib import Path
+
+from grader.diagnosis.not_generated import InterfaceName, used_packages
+from grader.recording.submission import Definition
+from grader.spec.source import Model, read_source
+from grader.submission.read.cmake import read_commands
 
 Files = Mapping[str, str | None]
+CMAKE = "CMakeLists.txt"
 _CLIENT_LIBRARIES = ("rclpy", "rclcpp")
+_GENERATE = "rosidl_generate_interfaces"
+_HEADER = re.compile(r"(#include\s*[<\"]\w+/(?:msg|srv|action)/)(\w+)(?=\.hpp)")
 
 
 @dataclass(frozen=True)
 class PackageFiles:
-    """The text files of a right package, by their path in it."""
+    """The text files of a right reference, and what of them is meant.
+
+    Attributes:
+        name: Of the package.
+        texts: By path in the reference.
+        executables: All of the package that the assignment asks for.
+        folder: Where the package is in the reference, with a slash at the end.
+        about: The executable or the interface that a check asks for.
+    """
 
     name: str
     texts: Mapping[str, str]
     executables: tuple[str, ...] = ()
+    folder: str = ""
+    about: str = ""
+
+    def text(self, path: str) -> str:
+        """A file of the package; nothing if it is not there."""
+        return self.texts.get(f"{self.folder}{path}", "")
+
+    def edited(self, path: str, edit: Callable[[str], str]) -> Files:
+        """A file of the package that is different after an edit."""
+        text = self.text(path)
+        changed = edit(text)
+        return {} if changed == text else {f"{self.folder}{path}": changed}
+
+    def deleted(self, path: str) -> Files:
+        """A file of the package that is gone."""
+        place = f"{self.folder}{path}"
+        return {place: None} if place in self.texts else {}
+
+    @property
+    def definition(self) -> str:
+        """The file of the interface in the package."""
+        return InterfaceName.of(self.about).file
+
+    @cached_property
+    def used(self) -> tuple[str, ...]:
+        """The packages that the definition uses; of another package, all that it depends on."""
+        if "/" not in self.about:
+            manifest = self.text("package.xml")
+            names = re.findall(r"<(?:build_|exec_)?depend>\s*([^\s<]+)", manifest)
+            others = (name for name in names if name not in _CLIENT_LIBRARIES)
+            return tuple(others) or tuple(names)
+        text = self.text(self.definition)
+        return used_packages(InterfaceName.of(self.about), Definition(self.definition, text))
+
+    @cached_property
+    def unused(self) -> list[str]:
+        """The names in the definition that no other file has."""
+        if "/" not in self.about:
+            return []
+        words = {path: {*re.findall(r"\w+", text)} for path, text in self.texts.items()}
+        own = words.pop(f"{self.folder}{self.definition}", set())
+        return sorted(own.difference(*words.values()))
+
+    @property
+    def sources(self) -> list[str]:
+        """The source files of its programs and libraries, by path in the reference."""
+        inside = [one for one in self.texts if one.startswith(self.folder)]
+        found = [one for one in inside if one.endswith((".py", ".cpp", ".hpp"))]
+        left_out = tuple(f"{self.folder}{name}/" for name in ("launch", "test"))
+        return [
+            one
+            for one in found
+            if "/" in one.removeprefix(self.folder)
+            and not one.startswith(left_out)
+            and not one.endswith("__init__.py")
+        ]
+
+
+class Edit(Model):
+    """An entry of the table ``edits.yaml``; see there."""
+
+    checks: tuple[str, ...]
+    title: str
+    file: str
+    find: str = ""
+    by: str = ""
+    once: bool = False
+
+    def made(self, package: PackageFiles) -> Files:
+        """What is different by it."""
+        file = self.file.replace("<package>", package.name)
+        if "<definition>" in file:
+            file = package.definition
+        if not self.find:
+            return package.deleted(file)
+        find = self.find
+        used = package.used
+        for word, names in (("<first>", used[:1]), ("<used>", used), ("<unused>", package.unused)):
+            find = find.replace(word, "|".join(map(re.escape, names)) or "(?!)")
+        by = self.by.replace("<misspelt>", misspelt(used[0])) if used else self.by
+        place = re.compile(find, re.MULTILINE)
+        return package.edited(file, lambda text: place.sub(by, text, count=int(self.once)))
+
+
+class Table(Model):
+    """The whole of ``edits.yaml``: the id of a mutant -> its edit."""
+
+    edits: dict[str, Edit]
+
+
+Change = Callable[[PackageFiles], Files]
+EDITS = read_source(Path(__file__).with_name("edits.yaml")).read(Table).edits
+CHANGES: list[tuple[str, str, tuple[str, ...], Change]] = [
+    (name, one.title, one.checks, one.made) for name, one in EDITS.items()
+]
+"""Id and title of each mutant, the checks that fail by it, and what makes it."""
+
+
+def breaks(check: str) -> Callable[[Change], Change]:
+    """The function is a mutant's, by which a check of the catalogue fails."""
+
+    def added(make: Change) -> Change:
+        title = (make.__doc__ or "").removesuffix(".")
+        CHANGES.append((make.__name__, title, (check,), make))
+        return make
+
+    return added
 
 
 def misspelt(name: str) -> str:
@@ -30,151 +155,165 @@ def misspelt(name: str) -> str:
     return name[:-1] if len(name.rpartition("/")[2]) > 2 else f"{name}s"
 
 
-def invalid_email(package: PackageFiles) -> Files:
-    """The maintainer's e-mail in package.xml is no address."""
-    return _manifest(package, _without_address)
-
-
-def missing_dependency(package: PackageFiles) -> Files:
-    """package.xml does not name a package that the code uses."""
-    return _manifest(package, _remove)
-
-
-def misspelt_dependency(package: PackageFiles) -> Files:
-    """package.xml names a package that the code uses without its last letter."""
-    return _manifest(package, _misspell)
-
-
+@breaks("package.dependencies")
 def dependency_inside_export(package: PackageFiles) -> Files:
     """package.xml names a package that the code uses inside <export>, where it does not count."""
-    return _manifest(package, _export)
+    first = "".join(map(re.escape, package.used[:1]))
+    tag = re.compile(rf"<((?:build_|exec_)?depend)>\s*{first}\s*</\1>")
+
+    def moved(text: str) -> str:
+        inside = "".join(found[0] for found in tag.finditer(text))
+        return tag.sub("", text).replace("<export>", f"<export>{inside}", 1)
+
+    return package.edited("package.xml", moved)
 
 
-def misnamed_package(package: PackageFiles) -> Files:
+@breaks("package.found")
+def package_misnamed(package: PackageFiles) -> Files:
     """The name of the package lacks its last letter."""
-    other = misspelt(package.name)
-    changed = dict(_manifest(package, lambda root: setattr(root.find("name"), "text", other)))
-    if "CMakeLists.txt" in package.texts:
-        project = re.compile(rf"(project\s*\(\s*){re.escape(package.name)}\b")
-        changed |= _edited(package, "CMakeLists.txt", lambda text: project.sub(rf"\1{other}", text))
-    elif "setup.py" in package.texts:
-        changed |= _edited(package, "setup.py", lambda text: _renamed_setup(text, package.name))
-        marker = f"resource/{package.name}"
-        changed |= {f"resource/{other}": package.texts.get(marker, ""), **_deleted(package, marker)}
-    return changed
+    name, other = package.name, misspelt(package.name)
+    if _GENERATE in package.text(CMAKE):
+        # Whoever uses its interfaces does so by this name.
+        word = re.compile(rf"\b{re.escape(name)}(?=\b|__)")
+        renamed = {path: word.sub(other, text) for path, text in package.texts.items()}
+        return {path: text for path, text in renamed.items() if text != package.texts[path]}
+    tag = re.compile(rf"(<name>\s*){re.escape(name)}\b")
+    changed = dict(package.edited("package.xml", lambda text: tag.sub(rf"\1{other}", text)))
+    project = re.compile(rf"(project\s*\(\s*){re.escape(name)}\b")
+    cmake = package.edited(CMAKE, lambda text: project.sub(rf"\1{other}", text))
+    if cmake:
+        return {**changed, **cmake}
+    marker = f"resource/{name}"
+    changed |= package.edited("setup.py", lambda text: _renamed_setup(text, name))
+    changed[f"{package.folder}resource/{other}"] = package.text(marker)
+    return {**changed, **package.deleted(marker)}
 
 
-def broken_syntax(package: PackageFiles) -> Files:
+@breaks("package.builds")
+def syntax_error(package: PackageFiles) -> Files:
     """A source file ends in the middle of an expression."""
-    sources = [path for path in package.texts if path.endswith((".py", ".cpp"))]
-    inner = [path for path in sources if "/" in path and not path.startswith(("launch/", "test/"))]
-    own = [path for path in inner if not path.endswith("__init__.py")]
-    if "setup.py" in package.texts and len(package.executables) > 1:
+    if package.text("setup.py") and len(package.executables) > 1:
         return {}  # Python installs it all the same, and the others run.
-    return {path: f"{package.texts[path]}\n(\n" for path in own[:1]}
+    return {path: f"{package.texts[path]}\n(\n" for path in package.sources[:1]}
 
 
-def broken_setup(package: PackageFiles) -> Files:
-    """setup.py names a variable that does not exist."""
-    return _edited(package, "setup.py", _with_unknown_name)
-
-
-def no_marker(package: PackageFiles) -> Files:
-    """The file of the package in resource/ is gone."""
-    return _deleted(package, f"resource/{package.name}") if "setup.py" in package.texts else {}
-
-
-def no_setup_cfg(package: PackageFiles) -> Files:
-    """setup.cfg is gone, so that `ros2 run` does not find the executable."""
-    return _deleted(package, "setup.cfg")
-
-
-def no_entry_point(package: PackageFiles, executable: str) -> Files:
+@breaks("package.executable")
+def entry_point_missing(package: PackageFiles) -> Files:
     """setup.py has no entry point for the executable."""
-    return _entry_point(package, executable, lambda _: "*()")
+    return _entry_point(package, lambda _: "*()")
 
 
-def misnamed_entry_point(package: PackageFiles, executable: str) -> Files:
+@breaks("package.executable")
+def executable_misnamed(package: PackageFiles) -> Files:
     """The executable lacks its last letter."""
-    other = misspelt(executable)
-    if "CMakeLists.txt" in package.texts:
-        line = f"set_target_properties({executable} PROPERTIES OUTPUT_NAME {other})\n"
-        end = re.compile(r"^ament_package\s*\(", re.MULTILINE)
-        return _edited(package, "CMakeLists.txt", lambda text: end.sub(rf"{line}\g<0>", text))
-    return _entry_point(package, executable, lambda text: repr(text.replace(executable, other, 1)))
+    name, other = package.about, misspelt(package.about)
+    line = f"set_target_properties({name} PROPERTIES OUTPUT_NAME {other})\n"
+    end = re.compile(r"^ament_package\s*\(", re.MULTILINE)
+    return package.edited(CMAKE, lambda text: end.sub(rf"{line}\g<0>", text)) or _entry_point(
+        package, lambda text: repr(text.replace(name, other, 1))
+    )
 
 
-def entry_point_to_nothing(package: PackageFiles, executable: str) -> Files:
+@breaks("package.executable")
+def entry_point_to_nothing(package: PackageFiles) -> Files:
     """The entry point names a function that does not exist."""
-    return _entry_point(package, executable, lambda text: repr(f"{text.rstrip()}_"))
+    return _entry_point(package, lambda text: repr(f"{text.rstrip()}_"))
 
 
-def not_installed(package: PackageFiles, executable: str) -> Files:
+@breaks("node.starts")
+def import_misspelt(package: PackageFiles) -> Files:
+    """The program imports a message by a name that does not exist."""
+    for path in _modules(package):
+        for node in ast.walk(ast.parse(package.texts[path])):
+            if isinstance(node, ast.ImportFrom) and re.search(
+                r"\.(msg|srv|action)$", node.module or ""
+            ):
+                first = node.names[0]
+                # What uses it stays as it is.
+                other = f"{misspelt(first.name)} as {first.asname or first.name}"
+                return {path: _replaced(package.texts[path], first, other)}
+    return {}
+
+
+@breaks("interface.found")
+def definition_in_wrong_folder(package: PackageFiles) -> Files:
+    """The folder of the definition has another name."""
+    return _redefined(package, package.definition.replace("/", "s/"))
+
+
+@breaks("interface.found")
+def definition_in_lower_case(package: PackageFiles) -> Files:
+    """The file of the definition has a name in lower case."""
+    return _redefined(package, re.sub(r"(?<=\w)(?=[A-Z])", "_", package.definition).lower())
+
+
+@breaks("interface.generated")
+def interface_not_listed(package: PackageFiles) -> Files:
+    """CMakeLists.txt generates another interface only."""
+    other = _redefined(package, package.definition.replace("/", "/Other"))
+    kept = {f"{package.folder}{package.definition}": package.text(package.definition)}
+    return other | kept if other else {}
+
+
+@breaks("interface.manifest")
+def ament_package_missing(package: PackageFiles) -> Files:
+    """CMakeLists.txt ends without ament_package()."""
+    found = re.compile(rf"find_package\s*\(\s*{re.escape(package.name)}\b")
+    if any(found.search(text) for text in package.texts.values()):
+        return {}  # Whoever asks CMake for it does not build then.
+    return package.edited(CMAKE, lambda text: re.sub(r"(?m)^\s*ament_package\s*\(.*", "", text))
+
+
+@breaks("package.executable")
+def not_installed(package: PackageFiles) -> Files:
     """CMakeLists.txt does not install the executable."""
     rule = re.compile(r"install\s*\(\s*TARGETS\b([^)]*?)(\b[A-Z]+\b[^)]*)\)")
 
     def without(found: re.Match[str]) -> str:
         targets = found[1].split()
-        if executable not in targets:
+        if package.about not in targets:
             return found[0]
-        others = " ".join(name for name in targets if name != executable)
+        others = " ".join(name for name in targets if name != package.about)
         return f"install(TARGETS {others} {found[2]})" if others else ""
 
-    return _edited(package, "CMakeLists.txt", lambda text: rule.sub(without, text))
+    return package.edited(CMAKE, lambda text: rule.sub(without, text))
 
 
-def _edited(package: PackageFiles, path: str, edit: Callable[[str], str]) -> Files:
-    """A file that is different after an edit."""
-    text = package.texts.get(path)
-    changed = edit(text) if text is not None else text
-    return {} if changed == text else {path: changed}
+@breaks("package.builds")
+def header_misspelt(package: PackageFiles) -> Files:
+    """The header of a message is written like its class."""
+
+    def like_the_class(found: re.Match[str]) -> str:
+        return found[1] + "".join(word.capitalize() for word in found[2].split("_"))
+
+    for path in package.sources:
+        text = _HEADER.sub(like_the_class, package.texts[path], count=1)
+        if text != package.texts[path]:
+            return {path: text}
+    return {}
 
 
-def _deleted(package: PackageFiles, path: str) -> Files:
-    return {path: None} if path in package.texts else {}
+@breaks("node.starts")
+def never_initialised(package: PackageFiles) -> Files:
+    """main() does not call rclcpp::init."""
+    call = re.compile(r"rclcpp::init\s*\([^;]*;")
+    for command in read_commands(package.text(CMAKE)):
+        if command.name == "add_executable" and command.arguments[:1] == (package.about,):
+            for path in command.arguments[1:]:
+                if found := package.edited(path, lambda text: call.sub("", text)):
+                    return found
+    return {}
 
 
-def _manifest(package: PackageFiles, edit: Callable[[ElementTree.Element], object]) -> Files:
-    text = package.texts["package.xml"]
-    root = ElementTree.fromstring(text)
-    before = ElementTree.tostring(root)
-    edit(root)
-    after = ElementTree.tostring(root)
-    return {} if after == before else {"package.xml": after.decode()}
+def _redefined(package: PackageFiles, to: str) -> dict[str, str | None]:
+    """The definition has another place, which CMakeLists.txt names."""
+    text = package.text(package.definition)
+    listed = package.edited(CMAKE, lambda cmake: cmake.replace(package.definition, to))
+    gone = package.deleted(package.definition)
+    return {**gone, f"{package.folder}{to}": text, **listed} if gone and listed else {}
 
 
-def _without_address(root: ElementTree.Element) -> None:
-    for one in root.iter("maintainer"):
-        one.set("email", "student@laptop")
-
-
-def _used(root: ElementTree.Element) -> list[ElementTree.Element]:
-    """The elements of the first dependency, of a client library where there is no other."""
-    depends = [one for one in root if one.tag in ("depend", "exec_depend", "build_depend")]
-    names = [(one.text or "").strip() for one in depends]
-    others = [name for name in names if name not in _CLIENT_LIBRARIES]
-    firsts = (others or names)[:1]
-    return [one for one, name in zip(depends, names, strict=True) if name in firsts]
-
-
-def _remove(root: ElementTree.Element) -> None:
-    for one in _used(root):
-        root.remove(one)
-
-
-def _misspell(root: ElementTree.Element) -> None:
-    for one in _used(root):
-        one.text = misspelt((one.text or "").strip())
-
-
-def _export(root: ElementTree.Element) -> None:
-    for one in _used(root):
-        root.remove(one)
-        for export in root.iter("export"):
-            ElementTree.SubElement(export, one.tag).text = one.text
-
-
-def _replaced(text: str, node: ast.expr, by: str) -> str:
+def _replaced(text: str, node: ast.expr | ast.alias, by: str) -> str:
     """A text of Python with something else for one expression."""
     lines = text.encode().splitlines(keepends=True)
     begin = sum(map(len, lines[: node.lineno - 1])) + node.col_offset
@@ -190,14 +329,25 @@ def _texts(tree: ast.AST) -> Iterator[tuple[ast.Constant, str]]:
             yield node, node.value
 
 
-def _entry_point(package: PackageFiles, executable: str, change: Callable[[str], str]) -> Files:
+def _entry_point(package: PackageFiles, change: Callable[[str], str]) -> Files:
     def edit(text: str) -> str:
         for node, value in _texts(ast.parse(text)):
-            if re.match(rf"\s*{re.escape(executable)}\s*=", value):
+            if re.match(rf"\s*{re.escape(package.about)}\s*=", value):
                 return _replaced(text, node, change(value))
         return text
 
-    return _edited(package, "setup.py", edit)
+    return package.edited("setup.py", edit)
+
+
+def _modules(package: PackageFiles) -> Iterator[str]:
+    """The modules of a program: that of its entry point, then those that it names."""
+    entry = re.compile(rf"\s*{re.escape(package.about)}\s*=\s*([\w.]+)")
+    for _, value in _texts(ast.parse(package.text("setup.py"))):
+        if found := entry.match(value):
+            main = f"{package.folder}{found[1].replace('.', '/')}.py"
+            words = {*re.findall(r"\w+", package.texts.get(main, ""))}
+            yield from (one for one in package.sources if one == main)
+            yield from (one for one in package.sources if one != main and Path(one).stem in words)
 
 
 def _setup_call(tree: ast.AST) -> ast.Call | None:
@@ -205,14 +355,6 @@ def _setup_call(tree: ast.AST) -> ast.Call | None:
         if isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] == "setup":
             return node
     return None
-
-
-def _with_unknown_name(text: str) -> str:
-    call = _setup_call(ast.parse(text))
-    if call is None:
-        return text
-    lines = text.splitlines(keepends=True)
-    return "".join([*lines[: call.lineno - 1], "packagename\n", *lines[call.lineno - 1 :]])
 
 
 def _renamed_setup(text: str, name: str) -> str:

@@ -12,6 +12,7 @@ import ast
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -130,7 +131,7 @@ def standard_mutants(loaded: LoadedAssignment, files: Mapping[str, bytes]) -> tu
     own = {one.get("id") for one in written or ()}
     for bound in (one for one in loaded.checks if one.spec.id not in own):
         for draft in (*_of_package(bound, loaded, files), *_of_run(bound, loaded)):
-            key = (draft.kind, *draft.about, draft.mistakes)
+            key = (draft.kind, frozenset(draft.files.items()), draft.mistakes)
             drafts.setdefault(key, draft).loses += draft.loses or [bound.spec.id]
     requires = {spec.id: spec.requires for spec in loaded.assignment.checks}
     return tuple(
@@ -167,80 +168,39 @@ def _named(drafts: Iterable[_Draft]) -> Iterator[tuple[str, _Draft]]:
 # Packages
 
 
-_PACKAGE: dict[str, tuple[tuple[str, Callable[[PackageFiles], Files]], ...]] = {
-    "package.found": (
-        ("package_misnamed", manifest.misnamed_package),
-        ("email_invalid", manifest.invalid_email),
-    ),
-    "package.builds": (
-        ("syntax_error", manifest.broken_syntax),
-        ("setup_raises", manifest.broken_setup),
-        ("resource_file_missing", manifest.no_marker),
-    ),
-    "package.dependencies": (
-        ("dependency_missing", manifest.missing_dependency),
-        ("dependency_misspelt", manifest.misspelt_dependency),
-        ("dependency_inside_export", manifest.dependency_inside_export),
-    ),
-}
-_EXECUTABLE: tuple[tuple[str, Callable[[PackageFiles, str], Files]], ...] = (
-    ("executable_misnamed", manifest.misnamed_entry_point),
-    ("entry_point_missing", manifest.no_entry_point),
-    ("entry_point_to_nothing", manifest.entry_point_to_nothing),
-    ("not_installed", manifest.not_installed),
-    ("setup_cfg_missing", lambda package, _: manifest.no_setup_cfg(package)),
-)
-
-
 def _of_package(
     bound: BoundCheck, loaded: LoadedAssignment, files: Mapping[str, bytes]
 ) -> Iterator[_Draft]:
-    given: Any = bound.parameters
-    name = getattr(given, "package", "")
-    asked = next((one for one in loaded.assignment.packages if one.name == name), None)
-    uses = bound.spec.uses or ""
-    programs = asked.executables if asked else ()
-    folder, package = _package(files, name, programs) if programs else ("", None)
+    changes = [one for one in manifest.CHANGES if bound.spec.uses in one[2]]
+    package = _package(bound, loaded, files) if changes else None
     if package is None:
         return
-    for kind, change in _PACKAGE.get(uses, ()):
-        yield from _edited(kind, change.__doc__, (package.name,), folder, change(package))
-    for kind, made in _EXECUTABLE if uses == "package.executable" else ():
-        executable = given.executable
-        changed = made(package, executable)
-        # One file for all executables of a package.
-        about = (package.name, "" if kind == "setup_cfg_missing" else executable)
-        title = made.__doc__ or manifest.no_setup_cfg.__doc__
-        yield from _edited(kind, title, about, folder, changed)
-
-
-def _edited(
-    kind: str, title: str | None, about: tuple[str, ...], folder: str, changed: Files
-) -> Iterator[_Draft]:
-    if changed:
-        placed = {f"{folder}{path}": text for path, text in changed.items()}
-        yield _Draft(kind, (title or kind).removesuffix("."), about, files=placed)
+    for kind, title, _, make in changes:
+        changed = make(package)
+        if changed:
+            yield _Draft(kind, title, (package.name, package.about), files=changed)
 
 
 def _package(
-    files: Mapping[str, bytes], name: str, executables: tuple[str, ...]
-) -> tuple[str, PackageFiles | None]:
-    """The folder of a package in a reference, and its files."""
-    for path, content in files.items():
-        if path.rpartition("/")[2] != "package.xml":
-            continue
-        tag = re.search(rb"<name>\s*([^<\s]+)\s*</name>", content)
-        if tag and tag[1].decode() == name:
-            folder = path.removesuffix("package.xml")
-            inside = {one: data for one, data in files.items() if one.startswith(folder)}
-            texts = {
-                one.removeprefix(folder): data.decode("utf-8", "replace")
-                for one, data in inside.items()
-            }
-            for file in ("package.xml", "setup.py"):
-                _refuse_broken(f"{folder}{file}", texts.get(file, ""))
-            return folder, PackageFiles(name, texts, executables)
-    return "", None
+    bound: BoundCheck, loaded: LoadedAssignment, files: Mapping[str, bytes]
+) -> PackageFiles | None:
+    """The package of a reference that a check is about, and the part of it that it asks for."""
+    given: Any = bound.parameters
+    about: str = getattr(given, "executable", "") or getattr(given, "interface", "")
+    name: str = getattr(given, "package", "") or about.partition("/")[0]
+    if bound.spec.uses == "node.starts":
+        about = "".join(_Run(bound, loaded).programs)
+    texts = {path: content.decode("utf-8", "replace") for path, content in files.items()}
+    for one in loaded.assignment.packages:
+        tag = re.compile(rf"<name>\s*{re.escape(one.name)}\s*</name>")
+        is_meant = one.name == name if name else about in one.executables
+        for path in texts if is_meant else ():
+            if path.rpartition("/")[2] == "package.xml" and tag.search(texts[path]):
+                folder = path.removesuffix("package.xml")
+                for file in ("package.xml", "setup.py"):
+                    _refuse_broken(f"{folder}{file}", texts.get(f"{folder}{file}", ""))
+                return PackageFiles(one.name, texts, one.executables, folder, about)
+    return None
 
 
 def _refuse_broken(path: str, text: str) -> None:
@@ -270,7 +230,8 @@ class _Wrong:
 
 def _of_run(bound: BoundCheck, loaded: LoadedAssignment) -> Iterator[_Draft]:
     run = _Run(bound, loaded)
-    for wrong in _rule(bound)(run) if run.programs else ():
+    rule = _RULES.get(bound.spec.uses or "")
+    for wrong in rule(run) if rule is not None and run.programs else ():
         mistakes = tuple(
             Mistake(program, *one) for program in run.programs for one in wrong.imposed
         )
@@ -327,16 +288,25 @@ class _Run:
         return tuple(dict.fromkeys(unheard))
 
 
-def _name(run: _Run) -> Iterator[_Wrong]:
-    topic = run.given.topic
-    other = misspelt(topic)
-    yield _Wrong("topic_misspelt", f"The topic is {other}", topic, (("rename", topic, other),))
-
-
-def _service_name(run: _Run) -> Iterator[_Wrong]:
-    name = run.given.service
+def _name(kind: str, run: _Run) -> Iterator[_Wrong]:
+    name = getattr(run.given, kind)
     other = misspelt(name)
-    yield _Wrong("service_misspelt", f"The service is {other}", name, (("rename", name, other),))
+    yield _Wrong(f"{kind}_misspelt", f"The {kind} is {other}", name, (("rename", name, other),))
+
+
+def _endpoint(kind: str, run: _Run) -> Iterator[_Wrong]:
+    yield from _name("topic", run)
+    topic = run.given.topic
+    # With neither the name nor the type, nothing is taken for it.
+    elsewhere = (("rename", topic, "/elsewhere"), ("type", topic, _OTHER_TYPES[0]))
+    yield _Wrong(f"no_{kind}", f"There is no {kind} on {topic}", topic, elsewhere)
+
+
+def _untouched(run: _Run) -> Iterator[_Wrong]:
+    # A program has one type for a topic: of those that it uses, the type would be another one.
+    for topic in [one for one in run.given.topics if one not in run.topics][:1]:
+        title = f"The node publishes on {topic}, too"
+        yield _Wrong("publishes_too", title, "", (("publishes", "node", topic),))
 
 
 def _type(run: _Run) -> Iterator[_Wrong]:
@@ -344,7 +314,7 @@ def _type(run: _Run) -> Iterator[_Wrong]:
     other = next(name for name in _OTHER_TYPES if name != run.given.type)
     yield _Wrong("type_wrong", f"The type is {other}", topic, (("type", topic, other),))
     if run.given.remap:
-        yield from _name(run)
+        yield from _name("topic", run)
 
 
 def _qos(run: _Run) -> Iterator[_Wrong]:
@@ -362,14 +332,8 @@ def _qos(run: _Run) -> Iterator[_Wrong]:
 
 def _matching(run: _Run) -> Iterator[_Wrong]:
     """A publisher that offers less than a subscription asks for."""
-    topic, given = run.given.topic, run.given
-    if given.kind == "publisher" and given.expect == "match":
-        if given.reliability == "reliable":
-            kind, other = "reliability", "best_effort"
-            yield _Wrong(other, "The endpoint is best effort", topic, ((kind, topic, other),))
-        if given.durability == "transient_local":
-            kind, other = "durability", "volatile"
-            yield _Wrong(other, "The endpoint is volatile", topic, ((kind, topic, other),))
+    if run.given.kind == "publisher" and run.given.expect == "match":
+        yield from (one for one in _qos(run) if one.kind in ("best_effort", "volatile"))
 
 
 def _depth(run: _Run) -> Iterator[_Wrong]:
@@ -388,6 +352,11 @@ def _node(run: _Run) -> Iterator[_Wrong]:
     yield _Wrong("in_a_namespace", "The node is in the namespace /robot", name, (moved, *kept))
 
 
+def _starts(_: _Run) -> Iterator[_Wrong]:
+    title = "The program waits for ever before it creates a node"
+    yield _Wrong("hangs_at_start", title, "", (("hangs", "node", "always"),))
+
+
 def _alive(run: _Run) -> Iterator[_Wrong]:
     title = "An exception ends the program after 1 s"
     yield _Wrong("raises_after_one_second", title, "", (("raises", "executor", "1.0"),))
@@ -399,6 +368,8 @@ def _alive(run: _Run) -> Iterator[_Wrong]:
 def _ends(_: _Run) -> Iterator[_Wrong]:
     title = "The program ignores Ctrl+C"
     yield _Wrong("ignores_interrupt", title, "", (("ignores", "SIGINT", "always"),))
+    title = "Ctrl+C ends the spinning, but not the program"
+    yield _Wrong("never_exits", title, "", (("lingers", "exit", "always"),))
 
 
 def _count(run: _Run) -> Iterator[_Wrong]:
@@ -436,10 +407,19 @@ def _equal(run: _Run) -> Iterator[_Wrong]:
 
 def _period(run: _Run) -> Iterator[_Wrong]:
     topic = run.given.topic
-    slow, fast = (("period", "timers", "10"),), (("period", "timers", "0.001"),)
+    given: list[Any] = [one.parameters for one in run.others(("timing.period",), None)]
+    # The executor still answers.
+    answered = {one.spec.id for one in run.others(("executor.",), None)}
+    starved = tuple(one for one in run.starved(run.periods) if one not in answered)
+    longer = 1 + 2 * max(one.tolerance.of(one.period) / one.period for one in given)
     # All timers of the program, and so all topics with a period.
-    yield _Wrong("period_ten_times", "The period is ten times as long", "", slow)
-    yield _Wrong("period_a_thousandth", "The period is a thousandth", "", fast)
+    for kind, title, times, lost in (
+        ("period_ten_times", "The period is ten times as long", 10.0, ()),
+        ("period_a_little_longer", f"The period is {longer:g} times as long", longer, ()),
+        ("period_a_thousandth", "The period is a thousandth", 0.001, ()),
+        ("period_a_thousand_times", "The period is a thousand times as long", 1e3, starved),
+    ):
+        yield _Wrong(kind, title, "", (("period", "timers", f"{times:g}"),), lost)
     title = "Nothing is published any more after five messages"
     yield _Wrong("falls_silent", title, topic, (("most", topic, "5"),))
     twice = (("twice", topic, "each"),)
@@ -460,27 +440,18 @@ def _responsive(run: _Run) -> Iterator[_Wrong]:
         yield _Wrong("blocks_in_its_callback", title, topic, imposed, lost)
 
 
-_Rule = Callable[[_Run], Iterable[_Wrong]]
-
-
-def _rule(bound: BoundCheck) -> _Rule:
-    return _RULES.get(bound.spec.uses or "", _no_rule)
-
-
-def _no_rule(_: _Run) -> Iterable[_Wrong]:
-    return ()
-
-
-_RULES: dict[str, _Rule] = {
-    "topic.published": _name,
-    "topic.subscribed": _name,
+_RULES: dict[str, Callable[[_Run], Iterable[_Wrong]]] = {
+    "topic.published": partial(_endpoint, "publisher"),
+    "topic.subscribed": partial(_endpoint, "subscription"),
     "topic.type": _type,
-    "service.exists": _service_name,
+    "topic.untouched": _untouched,
+    "service.exists": partial(_name, "service"),
     "qos.offered": _qos,
     "qos.requested": _qos,
     "qos.compatible": _matching,
     "qos.depth": _depth,
     "node.exists": _node,
+    "node.starts": _starts,
     "node.alive": _alive,
     "node.ends": _ends,
     "messages.count": _count,

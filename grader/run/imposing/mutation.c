@@ -83,6 +83,13 @@ __attribute__((constructor)) static void start(void)
   }
 }
 
+static void linger(void)
+{
+  while (true) {
+    pause();
+  }
+}
+
 static int64_t now_ns(void)
 {
   struct timespec time;
@@ -96,6 +103,23 @@ static void sleep_s(double seconds)
     .tv_sec = (time_t)seconds, .tv_nsec = (long)((seconds - (time_t)seconds) * 1e9)}, NULL);
 }
 
+/* A type by its name, such as builtin_interfaces/msg/Time. */
+static const rosidl_message_type_support_t * type_called(const char * type)
+{
+  char package[LONGEST], name[LONGEST], text[3 * LONGEST];
+  if (sscanf(type, "%511[^/]/msg/%511s", package, name) != 2) {
+    return NULL;
+  }
+  snprintf(text, sizeof(text), "lib%s__rosidl_typesupport_c.so", package);
+  void * library = dlopen(text, RTLD_LAZY);
+  snprintf(
+    text, sizeof(text), "rosidl_typesupport_c__get_message_type_support_handle__%s__msg__%s",
+    package, name);
+  const rosidl_message_type_support_t * (* find)(void) =
+    (const rosidl_message_type_support_t * (*)(void))(library ? dlsym(library, text) : NULL);
+  return find ? find() : NULL;
+}
+
 /* Names */
 
 static rcl_context_t * context;
@@ -106,11 +130,26 @@ PUBLIC rcl_ret_t rcl_node_init(
 {
   NEXT(rcl_node_init)
   context = of;
+  while (mistake("hangs", NULL)) {
+    sleep_s(1.0);
+  }
+  if (mistake("lingers", NULL)) {
+    atexit(linger);
+  }
   if (mistake("ignores", NULL)) {
     signal(SIGINT, SIG_IGN);
   }
   const char * other = mistake("node", name), * moved = mistake("namespace", name);
-  return next(node, other ? other : name, moved ? moved : namespace_, of, options);
+  rcl_ret_t result = next(node, other ? other : name, moved ? moved : namespace_, of, options);
+  const char * too = mistake("publishes", NULL);
+  if (too && result == RCL_RET_OK) {
+    static rcl_publisher_t publisher;
+    rcl_publisher_options_t given = rcl_publisher_get_default_options();
+    publisher = rcl_get_zero_initialized_publisher();
+    result = rcl_publisher_init(
+      &publisher, node, type_called("builtin_interfaces/msg/Time"), too, &given);
+  }
+  return result;
 }
 
 /* Another name for what the program calls so, or the same. */
@@ -150,23 +189,13 @@ static rmw_qos_profile_t requality(const rmw_qos_profile_t * asked, const char *
   return qos;
 }
 
-/* The type that a mistake says, such as builtin_interfaces/msg/Time. */
+/* The type that a mistake says. */
 static const rosidl_message_type_support_t * retyped(
   const char * topic, const rosidl_message_type_support_t * asked)
 {
   const char * type = mistake("type", topic);
-  char package[LONGEST], name[LONGEST], text[3 * LONGEST];
-  if (!type || sscanf(type, "%511[^/]/msg/%511s", package, name) != 2) {
-    return asked;
-  }
-  snprintf(text, sizeof(text), "lib%s__rosidl_typesupport_c.so", package);
-  void * library = dlopen(text, RTLD_LAZY);
-  snprintf(
-    text, sizeof(text), "rosidl_typesupport_c__get_message_type_support_handle__%s__msg__%s",
-    package, name);
-  const rosidl_message_type_support_t * (* find)(void) =
-    (const rosidl_message_type_support_t * (*)(void))(library ? dlsym(library, text) : NULL);
-  return find ? find() : asked;
+  const rosidl_message_type_support_t * other = type ? type_called(type) : NULL;
+  return other ? other : asked;
 }
 
 /* What is published on */

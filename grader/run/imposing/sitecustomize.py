@@ -132,14 +132,31 @@ def _field(message: Any, path: str) -> tuple[Any, str]:
 
 
 def _patch_node(module: Any) -> None:
+    import atexit
     import signal
+    import time
 
-    def named(_: Any, given: dict[str, Any]) -> None:
+    def wait() -> None:
+        while True:
+            time.sleep(1.0)
+
+    def named(node: Any, given: dict[str, Any]) -> Any:
+        if ("hangs", "node") in MISTAKES:
+            wait()
         name = given["node_name"]
         given["node_name"] = MISTAKES.get(("node", name), name)
         given["namespace"] = MISTAKES.get(("namespace", name), given["namespace"])
         if ("ignores", "SIGINT") in MISTAKES:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
+        if ("lingers", "exit") in MISTAKES:
+            atexit.register(wait)
+        return node
+
+    def publishing(_: Any, node: Any) -> None:
+        if too := MISTAKES.get(("publishes", "node")):
+            from builtin_interfaces.msg import Time
+
+            node.create_publisher(Time, too, 10)
 
     def timed(_: Any, given: dict[str, Any]) -> None:
         factor = float(MISTAKES.get(("period", "timers"), "1"))
@@ -149,7 +166,7 @@ def _patch_node(module: Any) -> None:
         _renamed(node, given, "srv_name")
 
     node_class = module.Node
-    _bound(node_class, "__init__", named)
+    _bound(node_class, "__init__", named, publishing)
     _bound(node_class, "create_publisher", _endpoint, _publisher)
     _bound(node_class, "create_subscription", _endpoint)
     _bound(node_class, "create_service", service)
