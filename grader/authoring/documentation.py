@@ -26,8 +26,7 @@ from grader.checks import window
 from grader.checks.catalogue import CATALOGUE, families
 from grader.checks.check import Check
 from grader.checks.tolerance import TimeTolerance
-from grader.diagnosis.explanation import explanations
-from grader.diagnosis.mistake import mistakes
+from grader.diagnosis.explanation import explanations, mistakes
 from grader.findings import finding
 from grader.machine import resources
 from grader.recording import interaction, simulated

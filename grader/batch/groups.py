@@ -11,7 +11,7 @@ from grader.batch.handed_in import NOTHING, HandedIn
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.used_assignment import load_used, refuse_changed
 from grader.course.load import Course, written
-from grader.findings.wording import listing
+from grader.findings.words import listing
 from grader.spec.nearest_name import did_you_mean
 
 _DIFFERENT = " of one group handed in different files"

@@ -19,7 +19,7 @@ from grader.batch.roster import Roster, Student
 from grader.batch.roster_match import matched, unique
 from grader.course.load import Course
 from grader.errors import GraderFault, RosgradeError, SubmissionError, UsageError
-from grader.findings.wording import listing
+from grader.findings.words import listing
 from grader.report.formats.canvas_comments import carrier
 from grader.report.formats.gradebook import DOWNLOAD
 from grader.submission.git import run_git

@@ -10,7 +10,7 @@ from pathlib import PurePosixPath
 from grader.batch.handed_in import NOTHING, HandedIn, stem_of
 from grader.batch.roster import Roster, Student, name_forms, resemblance
 from grader.course.load import written
-from grader.findings.wording import listing
+from grader.findings.words import listing
 from grader.submission.intake.paths import shown
 
 # Parts of a repository's name that are compared; real names have fewer.

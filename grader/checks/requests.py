@@ -12,7 +12,7 @@ from grader.checks.check import stop_if
 from grader.checks.need import Doubt
 from grader.checks.wrong_name import Named, misnamed
 from grader.diagnosis.destroyed_endpoint import why_withdrawn
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_endpoint import (
     ACTION,
     SERVICE,
@@ -32,7 +32,7 @@ from grader.findings.fields import (
 )
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.value import EXACT, Difference
-from grader.findings.wording import code
+from grader.findings.words import code
 from grader.recording.interaction import NO_SERVER, Goal
 from grader.recording.model import Call, Recording
 from grader.spec.name import InterfaceName

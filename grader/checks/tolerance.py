@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 
-from grader.findings.wording import percent
+from grader.findings.words import percent
 from grader.spec.quantity import refusal
 from grader.spec.unit import UNITS, Dimension, format_duration, parse_quantity
 

@@ -12,7 +12,7 @@ from grader.checks.check import NamedFields, Parameters
 from grader.checks.need import Recorded, SimulatedRobot
 from grader.findings.fields import unlike, words
 from grader.findings.value import EXACT, value_at
-from grader.findings.wording import code
+from grader.findings.words import code
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 from grader.spec.name import QualifiedNodeName, TopicName

@@ -8,9 +8,9 @@ from typing import ClassVar
 from pydantic import Field
 
 from grader.checks.check import Parameters
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.findings.finding import Evidence, Finding, Status
-from grader.findings.wording import code
+from grader.findings.words import code
 from grader.recording.model import Recording
 from grader.spec.names import Names, Thing, WrongName
 

@@ -23,7 +23,7 @@ from grader.cli.screen.console import output_console, print_error, print_warning
 from grader.course.load import COURSE_FILE, load_course
 from grader.course.model import CourseFile
 from grader.errors import RosgradeError, UsageError
-from grader.findings.wording import counted
+from grader.findings.words import counted
 from grader.grading.type_support import missing_underlays
 from grader.report.model.result import result_schema
 from grader.sandbox.python_tree import not_installed

@@ -15,7 +15,7 @@ from grader.batch.ledger import BATCH_FILE
 from grader.cli.options import AssignmentName, ClassFolder, file_option
 from grader.cli.screen.console import print_error, print_warning, say
 from grader.errors import UsageError
-from grader.findings.wording import counted
+from grader.findings.words import counted
 from grader.gradebook.class_files import find_reports, read_class
 from grader.gradebook.feedback import class_feedback, letters, write_files
 from grader.grading.files import RESULT_FILE

@@ -7,7 +7,7 @@ from grader.batch.used_assignment import load_used
 from grader.cli.options import ClassFolder, Quiet, UsedAssignment
 from grader.cli.screen.console import say
 from grader.cli.screen.progress import Progress
-from grader.findings.wording import counted
+from grader.findings.words import counted
 from grader.gradebook.instructor import write_questions, write_similarity
 
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from string import Template
 
-from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
-from grader.diagnosis.mistake import remedy
+from grader.diagnosis.explanation import Explanation, Symptom, add, explanation, remedy
 from grader.recording.submission import CPP, EMPTY, PYTHON, PackageRecord, SourceError
 from grader.spec.source import Model, read_source
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from grader.diagnosis.mistake import remedy
+from grader.diagnosis.explanation import remedy
 from grader.diagnosis.process.process_exit import ended_early, exited
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.wording import code
+from grader.findings.finding import Finding, evidence_at
+from grader.findings.words import code
 from grader.measure import declarations
 from grader.recording.interaction import Service, executor_services
 from grader.recording.model import NS, Endpoint, Kind, Recording
@@ -95,6 +95,6 @@ def _destroyed_at(
     return Finding(
         f"{seen}: {what} was destroyed {when_s:.2f} s after launch, while the process still ran",
         remedy("destroyed_endpoint"),
-        Evidence(moments=(Moment(f"{what.replace('`', '')} was destroyed", when_s),)),
+        evidence_at(recording, f"{what.replace('`', '')} was destroyed", last_ns),
         concept="nodes",
     )

@@ -11,6 +11,9 @@ It lies in any module of this package, and its docstring is its line in the docu
 the symptoms that are derived from its own, too. The deepest cause is asked first: in one module
 they stand in this order, and one of another module says ``before=`` or ``after=`` which it is
 asked. The general ones, which nearly always apply, follow after all others.
+
+What to try is said by the name of the mistake: in ``hints.yaml`` for explanations, and in
+``mistakes.yaml`` for what a check sees at once.
 """
 
 from __future__ import annotations
@@ -21,11 +24,17 @@ from dataclasses import dataclass, replace
 from functools import cache
 from graphlib import TopologicalSorter
 from importlib import import_module
+from pathlib import Path
 from pkgutil import walk_packages
+from string import Template
 from typing import Any, ClassVar, Generic, TypeVar, cast
 
+from pydantic import RootModel
+
 from grader import diagnosis
-from grader.findings.finding import Finding, Status
+from grader.findings.finding import Evidence, Finding, Status
+from grader.findings.words import TERMS, Words
+from grader.spec.source import Model, read_source
 
 A = TypeVar("A")
 S = TypeVar("S", bound="Symptom[Any]")
@@ -169,3 +178,51 @@ def cause_of(symptom: Symptom[A]) -> A:
     answer = explain(symptom)
     assert answer is not None, symptom
     return answer
+
+
+class Row(Model):
+    """An entry of ``mistakes.yaml``: what is wrong, and what to try; see there."""
+
+    mistake: str
+    hint: str | Words
+    only: str = ""
+
+
+class Mistakes(Model):
+    """The whole of ``mistakes.yaml``: what they are about -> name -> the mistake."""
+
+    mistakes: dict[str, dict[str, Row]]
+
+
+class Hints(RootModel[dict[str, dict[str, str | Words]]]):
+    """The whole of ``hints.yaml``: module of explanations -> name -> what to try."""
+
+
+@cache
+def mistakes() -> dict[str, dict[str, Row]]:
+    """What checks see at once. It is read when the first check fails."""
+    return read_source(Path(__file__).with_name("mistakes.yaml")).read(Mistakes).mistakes
+
+
+@cache
+def hints() -> dict[str, str | Words]:
+    """What to try, by the name of the mistake."""
+    explained = read_source(Path(__file__).with_name("hints.yaml")).read(Hints).root.values()
+    found = {name: hint for names in explained for name, hint in names.items()}
+    return found | {name: one.hint for rows in mistakes().values() for name, one in rows.items()}
+
+
+def mistaken(
+    name: str, observed: str, evidence: Evidence | None = None, /, **values: object
+) -> Finding:
+    """The finding of a check that saw a mistake, or the cause that an explanation found.
+
+    Args:
+        values: What stands for ``$name`` in the hint.
+    """
+    return Finding(observed, remedy(name, **values), evidence or Evidence())
+
+
+def remedy(name: str, /, **values: object) -> str:
+    """What to try after a mistake."""
+    return Template(str(hints()[name])).safe_substitute({**TERMS, **values})

@@ -6,10 +6,9 @@ import math
 from dataclasses import dataclass, replace
 
 from grader.diagnosis.destroyed_endpoint import why_unpublished
-from grader.diagnosis.explanation import Symptom, explanation
-from grader.diagnosis.mistake import mistaken, remedy
-from grader.findings.finding import Evidence, Finding, Moment, Table
-from grader.findings.wording import counted
+from grader.diagnosis.explanation import Symptom, explanation, mistaken, remedy
+from grader.findings.finding import Evidence, Finding, Table, moment
+from grader.findings.words import counted
 from grader.measure import declarations
 from grader.measure.compatibility import compatibility_table, refusals
 from grader.measure.numbering import published
@@ -100,7 +99,7 @@ class OtherHistory(Symptom[Finding]):
         name = self.join.name
         times = {"joined": self.join.joined_ns, "matched": self.join.matched_ns}
         moments = tuple(
-            Moment(f"{name} {what}", self.recording.since_launch_s(time_ns))
+            moment(self.recording, f"{name} {what}", time_ns)
             for what, time_ns in times.items()
             if time_ns is not None
         )

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from grader.diagnosis.explanation import cause_of, explanation
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import cause_of, explanation, mistaken, remedy
 from grader.diagnosis.no_endpoint import Word, offered
 from grader.diagnosis.process.not_called import (
     NotCalled,
@@ -22,7 +21,7 @@ from grader.diagnosis.process.raised import (
     raised_at,
 )
 from grader.diagnosis.process.standing import where_it_stands
-from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.finding import Evidence, Finding, evidence_at, moment
 from grader.measure import declarations
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
@@ -95,8 +94,7 @@ class NoAnswer(NotCalled, concept="executors"):
 
     def placed(self, cause: Finding) -> Finding:
         """A cause with the time of the call, and with where the process did not go on."""
-        when_s = self.recording.since_launch_s(self.asked_ns)
-        evidence = Evidence(moments=(Moment("call, not answered in time", when_s),))
+        evidence = evidence_at(self.recording, "call, not answered in time", self.asked_ns)
         stands = [where_it_stands(self.recording, one.name) for one in self.processes]
         return at_its_place(replace(cause, evidence=evidence), self.what, *stands or [None])
 
@@ -203,7 +201,7 @@ def why_raised(
             f"{what}: an exception was raised meanwhile, {raised}{in_brackets(place)}",
             remedy("named_line" if place else "read_message"),
             Evidence(
-                moments=(Moment("the exception", recording.since_launch_s(lines[-1].time_ns)),),
+                moments=(moment(recording, "the exception", lines[-1].time_ns),),
                 places=(place,) if place else (),
                 log=tuple(
                     own_frames([line.text for line in lines], recording.submission)[-_LOG_LINES:]

@@ -6,15 +6,12 @@ import re
 from dataclasses import dataclass
 
 from grader.diagnosis.destroyed_endpoint import why_dropped
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import crashed, why_crashed
 from grader.diagnosis.undeclared import why_never_appeared
-from grader.findings.finding import Evidence, Finding, Table
-from grader.findings.first_seen import evidence_at, nodes_seen
-from grader.findings.wording import code, codes
-from grader.findings.words import type_in_code, worded
+from grader.findings.finding import Evidence, Finding, Table, evidence_at, nodes_seen
+from grader.findings.words import code, codes, type_in_code, worded
 from grader.measure import declarations
 from grader.recording.interaction import Service
 from grader.recording.model import Kind, Owner, Recording

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken
 from grader.diagnosis.not_built import existing_package, why_not_built
 from grader.findings.finding import Evidence, Finding
-from grader.findings.wording import code, codes
+from grader.findings.words import code, codes
 from grader.recording.submission import CPP, PYTHON, PackageRecord, SourceError, SubmissionRecord
 from grader.spec.nearest_name import nearest
 

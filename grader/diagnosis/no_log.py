@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
-from grader.diagnosis.explanation import explanation
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import explanation, mistaken, remedy
 from grader.diagnosis.no_messages import why_few, why_not_delivered
 from grader.diagnosis.process.not_called import (
     CalledLate,
@@ -20,9 +19,8 @@ from grader.diagnosis.process.not_called import (
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.process.raised import defined_at
 from grader.diagnosis.wrong_value import factor_words
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.first_seen import endpoints_seen, first_seen
-from grader.findings.wording import code, counted, listing
+from grader.findings.finding import Evidence, Finding, Moment, endpoints_seen, first_seen, moment
+from grader.findings.words import code, counted, listing
 from grader.measure.printed import (
     UNFILLED,
     Echo,
@@ -126,9 +124,9 @@ class NotLogged(CalledLate):
 
     def evidence(self, line: LogLine) -> Evidence:
         """A line with other values, and others near the messages."""
-        moment = Moment("other values logged", self.recording.since_launch_s(line.time_ns))
         log = [one.text for one in self.near if one != line][: _LOG_LINES - 1]
-        return Evidence(moments=(moment,), places=self.places, log=(*log, line.text))
+        moments = (moment(self.recording, "other values logged", line.time_ns),)
+        return Evidence(moments, self.places, (*log, line.text))
 
 
 @explanation(NotLogged)

@@ -6,15 +6,12 @@ import math
 from dataclasses import dataclass
 
 from grader.diagnosis.destroyed_endpoint import why_unpublished, why_unsubscribed
-from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation, mistaken, remedy
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.process.not_called import NotCalled, never_spun
 from grader.diagnosis.process.process_exit import why_ended
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.first_seen import endpoints_seen, first_seen
-from grader.findings.wording import code, codes, counted
-from grader.findings.words import type_in_code
+from grader.findings.finding import Evidence, Finding, Moment, endpoints_seen, first_seen
+from grader.findings.words import code, codes, counted, type_in_code
 from grader.measure.compatibility import compatibility_table, refusals, sides
 from grader.measure.declarations import timers, was_held_up
 from grader.recording.model import NS, Endpoint, Kind, Owner, Qos, Recording

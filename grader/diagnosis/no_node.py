@@ -5,17 +5,14 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken
 from grader.diagnosis.not_built import why_not_built
 from grader.diagnosis.process.not_called import at_its_place
 from grader.diagnosis.process.process_exit import ended_early, why_crashed, why_ended
 from grader.diagnosis.process.standing import where_it_stands
 from grader.diagnosis.undeclared import why_never_appeared
-from grader.findings.finding import Evidence, Finding
-from grader.findings.first_seen import nodes_seen, until_the_end
-from grader.findings.wording import code, codes
-from grader.findings.words import INIT
+from grader.findings.finding import Evidence, Finding, nodes_seen, until_the_end
+from grader.findings.words import INIT, code, codes
 from grader.measure import declarations
 from grader.recording.interaction import EXECUTOR_SERVICES
 from grader.recording.model import Ending, Node, Process, Recording

@@ -6,17 +6,14 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken
 from grader.diagnosis.no_answer import NoAnswer, why_late
 from grader.diagnosis.no_endpoint import SERVICE
 from grader.diagnosis.no_node import why_not_node, written_nodes
 from grader.diagnosis.process.not_called import ANSWER_S
 from grader.diagnosis.process.process_exit import why_ended
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.first_seen import evidence_at, nodes_seen
-from grader.findings.wording import code, codes
-from grader.findings.words import worded
+from grader.findings.finding import Evidence, Finding, Moment, evidence_at, moment, nodes_seen
+from grader.findings.words import code, codes, worded
 from grader.measure.parameter_calls import calls_to, descriptor, undeclared
 from grader.measure.parameter_calls import names as declared
 from grader.recording.interaction import NO_SERVER
@@ -202,10 +199,7 @@ def why_not_asked(recording: Recording, node: str, what: str) -> Finding:
 def answered_at(recording: Recording, calls: Iterable[Call]) -> tuple[Moment, ...]:
     """When the first of some calls was answered."""
     moments = [
-        Moment(
-            f"{call.service.rpartition('/')[2]} was answered",
-            recording.since_launch_s(call.answered_ns),
-        )
+        moment(recording, f"{call.service.rpartition('/')[2]} was answered", call.answered_ns)
         for call in calls
         if call.answered_ns is not None
     ]

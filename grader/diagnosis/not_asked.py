@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from grader.diagnosis.explanation import cause_of, explanation
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import cause_of, explanation, mistaken, remedy
 from grader.diagnosis.no_answer import why_raised, why_taken
 from grader.diagnosis.no_endpoint import ACTION_CLIENT, CLIENT, why_not_offered
 from grader.diagnosis.process.not_called import NotCalled, blocked_executor, never_spun
 from grader.diagnosis.process.process_exit import why_crashed
 from grader.findings.fields import brief, words
-from grader.findings.finding import Evidence, Finding, Moment, Table
-from grader.findings.first_seen import until_the_end
-from grader.findings.wording import code
+from grader.findings.finding import Evidence, Finding, Moment, Table, until_the_end
+from grader.findings.words import code
 from grader.recording.interaction import Asked
 from grader.recording.model import Recording
 

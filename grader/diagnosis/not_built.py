@@ -6,10 +6,9 @@ import re
 from dataclasses import dataclass, replace
 
 from grader.diagnosis.build_error import BuildError
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken, remedy
 from grader.findings.finding import Evidence, Finding, Status
-from grader.findings.wording import code, codes
+from grader.findings.words import code, codes
 from grader.machine.bootstrap import COMPILERS
 from grader.recording.submission import (
     EMPTY,

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from grader.diagnosis.explanation import Symptom, explanation
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import Symptom, explanation, mistaken
 from grader.findings.finding import Finding
 from grader.findings.value import leaves, number_at
-from grader.findings.wording import code, codes, listing
-from grader.findings.words import MATH
+from grader.findings.words import MATH, code, codes, listing
 from grader.measure.derived_messages import DerivedMessages, Sample
 from grader.recording.model import NS
 from grader.spec.expression import Expression

@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import PurePosixPath
 
-from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation, mistaken, remedy
 from grader.diagnosis.not_built import existing_package, why_no_package, why_not_built
 from grader.findings.finding import Evidence, Finding, Status
-from grader.findings.wording import code, codes
+from grader.findings.words import code, codes
 from grader.recording.interface import DefinitionError, sections_of
 from grader.recording.submission import Definition, PackageRecord, SourceError, SubmissionRecord
 from grader.spec.nearest_name import nearest

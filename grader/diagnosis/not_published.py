@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from grader.diagnosis.explanation import explanation
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import explanation, mistaken, remedy
 from grader.diagnosis.no_answer import why_raised
 from grader.diagnosis.no_messages import (
     FewMessages,
@@ -20,9 +19,8 @@ from grader.diagnosis.process.not_called import (
 )
 from grader.diagnosis.process.raised import defined_at
 from grader.diagnosis.process.standing import where_it_stands
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.first_seen import evidence_at, until_the_end
-from grader.findings.wording import code, counted, listing
+from grader.findings.finding import Evidence, Finding, evidence_at, moment, until_the_end
+from grader.findings.words import code, counted, listing
 from grader.measure import declarations
 from grader.measure.declarations import is_compiled
 from grader.recording.model import NS, Kind, Recording
@@ -43,16 +41,12 @@ def slow_timer(symptom: NoMessages) -> Finding | None:
         return None
     timer = min(timers, key=lambda one: one.period_s)
     watched_s = recording.since_launch_s(recording.stop_ns)
+    declared = moment(recording, "timer declared", timer.declared_ns)
     return Finding(
         f"{symptom.seen} in {format_duration(watched_s)}: the process declared a "
         f"timer of {format_duration(timer.period_s)}",
         seconds_hint(),
-        Evidence(
-            moments=(
-                Moment("timer declared", recording.since_launch_s(timer.declared_ns)),
-                until_the_end(recording),
-            )
-        ),
+        Evidence((declared, until_the_end(recording))),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.words import worded
 from grader.measure import declarations

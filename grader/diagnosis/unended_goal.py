@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken
 from grader.diagnosis.no_answer import NoAnswer, why_late, why_raised, why_taken
 from grader.diagnosis.no_endpoint import ACTION
 from grader.diagnosis.process.process_exit import why_ended

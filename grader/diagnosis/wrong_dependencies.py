@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import mistaken, remedy
 from grader.diagnosis.process.exceptions import import_of
 from grader.findings.finding import Evidence, Finding, Table
-from grader.findings.wording import code, codes
+from grader.findings.words import code, codes
 from grader.recording.submission import EMPTY, Import, PackageRecord, SourceError, SubmissionRecord
 from grader.spec.nearest_name import nearest
 from grader.submission.read.dependencies import meant

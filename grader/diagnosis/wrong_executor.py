@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from grader.diagnosis.explanation import Symptom, explanation
-from grader.diagnosis.mistake import remedy
+from grader.diagnosis.explanation import Symptom, explanation, remedy
 from grader.measure.callback_runs import Run
 from grader.measure.declarations import declares, executors
 from grader.recording.model import Recording

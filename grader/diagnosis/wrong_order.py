@@ -8,8 +8,7 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
-from grader.diagnosis.explanation import Symptom, explanation
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import Symptom, explanation, mistaken, remedy
 from grader.findings.fields import wanted_text
 from grader.findings.finding import Finding
 from grader.findings.value import same

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from statistics import mean
 
-from grader.diagnosis.explanation import Symptom, explanation
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import Symptom, explanation, mistaken
 from grader.diagnosis.no_messages import seconds_hint
 from grader.diagnosis.process.not_called import left_s
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.process.standing import slow_callback
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.wording import counted, listing
+from grader.findings.finding import Evidence, Finding, evidence_at
+from grader.findings.words import counted, listing
 from grader.measure import declarations
 from grader.measure.period import Interval, PeriodLimits, PeriodVerdict
 from grader.recording.model import NS, Kind, Recording
@@ -195,5 +194,4 @@ def why_paused(
         return ended
     if left_s(recording, begin_ns, end_ns) <= allowed_s:
         return Finding.undecided(f"{seen}, but the machine took the time from the process")
-    moment = Moment("nothing from here on", recording.since_launch_s(begin_ns))
-    return mistaken(mistake, seen, Evidence(moments=(moment,)))
+    return mistaken(mistake, seen, evidence_at(recording, "nothing from here on", begin_ns))

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from grader.diagnosis.destroyed_endpoint import why_unpublished
-from grader.diagnosis.explanation import Symptom, explanation
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import Symptom, explanation, mistaken, remedy
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.no_messages import NoMessages, never_matched, why_silent
 from grader.diagnosis.process.process_exit import ended_early, why_crashed, why_ended
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.first_seen import endpoints_seen
-from grader.findings.wording import code, codes, counted
+from grader.findings.finding import Evidence, Finding, endpoints_seen, evidence_at
+from grader.findings.words import code, codes, counted
 from grader.measure import declarations
 from grader.measure.compatibility import refusals
 from grader.measure.transforms import Sent, is_static, sent
@@ -62,7 +60,7 @@ class NoTransform(Symptom[Finding], concept="frames"):
             return None
         seen = f"{edge(one.parent, one.child)} on {code(one.message.topic)} {why}"
         hint = hint or remedy("other_frames", parent=self.parent, child=self.child)
-        return Finding(seen, hint, moment(self.recording, one, "sent"))
+        return Finding(seen, hint, when_sent(self.recording, one, "sent"))
 
 
 @dataclass(frozen=True)
@@ -83,10 +81,9 @@ def edge(parent: str, child: str) -> str:
     return f"{code(parent)} → {code(child)}"
 
 
-def moment(recording: Recording, one: Sent, what: str) -> Evidence:
+def when_sent(recording: Recording, one: Sent, what: str) -> Evidence:
     """When a transform was published."""
-    when_s = recording.since_launch_s(one.message.stamp_ns)
-    return Evidence(moments=(Moment(f"{one.parent} → {one.child} {what}", when_s),))
+    return evidence_at(recording, f"{one.parent} → {one.child} {what}", one.message.stamp_ns)
 
 
 @explanation(NoTransform)
@@ -121,7 +118,7 @@ def overwritten(symptom: NoTransform) -> Finding | None:
         "overwritten",
         "a node that starts later does not get it: the publisher keeps "
         f"{counted(len(kept), 'message')}, and published others after it",
-        moment(recording, symptom.wanted[-1], "sent"),
+        when_sent(recording, symptom.wanted[-1], "sent"),
     )
 
 
@@ -177,7 +174,7 @@ def no_quaternion(symptom: BadTransform) -> Finding | None:
         "no_quaternion",
         f"tf2 ignores the transform, for its quaternion (x, y, z, w) = ({numbers}) does not have "
         f"the length 1{clause}",
-        moment(symptom.recording, symptom.one, "ignored"),
+        when_sent(symptom.recording, symptom.one, "ignored"),
     )
 
 
@@ -195,7 +192,7 @@ def wrong_stamp(symptom: BadTransform) -> Finding | None:
     return mistaken(
         "wrong_stamp",
         seen if stamp_ns else "the stamp is 0: it is not set",
-        moment(symptom.recording, symptom.one, "has a wrong stamp"),
+        when_sent(symptom.recording, symptom.one, "has a wrong stamp"),
     )
 
 

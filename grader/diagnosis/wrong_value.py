@@ -12,8 +12,7 @@ from typing import Any
 
 from grader.diagnosis.explanation import Symptom, explanation
 from grader.findings.value import Difference, same
-from grader.findings.wording import value_text
-from grader.findings.words import worded
+from grader.findings.words import value_text, worded
 
 # How many times too large -> what that is. People type 57.3 and 3.14: three digits must do.
 _FACTORS = {

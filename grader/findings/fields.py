@@ -17,8 +17,7 @@ from grader.findings.value import (
     differences,
     expected_leaves,
 )
-from grader.findings.wording import codes, value_text
-from grader.findings.words import worded
+from grader.findings.words import codes, value_text, worded
 from grader.recording.interaction import Goal
 
 _MOST_FIELDS = 6

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from itertools import islice
 
+from grader.recording.model import Endpoint, Message, Recording
 from grader.recording.submission import SourceError
 from grader.spec.names import NO_NAMES, Names
 from grader.spec.unit import format_duration
@@ -287,3 +290,48 @@ class Finding:
     def after(self, beginning: str) -> Finding:
         """The same with a text before what was observed."""
         return replace(self, observed=f"{beginning}: {self.observed}")
+
+
+# Moments for evidence. Something that is missing has no time: these show what there was instead.
+_MOST = 5
+
+
+def nodes_seen(recording: Recording) -> tuple[Moment, ...]:
+    """When the student's nodes appeared, the first few."""
+    return tuple(
+        moment(recording, f"node {node.name} appeared", node.appeared_ns)
+        for node in recording.student_nodes[:_MOST]
+    )
+
+
+def endpoints_seen(recording: Recording, endpoints: Iterable[Endpoint]) -> tuple[Moment, ...]:
+    """When endpoints appeared, the first few."""
+    return tuple(
+        moment(recording, f"{item.kind.value} on {item.topic} appeared", item.appeared_ns)
+        for item in islice(endpoints, _MOST)
+    )
+
+
+def first_seen(recording: Recording, messages: Iterable[Message]) -> tuple[Moment, ...]:
+    """When the first of some messages was published; nothing where there is none."""
+    return tuple(
+        moment(recording, f"first message on {item.topic}", item.stamp_ns)
+        for item in islice(messages, 1)
+    )
+
+
+def until_the_end(recording: Recording, what: str = "the observation ended") -> Moment:
+    """The end of the observation, for what lasted or was missing until then."""
+    return moment(recording, what, recording.stop_ns)
+
+
+def moment(recording: Recording, label: str, time_ns: int) -> Moment:
+    """A moment of a run."""
+    return Moment(label, recording.since_launch_s(time_ns))
+
+
+def evidence_at(
+    recording: Recording, label: str, time_ns: int, *plots: Plot, log: Iterable[str] = ()
+) -> Evidence:
+    """A moment of a run, with series to draw and lines that were written."""
+    return Evidence(moments=(moment(recording, label, time_ns),), plots=plots, log=tuple(log))

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from grader.findings.condition import EXACT, is_comparison, is_near, meets
-from grader.findings.wording import code
+from grader.findings.words import code
 from grader.spec.text_numbers import numbers_in
 
 _WORDS = {

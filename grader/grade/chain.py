@@ -12,7 +12,7 @@ from grader.checks.doubt import is_doubtful
 from grader.diagnosis.no_parameter import why_not_taken
 from grader.diagnosis.not_built import why_lacking
 from grader.findings.finding import Finding, Status, Verdict
-from grader.findings.wording import percent
+from grader.findings.words import percent
 from grader.grade.model import ScenarioFinding
 from grader.grade.origins import with_origins
 from grader.grade.windowed import judged_in

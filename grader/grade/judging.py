@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from grader.assignment.model import Counts
 from grader.assignment.mutant import required_by
 from grader.checks.check import Subject
-from grader.checks.parameter.given import PARAMETERS_GIVEN
+from grader.checks.parameter.parameter import PARAMETERS_GIVEN
 from grader.diagnosis.no_parameter import why_not_taken
 from grader.diagnosis.not_built import why_not_built
 from grader.findings.finding import Finding, Status, Verdict

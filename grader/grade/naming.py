@@ -18,8 +18,7 @@ from grader.diagnosis.not_built import why_not_built
 from grader.diagnosis.not_generated import find_definition
 from grader.errors import AssignmentError, UsageError
 from grader.findings.finding import Evidence, Finding
-from grader.findings.wording import code, codes
-from grader.findings.words import worded
+from grader.findings.words import code, codes, worded
 from grader.recording.model import Recording
 from grader.recording.submission import PackageRecord, SourceError, SubmissionRecord
 from grader.spec.name import INTERFACE

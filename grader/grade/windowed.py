@@ -15,11 +15,9 @@ from grader.diagnosis.no_messages import why_not_sent, why_silent
 from grader.diagnosis.process.not_called import ANSWER_S
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.fields import difference_words, unlike
-from grader.findings.finding import Evidence, Finding
-from grader.findings.first_seen import first_seen, until_the_end
+from grader.findings.finding import Evidence, Finding, first_seen, until_the_end
 from grader.findings.value import EXACT
-from grader.findings.wording import code, counted, listing
-from grader.findings.words import worded
+from grader.findings.words import code, counted, listing, worded
 from grader.grade.model import SEVERITY
 from grader.recording.model import Kind, Owner, Recording
 from grader.recording.window import cut

@@ -11,7 +11,7 @@ from grader.batch.batch import Done
 from grader.batch.ledger import BATCH_FILE, Entry, Ledger
 from grader.errors import UsageError
 from grader.findings.finding import Status
-from grader.findings.wording import listing
+from grader.findings.words import listing
 from grader.grade.model import total
 from grader.gradebook.adjusting import ClassAdjustments
 from grader.grading.files import REPORT_FILE, RESULT_FILE

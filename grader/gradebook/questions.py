@@ -15,7 +15,7 @@ from pathlib import PurePosixPath
 from statistics import median
 from typing import Any
 
-from grader.findings.wording import code
+from grader.findings.words import code
 from grader.measure.declarations import timers
 from grader.recording.model import NS, Kind, Message, Recording
 

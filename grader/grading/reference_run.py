@@ -17,7 +17,7 @@ from typing import Any
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Scenario
 from grader.errors import AssignmentError, Problem, UsageError
-from grader.findings.wording import counted
+from grader.findings.words import counted
 from grader.grade import Grade
 from grader.recording.model import Recording
 from grader.report.files import write_whole

@@ -11,7 +11,7 @@ from itertools import combinations
 
 from grader.findings.condition import difference
 from grader.findings.value import number_at
-from grader.findings.wording import code
+from grader.findings.words import code
 from grader.recording.model import NS, LogLine, Message, Recording
 from grader.spec.expression import Expression
 from grader.spec.text_numbers import MINUS, NUMBER, numbers_in

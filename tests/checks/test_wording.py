@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from grader.findings.wording import codes, counted, listing, value_text
+from grader.findings.words import codes, counted, listing, value_text
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from string import Template
 
 import pytest
 
-from grader.diagnosis.mistake import hints, mistaken, mistakes, remedy
+from grader.diagnosis.explanation import hints, mistaken, mistakes, remedy
 from grader.findings.words import TERMS, Words, speaking
 from grader.machine import resources
 from grader.recording.submission import CPP

@@ -17,8 +17,7 @@ from hypothesis import strategies as st
 from grader.assignment.load import list_assignments, load_assignment
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import NoParameters, Subject
-from grader.diagnosis.explanation import explanations
-from grader.diagnosis.mistake import mistakes, remedy
+from grader.diagnosis.explanation import explanations, hints, mistakes, remedy
 from grader.diagnosis.process import exceptions
 from grader.findings.finding import Finding, Status
 from grader.findings.words import SPIN_NODE, Words, speaking
@@ -104,7 +103,8 @@ def _texts(statement: ast.stmt) -> Iterator[str]:
             yield re.sub(r"(?<!\$)\{[^{}]*\}", "info", text)
 
 
-def _all_texts() -> Iterator[tuple[str, str]]:
+def _statements() -> Iterator[tuple[str, ast.stmt]]:
+    """Where each statement is that students of any language may get to read of."""
     root, declared = resources.root(), _declared()
     folders = [root / "grader" / name for name in _FOLDERS]
     for folder in (*folders, *resources.assignments().glob("*/checks")):
@@ -112,7 +112,12 @@ def _all_texts() -> Iterator[tuple[str, str]]:
             module = ".".join(file.relative_to(root).with_suffix("").parts)
             own = {name for where, name in declared if where == module}
             for statement in _spoken(ast.parse(file.read_text(encoding="utf-8")), own):
-                yield from ((f"{file}:{statement.lineno}", text) for text in _texts(statement))
+                yield f"{file}:{statement.lineno}", statement
+
+
+def _all_texts() -> Iterator[tuple[str, str]]:
+    for where, statement in _statements():
+        yield from ((where, text) for text in _texts(statement))
 
 
 def test_no_word_of_python_is_left_for_students_of_cpp() -> None:
@@ -126,14 +131,23 @@ def test_no_word_of_python_is_left_for_students_of_cpp() -> None:
     assert not left, "\n".join(left)
 
 
-def test_mistakes_have_no_word_of_python_for_students_of_cpp() -> None:
+def test_hints_have_no_word_of_python_for_students_of_cpp() -> None:
+    constants = {
+        str(node.value)
+        for _, statement in _statements()
+        for node in ast.walk(statement)
+        if isinstance(node, ast.Constant)
+    }
+    of_python = {
+        name for about in mistakes().values() for name, one in about.items() if one.only == PYTHON
+    }
     with speaking(CPP):
         left = [
             f"{name}: {found[0]!r}"
-            for about in mistakes().values()
-            for name, one in about.items()
-            if one.only != PYTHON and (found := _OF_PYTHON.search(remedy(name)))
+            for name in constants & hints().keys() - of_python
+            if (found := _OF_PYTHON.search(remedy(name)))
         ]
+    assert len(constants & hints().keys()) > 200
     assert not left, "\n".join(left)
 
 

@@ -13,8 +13,8 @@ from grader.findings.reference import (
     GoalPose,
     UnknownValue,
 )
+from grader.findings.words import degrees, metres, point, side, speed
 from grader.measure.motion.ground import ahead, nearest
-from grader.measure.motion.quantities import degrees, metres, point, side, speed
 from grader.recording.model import NS
 from grader.recording.simulated import Scene, Truth
 from sim.motion import ORIGIN, Pose

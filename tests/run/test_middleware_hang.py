@@ -10,7 +10,7 @@ import pytest
 from grader.assignment.load import list_assignments, load_assignment
 from grader.assignment.model import Scenario
 from grader.checks.check import Subject
-from grader.checks.parameter.given import PARAMETERS_GIVEN
+from grader.checks.parameter.parameter import PARAMETERS_GIVEN
 from grader.findings.finding import Status
 from grader.grade.judging import judge_all
 from grader.run.cell.middleware_hang import ENDED_BY, HangMonitor, hung_recording

@@ -17,7 +17,7 @@ from grader.findings.finding import Evidence, Finding
 from grader.checks.need import PUBLISHED, Recorded
 from grader.measure.period import Interval, PeriodLimits, forgiven, judge
 from grader.checks.tolerance import TimeTolerance, Tolerance
-from grader.findings.wording import code, codes, counted, listing
+from grader.findings.words import code, codes, counted, listing
 from grader.diagnosis.no_messages import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.process.process_exit import why_ended

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from grader.findings.finding import Finding
-from grader.findings.wording import code, codes, listing
+from grader.findings.words import code, codes, listing
 from grader.findings.words import group_class, worded
 from grader.measure.callback_runs import Run, timed
 from grader.measure.declarations import executors

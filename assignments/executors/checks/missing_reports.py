@@ -10,7 +10,7 @@ from pydantic import Field
 from grader.checks.check import Parameters
 from grader.findings.finding import Evidence, Moment, Table, Finding
 from grader.checks.need import Need, Recorded
-from grader.findings.wording import code, codes, counted, value_text
+from grader.findings.words import code, codes, counted, value_text
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.words import Words, worded

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check
 from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.wording import code, codes, counted, listing
+from grader.findings.words import code, codes, counted, listing
 from grader.findings.words import EXCLUSIVE, REENTRANT, SPIN_NODE, worded
 from grader.measure.callback_runs import Overlap, Run, overlaps
 from grader.recording.model import NS, Recording

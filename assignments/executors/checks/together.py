@@ -10,7 +10,7 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check
 from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.wording import code, codes, counted
+from grader.findings.words import code, codes, counted
 from grader.measure.callback_runs import Run
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Duration

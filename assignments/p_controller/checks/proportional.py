@@ -15,11 +15,11 @@ from grader.measure.motion.steering import MOST_BEHIND, Sample, answers, fit, LE
 from grader.measure.motion.approach import NO_SPEED_M_S, Approach
 from grader.diagnosis.motion.no_motion import approach
 from grader.measure.motion.command import command_topic
-from grader.measure.motion.quantities import metres, speed
+from grader.findings.words import metres, speed
 from grader.checks.motion.robot_check import GoalParameters
-from grader.findings.first_seen import evidence_at
-from grader.findings.wording import counted, percent
-from grader.diagnosis.mistake import remedy
+from grader.findings.finding import evidence_at
+from grader.findings.words import counted, percent
+from grader.diagnosis.explanation import remedy
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.no_motion import why_cut_short

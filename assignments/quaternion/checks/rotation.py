@@ -12,11 +12,11 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check
 from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.first_seen import first_seen
+from grader.findings.finding import first_seen
 from grader.measure.numbering import published
 from grader.checks.need import PUBLISHED, Recorded
-from grader.findings.wording import code, counted, listing
-from grader.diagnosis.mistake import remedy
+from grader.findings.words import code, counted, listing
+from grader.diagnosis.explanation import remedy
 from grader.diagnosis.wrong_value import misread_words, was_integer
 from grader.diagnosis.no_messages import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed

@@ -26,8 +26,7 @@ from grader.assignment.contract.model import (
 )
 from grader.findings.fields import each_field, wanted_words
 from grader.findings.text import is_asked_of_text
-from grader.findings.wording import listing
-from grader.findings.words import Words
+from grader.findings.words import Words, listing
 from grader.spec.document import Place
 
 ANY = "any"

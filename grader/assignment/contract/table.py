@@ -9,7 +9,7 @@ from typing import Any
 from grader.assignment.contract.model import Connection, Contract, Declared, Program
 from grader.assignment.contract.standard import ANY, period_of, rate_words
 from grader.findings.fields import each_field, wanted_words
-from grader.findings.wording import codes, listing, value_text
+from grader.findings.words import codes, listing, value_text
 from grader.spec.document import Place
 
 MARKER = "<!-- contract -->"

@@ -8,9 +8,9 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.need import Bags
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.findings.finding import Finding
-from grader.findings.wording import code, codes, counted, listing
+from grader.findings.words import code, codes, counted, listing
 from grader.recording.submission import BagRecord, SubmissionRecord
 from grader.spec.name import InterfaceName, TopicName
 from grader.spec.quantity import Duration

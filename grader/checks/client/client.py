@@ -11,13 +11,13 @@ from pydantic import Field
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.need import Act, Doubt, Stimulated
 from grader.checks.requests import why_other_fields
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import mistaken, remedy
 from grader.diagnosis.no_answer import why_taken
 from grader.diagnosis.not_asked import evidence, why_not_asked
 from grader.findings.fields import FieldTolerance, brief, unlike, words
 from grader.findings.finding import Evidence, Finding
 from grader.findings.value import EXACT
-from grader.findings.wording import code, counted
+from grader.findings.words import code, counted
 from grader.recording.interaction import Asked
 from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName

@@ -12,15 +12,13 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.log.log_content import logged, printed
-from grader.diagnosis.explanation import cause_of, explain
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import cause_of, explain, mistaken
 from grader.diagnosis.process.not_called import Uncalled
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.undeclared import why_undeclared
 from grader.diagnosis.wrong_executor import GROUP, MULTI, SINGLE, OtherExecution
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.wording import code, codes, counted, listing
-from grader.findings.words import group_class
+from grader.findings.finding import Evidence, Finding, Moment, moment
+from grader.findings.words import code, codes, counted, group_class, listing
 from grader.measure.callback_runs import Event, Run, overlaps, paired, spans, timed
 from grader.measure.declarations import (
     executors,
@@ -109,8 +107,8 @@ def overlap(recording: Recording, parameters: Overlap) -> Finding:
     parts = [f"{code(name)} overlaps {counted(numbers[name], 'time')}" for name in names]
     observed = f"{counted(len(runs), 'run')}: {listing(parts)}"
     wrong = [run for both in found for run in both] if never else []
-    begin_s = recording.since_launch_s((wrong or runs)[0].begin_ns)
-    evidence = Evidence((Moment("one runs", begin_s),), spans=spans(recording, runs, wrong))
+    first = moment(recording, "one runs", (wrong or runs)[0].begin_ns)
+    evidence = Evidence((first,), spans=spans(recording, runs, wrong))
     if not found if never else min(numbers.values()) >= least:
         return Finding.as_asked(observed, evidence)
     followed = [pair for pair in pairwise(runs) if _half_s(*pair) > _gap_s(*pair) > -_half_s(*pair)]

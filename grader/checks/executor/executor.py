@@ -10,7 +10,7 @@ from pydantic import Field
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Doubt
 from grader.checks.node.node import target_nodes
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.not_called import (
@@ -22,10 +22,17 @@ from grader.diagnosis.process.not_called import (
 from grader.diagnosis.process.process_exit import ended_early, why_ended, why_it_exited
 from grader.diagnosis.process.standing import slow_callback, where_it_stands
 from grader.diagnosis.undeclared import why_undeclared
-from grader.findings.finding import Evidence, Finding, Moment, Plot, Verdict
-from grader.findings.first_seen import first_seen, nodes_seen
-from grader.findings.wording import code, codes, counted
-from grader.findings.words import SPIN_NODE, worded
+from grader.findings.finding import (
+    Evidence,
+    Finding,
+    Plot,
+    Verdict,
+    evidence_at,
+    first_seen,
+    moment,
+    nodes_seen,
+)
+from grader.findings.words import SPIN_NODE, code, codes, counted, worded
 from grader.measure import callback_runs, declarations
 from grader.measure.declarations import was_held_up
 from grader.measure.paused import paused, publishers
@@ -264,7 +271,7 @@ def _evidence(recording: Recording, groups: list[_Answers]) -> Evidence:
     )
     return Evidence(
         moments=tuple(
-            Moment("call that waited too long", recording.since_launch_s(call.requested_ns))
+            moment(recording, "call that waited too long", call.requested_ns)
             for call in late[:_MOST_MOMENTS]
         ),
         plots=(plot,) if answered else (),
@@ -296,8 +303,7 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
     if not messages:
         return why_silent(recording, parameters.topic)
     if not declarations.declares(recording, "publisher", topic=parameters.topic):
-        cause = why_undeclared(recording, f"the publisher on {code(parameters.topic)}")
-        return cause
+        return why_undeclared(recording, f"the publisher on {code(parameters.topic)}")
     timers = declarations.timers(recording)
     calling = [item for item in timers if item.callback != _NOTHING]
     number = f"{counted(len(messages), 'message was', 'messages were')} published"
@@ -307,12 +313,11 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
         observed = f"{number}, outside of every callback: a thread or a loop calls publish()"
     elif calling:
         name = f", which calls {code(calling[0].callback)}" if calling[0].callback else ""
-        created_s = recording.since_launch_s(calling[0].declared_ns)
         rest = f", and nothing was published while {_CALLED_NOTHING}"
         seen = rest if recording.pauses and publishers(recording, parameters.topic) else ""
         return Finding.as_asked(
             f"the process declared a timer of {format_duration(calling[0].period_s)}{name}{seen}",
-            Evidence(moments=(Moment("timer created", created_s),)),
+            evidence_at(recording, "timer created", calling[0].declared_ns),
         )
     elif declarations.timer_of_zero(recording):
         return Finding.as_asked("the process declared a timer")
@@ -343,10 +348,9 @@ def _why_uncalled(recording: Recording, topic: str) -> Finding | None:
     observed = f"{number} published outside of every callback, while {_CALLED_NOTHING}"
     if found.is_doubtful(recording):
         return Finding.undecided(f"{observed}, but the machine held messages up")
-    when_s = recording.since_launch_s(found.uncalled_ns[0])
-    moment = Moment("published outside of every callback", when_s)
-    seen = f"{observed}: a thread or a loop calls publish()"
-    return mistaken("no_timer", seen, Evidence((moment,)))
+    label = "published outside of every callback"
+    shown = evidence_at(recording, label, found.uncalled_ns[0])
+    return mistaken("no_timer", f"{observed}: a thread or a loop calls publish()", shown)
 
 
 def _why_not_paused(recording: Recording, topic: str) -> Finding | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from grader.findings.wording import code, listing
+from grader.findings.words import code, listing
 from grader.recording.interface import Constant, Field, Section
 from grader.spec.nearest_name import nearest
 

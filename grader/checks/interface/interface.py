@@ -15,7 +15,7 @@ from grader.checks.interface.definition_differences import (
     field_differences,
 )
 from grader.checks.wrong_name import Named
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.not_built import existing_package, why_no_manifest
 from grader.diagnosis.not_generated import (
     GENERATORS,
@@ -26,8 +26,7 @@ from grader.diagnosis.not_generated import (
     why_not_generated,
 )
 from grader.findings.finding import Comparison, Evidence, Finding, Table
-from grader.findings.wording import code, codes, listing
-from grader.findings.words import worded
+from grader.findings.words import code, codes, listing, worded
 from grader.recording.interface import DefinitionError, Section, sections_of
 from grader.recording.submission import Definition, PackageRecord, SourceError, SubmissionRecord
 from grader.spec.name import InterfaceName as Interface

@@ -8,12 +8,11 @@ from collections.abc import Iterable
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_node import why_no_node, why_not_node, written_nodes
 from grader.diagnosis.process.process_exit import why_crashed
-from grader.findings.finding import Evidence, Finding, Moment, Table
-from grader.findings.first_seen import nodes_seen
-from grader.findings.wording import code, codes
+from grader.findings.finding import Evidence, Finding, Table, moment, nodes_seen
+from grader.findings.words import code, codes
 from grader.recording.model import Kind, Recording
 from grader.spec.name import QualifiedNodeName, TopicName
 from grader.spec.nearest_name import nearest
@@ -115,7 +114,7 @@ def arguments(recording: Recording, parameters: Arguments) -> Finding:
     shown = shown_arguments(line.text for line in lines)
     rows = tuple((name, default, description) for name, (description, default) in shown.items())
     table = Table("ros2 launch --show-args", ("argument", "default", "description"), rows)
-    printed = Moment("the arguments were shown", recording.since_launch_s(lines[-1].time_ns))
+    printed = moment(recording, "the arguments were shown", lines[-1].time_ns)
     evidence = Evidence(moments=(printed,), tables=(table,))
     there = f"it declares {codes(shown) or 'no argument'}"
     for name, wanted in parameters.arguments.items():

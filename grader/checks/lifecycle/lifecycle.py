@@ -11,14 +11,13 @@ from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Act, Doubt, Stimulated
 from grader.checks.requests import timeline
 from grader.checks.service.service import judged_calls, why_slow
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_endpoint import SERVICE, offered
 from grader.diagnosis.no_node import why_not_node
 from grader.diagnosis.process.not_called import ANSWER_S
 from grader.diagnosis.process.process_exit import why_ended
-from grader.findings.finding import Evidence, Finding
-from grader.findings.first_seen import nodes_seen
-from grader.findings.wording import code, counted, listing
+from grader.findings.finding import Evidence, Finding, nodes_seen
+from grader.findings.words import code, counted, listing
 from grader.recording.model import Call, Recording
 from grader.spec.name import QualifiedNodeName
 

@@ -10,15 +10,13 @@ from pydantic import Field
 
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.need import SentOrOwn
-from grader.diagnosis.explanation import cause_of
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import cause_of, mistaken
 from grader.diagnosis.no_log import NotLogged
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.not_called import Uncalled, slow_callbacks
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.first_seen import endpoints_seen
+from grader.findings.finding import Evidence, Finding, endpoints_seen, evidence_at
 from grader.findings.value import FieldPath
-from grader.findings.wording import code, codes, counted
+from grader.findings.words import code, codes, counted
 from grader.measure.printed import Echo, Wanted, echoes, quote, wanted_values
 from grader.recording.model import NS, Kind, Recording
 from grader.spec.name import TopicName
@@ -27,7 +25,7 @@ from grader.spec.unit import format_duration
 
 _BACKLOG_NS = NS
 """What the machine holds up so long before keeps later messages waiting."""
-_SHOWN_LINES = 5
+_SHOWN = 5
 _SENT = {
     "any": "",
     "before_launch": " that were published before the launch",
@@ -139,14 +137,11 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         return cause_of(symptom)
     stop_if(_too_seldom(recording, parameters, wanted, found))
     lines = [line for echo in found for line in echo.lines]
-    last_s = recording.since_launch_s(lines[-1].time_ns)
-    number = counted(len(messages), "message")
+    number, last = counted(len(messages), "message"), lines[-1]
+    label, log = f"logged a message on {parameters.topic}", (one.text for one in lines[:_SHOWN])
     return Finding.as_asked(
-        f"log lines follow {len(found)} of {number}: {quote(lines[-1].text)}",
-        Evidence(
-            moments=(Moment(f"logged a message on {parameters.topic}", last_s),),
-            log=tuple(line.text for line in lines[:_SHOWN_LINES]),
-        ),
+        f"log lines follow {len(found)} of {number}: {quote(last.text)}",
+        evidence_at(recording, label, last.time_ns, log=log),
     )
 
 
@@ -173,7 +168,7 @@ def _too_seldom(
     observed += f", although messages came on {code(parameters.topic)}"
     kind = Kind.PUBLISHER if parameters.own else Kind.SUBSCRIPTION
     nodes = {item.node for item in recording.student_endpoints(kind, parameters.topic)}
-    shown = Evidence(moments=(Moment("no line from here on", begin_s),))
+    shown = evidence_at(recording, "no line from here on", gap[0])
     slow = slow_callbacks(Uncalled(recording, observed, nodes))
     return slow or mistaken("seldom", observed, shown)
 

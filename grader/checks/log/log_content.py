@@ -10,17 +10,14 @@ from typing import Annotated, Literal, get_args
 from pydantic import AfterValidator, Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.diagnosis.explanation import explain
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import explain, mistaken
 from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.not_called import Uncalled, left_s
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.wrong_rhythm import why_paused
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.first_seen import until_the_end
+from grader.findings.finding import Evidence, Finding, evidence_at, moment, until_the_end
 from grader.findings.text import check_asked, says
-from grader.findings.wording import code, counted, percent
-from grader.findings.words import worded
+from grader.findings.words import code, counted, percent, worded
 from grader.measure.printed import logged_text, quote
 from grader.recording.model import NS, LogLine, Recording
 from grader.spec.name import QualifiedNodeName
@@ -225,8 +222,8 @@ def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]
         return cause
     lines = [line for line in printed(recording) if parameters.says(line.text)]
     if lines and not found:
-        moment = Moment("printed", recording.since_launch_s(lines[0].time_ns))
-        shown = Evidence(moments=(moment,), log=tuple(line.text for line in lines[:_SHOWN]))
+        log = (line.text for line in lines[:_SHOWN])
+        shown = evidence_at(recording, "printed", lines[0].time_ns, log=log)
         seen = f"{quote(lines[0].text)} is printed, not logged"
         return mistaken("printed", seen, shown, call=call)
     prints = isinstance(parameters, Contains) and parameters.printed
@@ -341,10 +338,7 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
 def _evidence(recording: Recording, records: list[Logged]) -> Evidence:
     return Evidence(
         moments=tuple(
-            Moment(
-                f"{item.level} logged" if item.level else "printed",
-                recording.since_launch_s(item.time_ns),
-            )
+            moment(recording, f"{item.level} logged" if item.level else "printed", item.time_ns)
             for item in records[:_SHOWN]
         ),
         log=tuple(

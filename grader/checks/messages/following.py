@@ -9,14 +9,13 @@ from pydantic import Field
 
 from grader.checks.check import NamedFields, Parameters, Subject, check, toleranced
 from grader.checks.need import Recorded
-from grader.diagnosis.explanation import cause_of
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import cause_of, mistaken
 from grader.diagnosis.no_messages import why_few, why_silent
 from grader.diagnosis.not_following import NotFollowing, spread
 from grader.findings.fields import FieldTolerance, within_words
-from grader.findings.finding import Evidence, Finding, Moment, Plot
+from grader.findings.finding import Evidence, Finding, Plot, evidence_at
 from grader.findings.value import FieldPath
-from grader.findings.wording import code, counted, listing
+from grader.findings.words import code, counted, listing
 from grader.measure.derived_messages import DerivedMessages, Sample
 from grader.recording.model import Recording
 from grader.spec.name import TopicName
@@ -86,12 +85,11 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     if len(judged) < parameters.at_least:
         if len(messages) < parameters.at_least:
             return why_few(recording, parameters.topic, parameters.at_least)
-        last_s = recording.since_launch_s(messages[-1].stamp_ns)
         return mistaken(
             "not_after",
             f"of {counted(len(messages), 'message')} only {len(judged)} came after the first one "
             f"on {source}",
-            Evidence(moments=(Moment("the last message", last_s),)),
+            evidence_at(recording, "the last message", messages[-1].stamp_ns),
             source=source,
         )
     wrong = [sample for sample in judged if sample.number not in right]
@@ -127,12 +125,10 @@ def _judged(
 def _failure(recording: Recording, symptom: NotFollowing) -> Finding:
     sample = symptom.wrong[len(symptom.wrong) // 2]
     derived, judged, cause = symptom.derived, symptom.judged, cause_of(symptom)
-    when_s = recording.since_launch_s(sample.message.stamp_ns)
     shown = symptom.bad or range(len(derived.fields))
-    evidence = Evidence(
-        moments=(Moment(f"message {sample.number} is wrong", when_s),),
-        plots=tuple(_plot(recording, derived, judged, index) for index in shown),
-    )
+    plots = (_plot(recording, derived, judged, index) for index in shown)
+    label = f"message {sample.number} is wrong"
+    evidence = evidence_at(recording, label, sample.message.stamp_ns, *plots)
     wrong = f"{len(symptom.wrong)} of {counted(len(judged), 'message')} wrong"
     return Finding(f"{cause.observed} ({wrong})", cause.hint, evidence)
 

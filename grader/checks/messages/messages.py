@@ -9,8 +9,7 @@ from pydantic import Field, model_validator
 
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if, toleranced
 from grader.checks.need import PUBLISHED, Recorded
-from grader.diagnosis.explanation import cause_of, explain
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import cause_of, explain, mistaken
 from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
 from grader.diagnosis.wrong_order import WrongOrder, plain
 from grader.diagnosis.wrong_value import WrongValue, was_integer
@@ -21,7 +20,7 @@ from grader.findings.fields import (
     within_words,
     words,
 )
-from grader.findings.finding import Evidence, Finding, Moment, Table
+from grader.findings.finding import Evidence, Finding, Table, moment
 from grader.findings.value import (
     EXACT,
     Difference,
@@ -34,7 +33,7 @@ from grader.findings.value import (
     same,
     tolerance_of,
 )
-from grader.findings.wording import code, codes, counted
+from grader.findings.words import code, codes, counted
 from grader.measure.numbering import is_numbered, published
 from grader.recording.model import Kind, Recording
 from grader.spec.expression import Expression
@@ -114,7 +113,7 @@ def count(recording: Recording, parameters: Count) -> Finding:
         return why_few(recording, parameters.topic, low * each + early)
     evidence = Evidence(
         moments=tuple(
-            Moment(f"message {index}", recording.since_launch_s(message.stamp_ns))
+            moment(recording, f"message {index}", message.stamp_ns)
             for index, message in enumerate(messages[:10], start=1)
         )
     )
@@ -204,11 +203,8 @@ def _wrong(
     observed += f": {clause}" if clause else ""
     if len(messages) > 1:
         observed += f" ({wrong} of {counted(len(messages), 'message')} wrong)"
-    when_s = recording.since_launch_s(message.stamp_ns)
-    shown = Evidence(
-        moments=(Moment(f"message {first} is wrong", when_s),),
-        tables=(difference_table(f"Message {first}", found),),
-    )
+    wrong_one = moment(recording, f"message {first} is wrong", message.stamp_ns)
+    shown = Evidence((wrong_one,), tables=(difference_table(f"Message {first}", found),))
     if any(was_integer(item.observed) for item in found):
         return mistaken("float_field", observed, shown)
     if right:
@@ -318,7 +314,8 @@ def _wrong_order(
     first: int,
 ) -> Finding:
     cause = cause_of(WrongOrder(found, parameters.step, parameters.tolerance))
-    when_s = recording.since_launch_s(recording.on(parameters.topic)[first].stamp_ns)
+    sent_ns = recording.on(parameters.topic)[first].stamp_ns
+    wrong_one = moment(recording, f"message {first + 1} is wrong", sent_ns)
     rows = tuple(
         (str(number), "any" if want is None else plain(want), plain(have))
         for number, (want, have) in enumerate(zip(wanted, found, strict=True), start=1)
@@ -328,8 +325,5 @@ def _wrong_order(
         f"{code(parameters.field)} is {plain(found[first])} instead of {plain(wanted[first])} in "
         f"message {first + 1} of {len(found)}{cause.observed}",
         cause.hint,
-        Evidence(
-            moments=(Moment(f"message {first + 1} is wrong", when_s),),
-            tables=(Table(title, header, rows[:50]),),
-        ),
+        Evidence((wrong_one,), tables=(Table(title, header, rows[:50]),)),
     )

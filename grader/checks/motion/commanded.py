@@ -10,7 +10,7 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.no_motion import (
     why_cut_short,
     why_not_judged,
@@ -18,12 +18,10 @@ from grader.diagnosis.motion.no_motion import (
     why_rejected,
 )
 from grader.diagnosis.no_messages import why_silent
-from grader.findings.finding import Evidence, Finding, Plot
-from grader.findings.first_seen import evidence_at, first_seen
-from grader.findings.wording import code, counted, percent
+from grader.findings.finding import Evidence, Finding, Plot, evidence_at, first_seen
+from grader.findings.words import code, counted, percent, speed, turn
 from grader.measure.motion.approach import NO_SPEED_M_S
 from grader.measure.motion.command import VelocityCommand, command_topic, commands
-from grader.measure.motion.quantities import speed, turn
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene
 from grader.spec.quantity import Ratio

@@ -11,16 +11,14 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters, moved_in
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
 from grader.diagnosis.wrong_value import factor_words
-from grader.findings.finding import Evidence, Finding
-from grader.findings.first_seen import evidence_at, until_the_end
-from grader.findings.wording import counted, percent
+from grader.findings.finding import Evidence, Finding, evidence_at, until_the_end
+from grader.findings.words import counted, degrees, metres, percent, speed, turn
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.ground import ahead
-from grader.measure.motion.quantities import degrees, metres, speed, turn
 from grader.measure.motion.scan import misreading
 from grader.measure.motion.track import (
     MOVED_M,

@@ -11,17 +11,14 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import GoalParameters, RobotParameters
-from grader.diagnosis.mistake import mistaken
-from grader.diagnosis.motion.missed_goal import why_not_there
-from grader.diagnosis.motion.missed_heading import why_not_aligned
+from grader.diagnosis.explanation import mistaken
+from grader.diagnosis.motion.missed_goal import why_not_aligned, why_not_there
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted, why_off_course, why_unsteered
-from grader.findings.finding import Evidence, Finding, Plot
-from grader.findings.first_seen import evidence_at, until_the_end
-from grader.findings.wording import percent
+from grader.findings.finding import Evidence, Finding, Plot, evidence_at, until_the_end
+from grader.findings.words import degrees, metres, percent, point, speed, turn
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.command import stolen_s
-from grader.measure.motion.quantities import degrees, metres, point, speed, turn
 from grader.measure.motion.track import final_rest, is_at_rest, speed_plot, way_m
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth

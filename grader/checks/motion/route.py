@@ -12,16 +12,13 @@ from pydantic import AfterValidator, Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters, moved_in
-from grader.diagnosis.explanation import cause_of
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import cause_of, mistaken, remedy
 from grader.diagnosis.motion.missed_place import PlaceMissed
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_off_course
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.first_seen import evidence_at
-from grader.findings.wording import counted, listing, percent
+from grader.findings.finding import Evidence, Finding, Moment, evidence_at, moment
+from grader.findings.words import counted, listing, metres, percent, point
 from grader.measure.motion.ground import nearest
-from grader.measure.motion.quantities import metres, point
 from grader.measure.motion.track import is_at_rest, over_time, speed_plot, way_m
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
@@ -87,7 +84,7 @@ def visits(recording: Recording, parameters: Visits) -> Finding:
     plots = (speed_plot(recording),)
     evidence = Evidence(
         moments=tuple(
-            Moment(f"at {_words(parameters.places[number])}", recording.since_launch_s(time_ns))
+            moment(recording, f"at {_words(parameters.places[number])}", time_ns)
             for number, time_ns in moments.items()
         ),
         plots=plots,

@@ -11,18 +11,16 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters, moved_in
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_it_exited
-from grader.findings.finding import Evidence, Finding, Table
-from grader.findings.first_seen import evidence_at, until_the_end
-from grader.findings.wording import counted
+from grader.findings.finding import Evidence, Finding, Table, evidence_at, until_the_end
+from grader.findings.words import counted, metres, speed
 from grader.measure.motion.command import commands, scans, stolen_s
 from grader.measure.motion.ground import Sight, ahead
-from grader.measure.motion.quantities import metres, speed
 from grader.measure.motion.scan import front, misreading
 from grader.measure.motion.track import (
     REST_M_S,

@@ -9,14 +9,12 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import GoalParameters
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.off_course import why_off_course
-from grader.findings.finding import Evidence, Finding
-from grader.findings.first_seen import evidence_at
-from grader.findings.wording import counted
+from grader.findings.finding import Evidence, Finding, evidence_at
+from grader.findings.words import counted, degrees, metres, speed
 from grader.measure.motion.approach import Approach, long_turns
-from grader.measure.motion.quantities import degrees, metres, speed
 from grader.measure.motion.track import speed_plot, way_m
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth

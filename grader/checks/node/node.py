@@ -8,7 +8,7 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.wrong_name import Named, misnamed
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_node import meant_node, why_no_node, why_not_node
 from grader.diagnosis.process.not_called import left_s
 from grader.diagnosis.process.process_exit import (
@@ -18,9 +18,17 @@ from grader.diagnosis.process.process_exit import (
     why_ended,
     why_it_exited,
 )
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.first_seen import endpoints_seen, nodes_seen
-from grader.findings.wording import code, codes, counted
+from grader.findings.finding import (
+    Evidence,
+    Finding,
+    Moment,
+    endpoints_seen,
+    evidence_at,
+    moment,
+    nodes_seen,
+    until_the_end,
+)
+from grader.findings.words import code, codes, counted
 from grader.measure import declarations
 from grader.recording.event import LONGEST_STRETCH
 from grader.recording.model import NS, Kind, Node, Owner, Process, Recording
@@ -49,9 +57,8 @@ def starts(recording: Recording, parameters: Starts) -> Finding:
 
 def _appeared(recording: Recording, parameters: Parameters, node: Node, what: str) -> Finding:
     when_s = recording.since_launch_s(node.appeared_ns)
-    shown = Evidence(moments=(Moment(f"node {node.name} appeared", when_s),))
-    observed = f"{what} appeared {when_s:.2f} s after launch"
-    return Finding.as_asked(observed, shown)
+    shown = evidence_at(recording, f"node {node.name} appeared", node.appeared_ns)
+    return Finding.as_asked(f"{what} appeared {when_s:.2f} s after launch", shown)
 
 
 class NodeExists(Named):
@@ -152,12 +159,12 @@ def _why_gone(recording: Recording, name: str | None) -> Finding | None:
     # Of nodes that the scenario is not about, one is as good as another.
     if not gone or (name is None and not concerned and len(gone) < len(nodes)):
         return None
-    when_s = recording.since_launch_s(gone[0].vanished_ns or recording.stop_ns)
+    gone_ns = gone[0].vanished_ns or recording.stop_ns
     return mistaken(
         "destroyed",
-        f"the node {code(gone[0].name)} left the ROS graph {when_s:.2f} s after launch, although "
-        "its process still ran",
-        Evidence(moments=(Moment(f"node {gone[0].name} vanished", when_s),)),
+        f"the node {code(gone[0].name)} left the ROS graph "
+        f"{recording.since_launch_s(gone_ns):.2f} s after launch, although its process still ran",
+        evidence_at(recording, f"node {gone[0].name} vanished", gone_ns),
     )
 
 
@@ -228,8 +235,7 @@ def ends(recording: Recording, parameters: Ends) -> Finding:
     if not asked:
         return Finding.ours("a stimulus of the scenario had ended it before")
     observed = f"ended {format_duration(max(map(took_s, asked)))} after SIGINT"
-    sigint = Moment("SIGINT", recording.since_launch_s(recording.stop_ns))
-    return Finding.as_asked(observed, Evidence(moments=(sigint,)))
+    return Finding.as_asked(observed, Evidence(moments=(until_the_end(recording, "SIGINT"),)))
 
 
 def _was_killed(recording: Recording, process: Process) -> bool:
@@ -270,12 +276,10 @@ def _why_slow(recording: Recording, process: Process) -> Finding:
         for line in recording.log
         if line.process == process.name and line.time_ns >= recording.stop_ns
     ]
-    sigint = Moment("SIGINT", recording.since_launch_s(recording.stop_ns))
-    moments = (sigint, _end(recording, process))
+    moments = (until_the_end(recording, "SIGINT"), _end(recording, process))
     shown = Evidence(moments=moments, log=tuple(lines[-10:]))
     return mistaken("ignores_sigint", seen, shown)
 
 
 def _end(recording: Recording, process: Process) -> Moment:
-    when_s = recording.since_launch_s(process.exited_ns or recording.end_ns)
-    return Moment(f"{process.name} ended", when_s)
+    return moment(recording, f"{process.name} ended", process.exited_ns or recording.end_ns)

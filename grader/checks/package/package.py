@@ -1,17 +1,23 @@
-"""Checks of a package as handed in: it is found, builds, has its executable and dependencies."""
+"""Checks of a package as handed in: it is found, builds, and has what belongs to it.
+
+That is its executable, its dependencies, what package.xml says, its files and its own tests.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from fnmatch import fnmatchcase
+from pathlib import PurePosixPath
 from typing import ClassVar
 
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.need import Need, Submitted
+from grader.checks.need import Need, StudentTests, Submitted
 from grader.checks.wrong_name import Named
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_executable import why_no_executable, why_nothing_to_run
 from grader.diagnosis.not_built import (
     breach_of_rep_144,
@@ -23,11 +29,11 @@ from grader.diagnosis.not_built import (
 )
 from grader.diagnosis.wrong_dependencies import why_unknown_imports, why_wrong_dependencies
 from grader.findings.finding import Evidence, Finding
-from grader.findings.wording import code, codes
-from grader.findings.words import worded
-from grader.recording.submission import SourceError, SubmissionRecord
+from grader.findings.words import code, codes, counted, worded
+from grader.recording.submission import PackageRecord, SourceError, SubmissionRecord
 from grader.spec.name import BuildTypes, PackageName
 from grader.spec.names import NO_NAMES, Names, Thing, WrongName
+from grader.spec.nearest_name import meant
 from grader.submission.read.reachable import only_for
 
 
@@ -172,3 +178,152 @@ def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Find
     names = sorted({item.module for item in package.ros_imports} - {package.name})
     observed = f"{codes(names)} declared" if names else f"none {worded('imported', 'included')}"
     return Finding.as_asked(observed)
+
+
+# What `ros2 pkg create` writes where nothing was given, on any machine.
+_PLACEHOLDER = re.compile(r"TODO|@todo\.todo|@todo$", re.IGNORECASE)
+
+
+class Manifest(OfPackage):
+    """Parameters of package.manifest."""
+
+    asks = "the description, the maintainer and the licence in package.xml of `{self.package}`"
+
+    license: str | None = Field(
+        None, description="Expected licence, such as `Apache-2.0`; by default any."
+    )
+
+
+@check("package.manifest", Subject.SUBMISSION, Manifest, concept="packages")
+def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding:
+    """package.xml names the description, the maintainer and the licence of the package.
+
+    Placeholders that `ros2 pkg create` writes, such as `TODO: License declaration`, do not count.
+    """
+    stop_if(why_no_manifest(submission, parameters.package))
+    package = existing_package(submission, parameters.package)
+    faults = [*_placeholders(package), *_other_license(package, parameters)]
+    if not faults:
+        seen = f"{', '.join(package.maintainers)}; {', '.join(package.licenses)}"
+        return Finding.as_asked(seen)
+    shown = Evidence(places=(SourceError(package.file("package.xml"), None, faults[0]),))
+    return mistaken("unsaid", "; ".join(faults), shown)
+
+
+def _placeholders(package: PackageRecord) -> Iterator[str]:
+    tags = {
+        "description": (package.description,),
+        "maintainer": package.maintainers,
+        "license": package.licenses,
+    }
+    for tag, values in tags.items():
+        for value in values:
+            if not value.strip() or _PLACEHOLDER.search(value.rstrip(">")):
+                yield f"<{tag}> is {code(value) if value.strip() else 'empty'}"
+
+
+def _other_license(package: PackageRecord, parameters: Manifest) -> Iterator[str]:
+    expected = parameters.license
+    if expected is not None and expected.casefold() not in map(str.casefold, package.licenses):
+        yield f"the licence is {code(', '.join(package.licenses))}, not {code(expected)}"
+
+
+class File(OfPackage, Named):
+    """Parameters of package.file."""
+
+    asks = "the package installs `share/{self.package}/{self.path}`"
+    thing, called = Thing.FILE, "share/{self.package}/{self.path}"
+
+    path: str = Field(
+        min_length=1,
+        description="Path below `share/<package>/`, such as `launch/robot.launch.py`; `*` and `?` "
+        "stand for any text and any character, as in `config/*.yaml`.",
+    )
+
+
+@check("package.file", Subject.SUBMISSION, File, concept="packages")
+def file(submission: SubmissionRecord, parameters: File) -> Finding:
+    """The package installs a file, such as a launch file or a parameter file.
+
+    Judged by what the build installed in `share/<package>/`.
+    """
+    stop_if(why_not_built(submission, parameters.package))
+    package, asked = existing_package(submission, parameters.package), parameters.asked_for
+    installed = [path for path, _ in package.shared]
+    found = [path for path in installed if fnmatchcase(path, parameters.path)]
+    if found:
+        return Finding.passed(asked, f"it installs {codes(found)}")
+    if not installed:
+        # Each package installs its package.xml.
+        return Finding.ours("what it installs was not recorded: grade again")
+    folder, _, name = parameters.path.rpartition("/")
+    other = _meant(parameters.path, installed) if parameters.remap else None
+    if other:
+        seen = f"it installs {code(other)} instead; everything else was judged with that file"
+        found_there = mistaken("other_file", seen, file=name, folder=f"{package.name}/{folder}")
+        names = parameters.wrong(f"share/{package.name}/{other}")
+        return replace(found_there, names=names)
+    own = [path for path in submission.files if fnmatchcase(path.rpartition("/")[2], name)]
+    seen = f"{codes(own)} is handed in, but not installed; " if own else ""
+    line = f"install(DIRECTORY {folder} DESTINATION share/${{PROJECT_NAME}})` in CMakeLists.txt"
+    if package.build_type != "ament_cmake":
+        line = worded(
+            python=f"('share/{package.name}/{folder}', glob('{parameters.path}'))` in data_files "
+            "of setup.py",
+            cpp=line,
+        )
+    mistake = "not_installed" if own else "no_such_file"
+    return mistaken(mistake, f"{seen}it installs {codes(installed)}", line=line)
+
+
+def _meant(path: str, installed: Iterable[str]) -> str | None:
+    """The installed file that is probably meant by a path: of that name elsewhere, or of its kind.
+
+    Of several in its folder it is the one with the nearest name.
+    """
+    asked = PurePosixPath(path)
+    others = [PurePosixPath(one) for one in installed]
+    same = [str(one) for one in others if one.name == asked.name]
+    kind = [
+        str(one)
+        for one in others
+        if (one.parent, one.suffixes) == (asked.parent, asked.suffixes) and asked.suffix
+    ]
+    return meant(path, same or kind)
+
+
+class Tests(OfPackage):
+    """Parameters of package.tests."""
+
+    needs = (StudentTests(),)
+
+    at_least: int = Field(1, ge=1, description="Least number of tests.")
+
+    def _asked(self) -> str:
+        return f"at least {counted(self.at_least, 'test')} in {code(self.package)}, all pass"
+
+
+@check("package.tests", Subject.SUBMISSION, Tests)
+def tests(submission: SubmissionRecord, parameters: Tests) -> Finding:
+    """The student's own tests of the package pass.
+
+    They are run with pytest after the build, in the sandbox of the build. The linters that `ros2
+    pkg create` puts into `test/` do not count.
+    """
+    stop_if(why_not_built(submission, parameters.package))
+    runs = submission.build.tests if submission.build else ()
+    name = existing_package(submission, parameters.package).name
+    run = next((one for one in runs if one.package == name), None)
+    if run is None:
+        return Finding.ours("the tests were not run: grade again")
+    if run.problem is not None:
+        return mistaken("no_tests", run.problem)
+    if run.failed:
+        names = codes(name for name, _ in run.failed)
+        seen = f"{counted(run.passed, 'test')} passed, {len(run.failed)} failed: {names}"
+        log = tuple(f"{name} - {message}" for name, message in run.failed)
+        return mistaken("failed_tests", seen, Evidence(log=log))
+    if run.passed < parameters.at_least:
+        seen = f"there {'is' if run.passed == 1 else 'are'} {counted(run.passed, 'test')}"
+        return mistaken("few_tests", seen)
+    return Finding.as_asked(f"{counted(run.passed, 'test')} passed")

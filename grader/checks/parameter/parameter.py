@@ -1,26 +1,28 @@
-"""Checks of parameters: declared as they must be, and set or refused."""
+"""Checks of parameters: declared as they must be, set or refused, and taken from the launch."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.need import Act, Doubt, ParameterSet, Stimulated
-from grader.diagnosis.mistake import mistaken
+from grader.checks.need import Act, Doubt, ParameterSet, ParametersGiven, Stimulated
+from grader.checks.wrong_name import Renamable
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_parameter import (
     answered_at,
     declare_parameter,
     why_not_asked,
     why_not_declared,
+    why_not_taken,
     why_services_silent,
 )
 from grader.findings.fields import wanted_text
-from grader.findings.finding import Evidence, Finding, Table
-from grader.findings.first_seen import evidence_at
+from grader.findings.finding import Evidence, Finding, Table, evidence_at
 from grader.findings.value import same, same_value
-from grader.findings.wording import code, value_text
+from grader.findings.words import code, codes, listing, value_text
 from grader.measure.parameter_calls import (
     Descriptor,
     Reading,
@@ -28,11 +30,13 @@ from grader.measure.parameter_calls import (
     Type,
     calls_to,
     descriptor,
+    misnamed_parameters,
     readings,
     settings,
 )
 from grader.recording.model import Recording
 from grader.spec.name import QualifiedNodeName
+from grader.spec.names import Names, Thing, WrongName
 
 _TOLERANCE = 1e-9
 
@@ -239,3 +243,42 @@ def _why_other_answer(recording: Recording, item: Setting, parameters: Set) -> F
 def _moment(recording: Recording, item: Setting, parameters: Set) -> Evidence:
     text = f"set {parameters.name} = {value_text(item.value)}"
     return evidence_at(recording, text, item.call.requested_ns)
+
+
+class Given(Renamable):
+    """Parameters of parameter.given."""
+
+    doubt = Doubt.ANSWER_MISSED
+    needs = (ParametersGiven(),)
+
+    names: tuple[str, ...] = Field(
+        (), description="Names of the parameters; by default all that the launch gives."
+    )
+
+    def _asked(self) -> str:
+        return f"{codes(self.names) or 'every parameter that the launch gives'} declared by a node"
+
+
+PARAMETERS_GIVEN = "parameter.given"
+
+
+@check(PARAMETERS_GIVEN, Subject.RECORDING, Given)
+def given(recording: Recording, parameters: Given) -> Finding:
+    """The node declares the parameters that the launch gives it.
+
+    Judged by what the student's nodes answer when the probe asks for their parameters. Without an
+    answer of each node it passes: what the node does is judged by other checks. Where a launch file
+    starts the nodes, a parameter file that is for none of them fails, too. If it fails, others
+    that fail in the same scenario, without partial credit, are skipped, but for those it requires.
+    """
+    given, asked = parameters.names or recording.given_parameters, parameters.asked_for
+    finding = why_not_taken(recording, given)
+    if finding is None:
+        return Finding.passed(asked, "no other parameter is given")
+    likely = misnamed_parameters(recording, given) if parameters.remap else {}
+    if not likely:
+        return finding
+    names = Names.of(WrongName(Thing.PARAMETER, other, name) for name, other in likely.items())
+    meant = listing(f"{code(other)} for {code(name)}" for name, other in likely.items())
+    seen = f"{finding.observed}; everything else was judged with {meant}"
+    return replace(finding, observed=seen, names=names)

@@ -13,15 +13,15 @@ from pydantic import Field, model_validator
 from grader.checks.check import NamedFields, Subject, check, stop_if, toleranced
 from grader.checks.need import ParameterSet, Recorded
 from grader.checks.parameter.parameter import OfSetting, refusal, settings_to
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_answer import why_raised, why_taken
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_parameter import get_parameter
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.fields import FieldTolerance, difference_table, difference_words, unlike, words
-from grader.findings.finding import Evidence, Finding, Moment
+from grader.findings.finding import Evidence, Finding, evidence_at
 from grader.findings.value import EXACT
-from grader.findings.wording import code, counted, percent, value_text
+from grader.findings.words import code, counted, percent, value_text
 from grader.measure.parameter_calls import settings
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
@@ -80,8 +80,7 @@ def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding:
     """
     item = settings_to(recording, parameters)[0]
     set_ns = item.call.answered_ns or 0
-    when = Moment(f"set to {value_text(item.value)}", recording.since_launch_s(set_ns))
-    shown = Evidence(moments=(when,))
+    shown = evidence_at(recording, f"set to {value_text(item.value)}", set_ns)
     if not item.accepted:
         return mistaken("refused_value", f"the value was {refusal(item)}", shown)
     published = recording.on(parameters.topic)

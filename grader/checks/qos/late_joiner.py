@@ -16,7 +16,7 @@ from grader.diagnosis.kept_history import (
 from grader.diagnosis.no_messages import why_few
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Finding
-from grader.findings.wording import code, counted
+from grader.findings.words import code, counted
 from grader.recording.model import Recording
 from grader.spec.name import Id, TopicName
 

@@ -9,13 +9,11 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import mistaken, remedy
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.undeclared import why_undeclared
-from grader.findings.finding import Evidence, Finding
-from grader.findings.first_seen import endpoints_seen, first_seen
-from grader.findings.wording import code, counted
-from grader.findings.words import Words
+from grader.findings.finding import Evidence, Finding, endpoints_seen, first_seen
+from grader.findings.words import Words, code, counted
 from grader.measure import declarations
 from grader.measure.compatibility import (
     comparisons,

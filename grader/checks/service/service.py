@@ -20,13 +20,13 @@ from grader.checks.check import (
 )
 from grader.checks.need import Act, Doubt, Stimulated
 from grader.checks.requests import Offered, is_offered, judged_requests, why_other_fields
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_answer import NoAnswer, why_late
 from grader.diagnosis.no_endpoint import SERVICE
 from grader.findings.fields import FieldTolerance, brief, unlike, words
-from grader.findings.finding import Evidence, Finding, Moment, Table
+from grader.findings.finding import Evidence, Finding, Table, evidence_at, moment
 from grader.findings.value import EXACT, value_at
-from grader.findings.wording import code, codes, counted
+from grader.findings.words import code, codes, counted
 from grader.recording.model import NS, Call, Recording
 from grader.spec.name import TopicName
 from grader.spec.names import Thing
@@ -139,8 +139,8 @@ def _why_other_response(
     recording: Recording, calls: tuple[Call, ...], call: Call, parameters: Responds
 ) -> Finding | None:
     seen = f"{_which(calls, call)} was answered with"
-    called = Moment(f"called with {brief(call.request or {})}", _since_s(recording, call))
-    shown, response = Evidence(moments=(called,)), call.response or {}
+    called, response = f"called with {brief(call.request or {})}", call.response or {}
+    shown = evidence_at(recording, called, call.requested_ns)
     other = unlike(response, parameters.response, parameters.tolerance)
     wrong = why_other_fields(seen, "response", response, other, shown)
     lacking = [
@@ -156,20 +156,16 @@ def _why_other_response(
 def _evidence(recording: Recording, calls: Sequence[Call]) -> Evidence:
     rows = tuple(
         (
-            f"{_since_s(recording, call):.2f} s",
+            f"{recording.since_launch_s(call.requested_ns):.2f} s",
             brief(call.request or {}),
             words(call.response) if call.response is not None else "no answer",
             format_duration(_took_s(call)) if call.answered_ns is not None else "",
         )
         for call in calls[:50]
     )
-    moments = [Moment(f"{call.service} called", _since_s(recording, call)) for call in calls[:5]]
+    moments = [moment(recording, f"{one.service} called", one.requested_ns) for one in calls[:5]]
     table = Table("Calls", ("called at", "request", "response", "after"), rows)
     return Evidence(moments=tuple(moments), tables=(table,))
-
-
-def _since_s(recording: Recording, call: Call) -> float:
-    return recording.since_launch_s(call.requested_ns)
 
 
 class Concurrent(Parameters):

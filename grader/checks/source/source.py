@@ -15,10 +15,10 @@ from pydantic import AfterValidator, Field, field_validator
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.need import RuffRules, Submitted
 from grader.checks.package.package import OfPackage
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.not_built import existing_package, why_no_package, why_too_new
 from grader.findings.finding import Evidence, Finding
-from grader.findings.wording import code, codes, counted, listing, percent
+from grader.findings.words import code, codes, counted, listing, percent
 from grader.recording.submission import (
     PYTHON,
     PackageRecord,

@@ -12,11 +12,11 @@ from pydantic import Field, model_validator
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import PUBLISHED, Recorded
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_messages import why_not_sent, why_silent
 from grader.diagnosis.process.not_called import left_s
-from grader.findings.finding import Evidence, Finding, Moment, Plot
-from grader.findings.wording import code, counted
+from grader.findings.finding import Evidence, Finding, Plot, moment
+from grader.findings.words import code, counted
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
@@ -164,14 +164,13 @@ def _evidence(
     missing: Sequence[int],
 ) -> Evidence:
     moments = [
-        Moment(f"sent on {parameters.stimulus}, not answered", recording.since_launch_s(at))
-        for at in missing[:10]
+        moment(recording, f"sent on {parameters.stimulus}, not answered", at) for at in missing[:10]
     ]
     if not waits:
         return Evidence(moments=tuple(moments))
     begin_ns, end_ns = max(waits, key=lambda wait: wait[1] - wait[0])
     slowest = f"slowest answer: after {format_duration((end_ns - begin_ns) / NS)}"
-    moments.append(Moment(slowest, recording.since_launch_s(begin_ns)))
+    moments.append(moment(recording, slowest, begin_ns))
     plot = Plot(
         title=f"From a message on {parameters.stimulus} to its answer",
         x_label="time since launch (s)",

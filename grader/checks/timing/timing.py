@@ -13,14 +13,12 @@ from pydantic import Field, model_validator
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Recorded
 from grader.checks.tolerance import TimeTolerance, Tolerance
-from grader.diagnosis.explanation import cause_of
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import cause_of, mistaken
 from grader.diagnosis.no_messages import why_few
 from grader.diagnosis.process.not_called import left_s
 from grader.diagnosis.wrong_rhythm import WrongRhythm, why_paused
-from grader.findings.finding import Evidence, Finding, Moment, Plot
-from grader.findings.first_seen import evidence_at, first_seen
-from grader.findings.wording import code, counted
+from grader.findings.finding import Evidence, Finding, Plot, evidence_at, first_seen
+from grader.findings.words import code, counted
 from grader.measure import declarations
 from grader.measure.numbering import is_numbered, lost
 from grader.measure.period import (
@@ -109,8 +107,7 @@ def period(recording: Recording, parameters: Period) -> Finding:
     limits = parameters.limits
     messages = recording.on(parameters.topic)[: MOST_INTERVALS + 1]
     if len(messages) <= parameters.at_least and not _too_slow(messages, limits):
-        cause = why_few(recording, parameters.topic, parameters.at_least + 1)
-        return cause
+        return why_few(recording, parameters.topic, parameters.at_least + 1)
     stop_if(_why_not_believed(recording, messages))
     measured = intervals(messages)
     if len(measured) < min(parameters.at_least, len(messages) - 1):
@@ -349,8 +346,7 @@ def _why_arrivals_differ(recording: Recording, live: Sequence[Message]) -> Findi
 
 
 def _arrival(recording: Recording, message: Message) -> Evidence:
-    when_s = recording.since_launch_s(message.received_ns)
-    return Evidence(moments=(Moment(f"a message on {message.topic} arrived", when_s),))
+    return evidence_at(recording, f"a message on {message.topic} arrived", message.received_ns)
 
 
 def _way_s(message: Message) -> float:

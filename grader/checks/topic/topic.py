@@ -11,13 +11,11 @@ from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Recorded
 from grader.checks.wrong_name import Named, misnamed
 from grader.diagnosis.destroyed_endpoint import why_dropped
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_endpoint import ENDPOINTS, meant_endpoint, why_no_endpoint
 from grader.diagnosis.no_node import why_no_node
-from grader.findings.finding import Evidence, Finding
-from grader.findings.first_seen import endpoints_seen, nodes_seen
-from grader.findings.wording import code, codes
-from grader.findings.words import type_in_code
+from grader.findings.finding import Evidence, Finding, endpoints_seen, nodes_seen
+from grader.findings.words import code, codes, type_in_code
 from grader.recording.model import Kind, Recording
 from grader.spec.name import InterfaceName, TopicName
 from grader.spec.names import Thing

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from grader.findings.wording import counted
+from grader.findings.words import counted
 from grader.spec.safe_text import one_line
 
 if TYPE_CHECKING:

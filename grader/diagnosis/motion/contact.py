@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken
 from grader.diagnosis.process.standing import stuck
-from grader.findings.finding import Evidence, Finding
-from grader.findings.first_seen import evidence_at
+from grader.findings.finding import Evidence, Finding, evidence_at
+from grader.findings.words import speed, turn
 from grader.measure.motion.command import VelocityCommand, commands
-from grader.measure.motion.quantities import speed, turn
 from grader.measure.motion.scan import newest
 from grader.measure.motion.track import is_at_rest, speed_plot
 from grader.recording.model import NS, Recording

@@ -1,21 +1,19 @@
-"""Why the goal's position was not reached."""
+"""Why the goal was not reached: its position, or its heading."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.mistake import remedy
+from grader.diagnosis.explanation import Symptom, cause_of, explanation, remedy
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.diagnosis.process.not_called import at_its_place
 from grader.diagnosis.process.standing import stuck
-from grader.findings.finding import Finding
-from grader.findings.first_seen import evidence_at
+from grader.findings.finding import Evidence, Finding, evidence_at, until_the_end
+from grader.findings.words import degrees, metres, point, speed, turn
 from grader.measure.motion.approach import Approach, long_turns
 from grader.measure.motion.command import stolen_s
-from grader.measure.motion.quantities import metres, point, speed, turn
 from grader.measure.motion.track import is_at_rest, turned_rad
 from grader.recording.model import NS, Ending
 from grader.recording.simulated import Truth
@@ -70,10 +68,41 @@ class GoalMissed(Symptom[Finding]):
         return Finding(f"{self.seen}{words}", hint, evidence)
 
 
+@dataclass(frozen=True)
+class HeadingMissed(Symptom[Finding], concept="angles"):
+    """The robot is at the goal with the wrong heading."""
+
+    run: Approach
+    position_m: float
+    heading_rad: float
+
+    @property
+    def last(self) -> Truth:
+        """The end of the way."""
+        return self.run.truth[-1]
+
+    def cause(self, words: str, hint: str) -> Finding:
+        """The symptom in words, followed by more, with the heading over time."""
+        plots = (self.run.heading_plot,)
+        return Finding(
+            f"is at the goal's position, but faces {degrees(self.last.yaw_rad)} instead of "
+            f"{degrees(self.run.goal.yaw_rad)}{words}",
+            hint,
+            Evidence(moments=(until_the_end(self.run.recording),), plots=plots),
+        )
+
+
 def why_not_there(run: Approach, position_m: float) -> Finding | None:
     """Why the robot is not at the goal's position in the end; None if it is."""
     symptom = GoalMissed(run, position_m)
     return None if run.distance_m(symptom.last) <= position_m else cause_of(symptom)
+
+
+def why_not_aligned(run: Approach, position_m: float, heading_rad: float) -> Finding | None:
+    """Why the robot does not look as the goal does in the end; None if it does."""
+    if abs(run.heading_error_rad(run.truth[-1])) <= heading_rad:
+        return None
+    return cause_of(HeadingMissed(run, position_m, heading_rad))
 
 
 @explanation(GoalMissed)
@@ -87,8 +116,8 @@ def no_cpu_time(symptom: GoalMissed) -> Finding | None:
     return Finding.held_up(symptom.seen, lost_s)
 
 
-@explanation(GoalMissed)
-def off_course(symptom: GoalMissed) -> Finding | None:
+@explanation(GoalMissed, HeadingMissed)
+def off_course(symptom: GoalMissed | HeadingMissed) -> Finding | None:
     """The process ended, the robot touched something, or no command came for a long time."""
     return why_off_course(symptom.run.recording)
 
@@ -180,3 +209,21 @@ def drives_away(symptom: GoalMissed) -> Finding | None:
 def too_slow(symptom: GoalMissed) -> Finding:
     """It is on its way, but too slow, or it weaves from side to side."""
     return symptom.cause(f", after {format_duration(symptom.watched_s)}", remedy("too_slow"))
+
+
+@explanation(HeadingMissed)
+def heading_misread(symptom: HeadingMissed) -> Finding | None:
+    """The yaw is computed wrongly from the quaternion."""
+    misread = misread_yaw(symptom.run, symptom.position_m)
+    return symptom.cause(f": {misread}", remedy(misread.mistake)) if misread else None
+
+
+@explanation(HeadingMissed, general=True)
+def stopped_turning(symptom: HeadingMissed) -> Finding:
+    """It stopped turning too early or too late, never turned to the heading, or still turns."""
+    words, driven = "", symptom.run.driven(math.inf)
+    if not is_at_rest(symptom.last):
+        words = f" and still turns at {turn(symptom.last.angular_rad_s)} when the observation ends"
+    elif driven is not None and abs(turned_rad(symptom.run.truth[driven:])) < symptom.heading_rad:
+        words = ": it has not turned since it arrived"
+    return symptom.cause(words, remedy("stopped_turning"))

@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from grader.diagnosis.explanation import Symptom, explanation
-from grader.diagnosis.mistake import remedy
+from grader.diagnosis.explanation import Symptom, explanation, remedy
 from grader.diagnosis.motion.off_course import why_off_course
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.measure.motion.quantities import degrees, metres
+from grader.findings.finding import Evidence, Finding, Moment, moment
+from grader.findings.words import degrees, metres
 from grader.measure.motion.track import final_rest, speed_plot
 from grader.recording.model import Recording
 from grader.recording.simulated import Truth
@@ -61,8 +60,8 @@ class PlaceMissed(Symptom[Finding]):
 
     def cause(self, words: str, hint: str, label: str, step: Truth) -> Finding:
         """What it did instead, and when."""
-        moment = Moment(label, self.recording.since_launch_s(step.time_ns))
-        evidence = Evidence((*self.visited, moment), plots=(speed_plot(self.recording),))
+        moments = (*self.visited, moment(self.recording, label, step.time_ns))
+        evidence = Evidence(moments, plots=(speed_plot(self.recording),))
         return Finding(f"{self.seen}; {words}", hint, evidence)
 
 

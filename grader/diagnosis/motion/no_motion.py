@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken, remedy
 from grader.diagnosis.no_messages import NoMessages, why_refused, why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
 from grader.diagnosis.wrong_value import misread_words, was_integer
-from grader.findings.finding import Evidence, Finding
-from grader.findings.first_seen import evidence_at
+from grader.findings.finding import Evidence, Finding, evidence_at
 from grader.findings.reference import Goal, UnknownValue
 from grader.findings.value import leaves
-from grader.findings.wording import code, codes, counted
+from grader.findings.words import code, codes, counted, speed
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.command import (
     VelocityCommand,
@@ -24,7 +22,6 @@ from grader.measure.motion.command import (
     is_zero,
     stolen_s,
 )
-from grader.measure.motion.quantities import speed
 from grader.measure.motion.scan import misreading
 from grader.measure.motion.track import has_moved, index_at, is_at_rest
 from grader.recording.model import NS, Recording

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from grader.diagnosis.mistake import mistaken
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short
-from grader.findings.finding import Finding
-from grader.findings.first_seen import evidence_at
+from grader.findings.finding import Finding, evidence_at
 from grader.measure.motion.command import commands, is_zero
 from grader.measure.motion.track import speed_plot
 from grader.recording.model import NS, Recording

@@ -9,12 +9,10 @@ from string import Template
 
 from pydantic import Field
 
-from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
-from grader.diagnosis.mistake import remedy
+from grader.diagnosis.explanation import Explanation, Symptom, add, explanation, remedy
 from grader.diagnosis.process.failure import Failure, Frame
 from grader.diagnosis.process.raised import student_place
-from grader.findings.wording import code, listing
-from grader.findings.words import Words
+from grader.findings.words import Words, code, listing
 from grader.recording.model import Recording
 from grader.recording.submission import CPP, PYTHON, PackageRecord, SubmissionRecord
 from grader.spec.source import Model, read_source

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
-from grader.diagnosis.explanation import Symptom, explanation
-from grader.diagnosis.mistake import remedy
+from grader.diagnosis.explanation import Symptom, explanation, remedy
 from grader.diagnosis.process.standing import Stand, slow_callback, unkept_future, where_it_stands
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.first_seen import until_the_end
-from grader.findings.wording import codes
-from grader.findings.words import SPIN
+from grader.findings.finding import Evidence, Finding, evidence_at, until_the_end
+from grader.findings.words import SPIN, codes
 from grader.measure import declarations
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Call, Process, Recording
@@ -146,7 +143,7 @@ def blocked_executor(symptom: NotCalled) -> Finding | None:
         f"{symptom.seen}: something blocks the executor; from {since_s:.2f} s after launch on the "
         "node's parameter service does not answer either",
         remedy("blocked"),
-        Evidence(moments=(Moment("first call that was not answered", since_s),)),
+        evidence_at(recording, "first call that was not answered", call.requested_ns),
         concept="executors",
     )
     stand = where_it_stands(recording, process.name) if process is not None else None
@@ -165,12 +162,11 @@ def slow_callbacks(symptom: CalledLate) -> Finding | None:
     call, wait_s = sorted(waits, key=lambda item: item[1])[-2] if len(waits) > 1 else (None, 0.0)
     if call is None or wait_s <= _SLOW_S:
         return None
-    moment = Moment("call that waited", recording.since_launch_s(call.requested_ns))
     cause = Finding(
         f"{symptom.late}: the callbacks keep each other waiting, and calls to the node's parameter "
         f"service waited {format_duration(wait_s)} or more",
         remedy("blocked"),
-        Evidence(moments=(moment,)),
+        evidence_at(recording, "call that waited", call.requested_ns),
         concept="executors",
     )
     return at_its_place(cause, symptom.late, slow_callback(recording))

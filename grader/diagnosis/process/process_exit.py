@@ -7,8 +7,7 @@ import signal
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.mistake import mistaken, remedy
+from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken, remedy
 from grader.diagnosis.process.exceptions import Raised
 from grader.diagnosis.process.failure import Failure
 from grader.diagnosis.process.missing_library import lacking_here
@@ -20,9 +19,8 @@ from grader.diagnosis.process.raised import (
     own_frames,
     raised_at,
 )
-from grader.findings.finding import Evidence, Finding, Moment
-from grader.findings.wording import code
-from grader.findings.words import SPIN, Words
+from grader.findings.finding import Evidence, Finding, Moment, evidence_at
+from grader.findings.words import SPIN, Words, code
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.recording.submission import PYTHON, SourceError
@@ -346,8 +344,8 @@ def offence(recording: Recording) -> Finding | None:
     """What the sandbox ends processes for, also where it was seen only after their end."""
     for breach in recording.breaches:
         if breach.ended:
-            moment = Moment(breach.what, recording.since_launch_s(breach.time_ns))
-            return Finding(str(breach), str(TABLE.hints[breach.what]), Evidence(moments=(moment,)))
+            shown = evidence_at(recording, breach.what, breach.time_ns)
+            return Finding(str(breach), str(TABLE.hints[breach.what]), shown)
     return None
 
 

@@ -9,7 +9,7 @@ from itertools import takewhile
 
 from grader.diagnosis.process.crash import parse_crashes
 from grader.diagnosis.process.failure import Failure, Frame
-from grader.findings.wording import code
+from grader.findings.words import code
 from grader.measure import declarations
 from grader.recording.model import Recording
 from grader.recording.submission import SourceError, SubmissionRecord

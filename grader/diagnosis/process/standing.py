@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from grader.diagnosis.mistake import remedy
+from grader.diagnosis.explanation import remedy
 from grader.diagnosis.process.raised import interrupted_call, submission_path
-from grader.findings.wording import code
-from grader.findings.words import SPIN
+from grader.findings.words import SPIN, code
 from grader.measure.declarations import never_spun
 from grader.measure.standing import Standing, at_the_end, longest_callback
 from grader.recording.model import NS, Recording

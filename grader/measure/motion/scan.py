@@ -7,9 +7,9 @@ from bisect import bisect_right
 from collections.abc import Callable
 from typing import NamedTuple
 
+from grader.findings.words import metres, side
 from grader.measure.motion.command import number, scans
 from grader.measure.motion.ground import nearest
-from grader.measure.motion.quantities import metres, side
 from grader.recording.model import NS, Message, Recording
 from grader.recording.simulated import Truth
 

@@ -8,7 +8,7 @@ from statistics import median_high
 from markupsafe import Markup
 
 from grader.findings.finding import Span
-from grader.findings.wording import counted
+from grader.findings.words import counted
 from grader.report.drawing import axes
 from grader.report.drawing.svg import Figure, figure
 from grader.spec.safe_text import one_line

@@ -9,7 +9,7 @@ from itertools import groupby
 from markupsafe import Markup
 
 from grader.findings.finding import Case, Cases
-from grader.findings.wording import counted
+from grader.findings.words import counted
 from grader.report.drawing import svg
 from grader.report.drawing.axes import RIGHT, Scale, unit_of, value_axis
 from grader.spec.safe_text import one_line

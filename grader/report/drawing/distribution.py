@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from grader.findings.wording import counted
+from grader.findings.words import counted
 from grader.report.drawing.svg import NARROW, Figure, element, figure, label, line
 from grader.report.text.words import counted_points, number
 

@@ -15,9 +15,8 @@ from pydantic import TypeAdapter, ValidationError
 from grader.assignment.model import Assignment, Visibility
 from grader.checks.motion.route import Place
 from grader.findings.reference import Goal, GoalPose, UnknownValue
-from grader.findings.wording import counted, listing
+from grader.findings.words import counted, listing, metres
 from grader.measure.motion.ground import ahead
-from grader.measure.motion.quantities import metres
 from grader.measure.motion.track import first_rest, has_moved
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth

@@ -10,7 +10,7 @@ from operator import itemgetter
 from markupsafe import Markup
 
 from grader.findings.finding import Plot
-from grader.findings.wording import counted
+from grader.findings.words import counted
 from grader.report.drawing import svg
 from grader.report.drawing.axes import LEFT, RIGHT, Scale, ticks, unit_of, value_axis
 from grader.spec.safe_text import one_line

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from markupsafe import Markup
 
 from grader.diagnosis.no_endpoint import OWN_TOPICS
-from grader.findings.wording import counted, listing
+from grader.findings.words import counted, listing
 from grader.recording.model import NS, Call, LogLine, Owner, Process, Recording
 from grader.report.drawing import axes
 from grader.report.drawing.svg import LETTER, Figure, figure, fitted, label, line

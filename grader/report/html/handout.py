@@ -14,7 +14,7 @@ from grader.assignment.contract.table import with_table
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import ManualItem, Visibility
 from grader.errors import UsageError
-from grader.findings.wording import counted
+from grader.findings.words import counted
 from grader.grade.model import total
 from grader.report.html.page import render_page
 from grader.report.text.words import counted_points

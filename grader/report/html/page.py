@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup, escape
 
 from grader.findings.finding import Status
-from grader.findings.wording import counted
+from grader.findings.words import counted
 from grader.machine import resources
 from grader.report.text import additions, explanation, words
 from grader.spec.safe_text import clean, one_line

@@ -14,7 +14,7 @@ from typing import Any
 from markupsafe import Markup
 
 from grader.assignment.model import Assignment, Scenario
-from grader.measure.motion.quantities import metres
+from grader.findings.words import metres
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
 from grader.report.drawing.ground_plan import places

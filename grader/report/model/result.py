@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from grader.checks.topic.topic import PROBE, Untouched
 from grader.errors import UsageError
 from grader.findings.finding import Status
-from grader.findings.wording import code, codes, counted
+from grader.findings.words import code, codes, counted
 from grader.grade.model import CheckResult, Grade, ScenarioFinding
 from grader.measure.transforms import TRANSFORMS
 from grader.recording.model import NS, Kind, Owner, Recording

@@ -6,7 +6,7 @@ from collections.abc import Hashable, Iterator, Sequence
 from typing import NamedTuple
 
 from grader.findings.finding import Status
-from grader.findings.wording import counted, listing
+from grader.findings.words import counted, listing
 from grader.grade.model import total
 from grader.recording.submission import SourceError
 from grader.report.model.excerpt import places as places_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from grader.findings.finding import Status
-from grader.findings.wording import counted
+from grader.findings.words import counted
 from grader.grade.model import CheckResult, total
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.text.words import STATUS, cut, number

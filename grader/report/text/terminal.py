@@ -15,7 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from grader.findings.finding import Status
-from grader.findings.wording import counted
+from grader.findings.words import counted
 from grader.recording.submission import SourceError
 from grader.report.model.excerpt import excerpt, places
 from grader.report.model.result_model import CheckPart, Result
