@@ -82,6 +82,12 @@ def test_a_name_that_is_imposed_can_be_put_right_like_one_of_a_student(run_node:
     assert right.on("/cmd_vel")
 
 
+def test_a_program_can_publish_on_a_topic_that_it_has_nothing_to_do_with(run_node: RunNode) -> None:
+    recording = run_node(RIGHT, mistakes=mistakes(("publishes", "node", "/odom")))
+    assert "/odom" in {one.topic for one in recording.endpoints if one.node == "/bot_publisher"}
+    assert recording.on("/cmd_vel")
+
+
 def test_a_mistake_of_another_program_is_not_made(run_node: RunNode) -> None:
     other = (Mistake("other", "node", "bot_publisher", "publisher"),)
     assert "/bot_publisher" in {one.name for one in run_node(RIGHT, mistakes=other).nodes}
