@@ -59,7 +59,7 @@ def replay(
     installation = ros.find()
     with progress.shown():
         installation = TypeSupport(loaded, installation, cache_folder()).student(progress.say)
-        how = Preparation(installation, cache_folder(), on_progress=progress.say)
+        how = Preparation(ros=installation, cache=cache_folder(), on_progress=progress.say)
         prepared = prepare(submission, how)
         record = replace(prepared.record, given=recorded.submission.given)
         loaded, _, _ = with_chosen_names(loaded, record, {recorded.scenario: recorded})

@@ -120,7 +120,7 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
         print(notice, file=sys.stderr)
     for name, count in CLASSES.items():
         loaded = load_assignment(name)
-        how = Preparation(ros.find(), folder / "batch-cache", sandbox=sandbox)
+        how = Preparation(ros=ros.find(), cache=folder / "batch-cache", sandbox=sandbox)
         prepared = prepare(reference_of(name), how)
         with Runner(ros.find(), Admission(), sandbox=sandbox) as runner:
             grading = Grading(loaded, runner, folder / "batch-cache")
@@ -165,7 +165,7 @@ def _cell(samples: Samples, folder: Path, _: int) -> None:
     sandbox, _notice = choose(Choice.AUTO, folder / "cell-cache")
     for what, (name, scenario_id) in CELLS.items():
         loaded = load_assignment(name)
-        how = Preparation(ros.find(), folder / "cell-cache", sandbox=sandbox)
+        how = Preparation(ros=ros.find(), cache=folder / "cell-cache", sandbox=sandbox)
         prepared = prepare(reference_of(name), how)
         (scenario,) = (one for one in loaded.assignment.scenarios if one.id == scenario_id)
         assert prepared.install is not None

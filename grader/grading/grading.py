@@ -108,14 +108,14 @@ class Grading:
             return frozenset(one.name for name in _tested(loaded) if (one := record.package(name)))
 
         return Preparation(
-            ros,
-            self._cache,
+            ros=ros,
+            cache=self._cache,
             limits=self._build_limits,
             on_progress=say,
             sandbox=sandbox.allowing(self._libraries) if sandbox is not None else None,
             stop=self._stop,
             on_output=self.told.output,
-            tested=tested,
+            choose_tested=tested,
             source_folder=source,
             with_bags=self._with_bags,
             place=self._build_place,

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import os
-import threading
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +17,7 @@ from grader.recording.submission import SubmissionRecord
 from grader.submission.build.build import Builder, once_more
 from grader.submission.build.build_cache import BuildCache
 from grader.submission.build.build_error_location import Sources
-from grader.submission.build.colcon import BuildLimits
+from grader.submission.build.colcon import BuildSetting
 from grader.submission.build.installed import inspect
 from grader.submission.build.standalone_build import standalone
 from grader.submission.intake.archive import SUFFIXES
@@ -34,7 +33,7 @@ from grader.submission.read.source import Allowance
 from grader.submission.underlay.store import UnderlayStore
 
 if TYPE_CHECKING:
-    from grader.sandbox.sandbox import Sandbox
+    pass
 
 _MAX_PACKAGES = 200
 _MOST_PATHS = 5000
@@ -56,30 +55,21 @@ class Prepared:
     underlays: tuple[Path, ...] = ()
 
 
-@dataclass(frozen=True)
-class Preparation:
-    """How a submission is read and built.
+@dataclass(frozen=True, kw_only=True)
+class Preparation(BuildSetting):
+    """How a submission is read and built, with what underlays the assignment names.
 
     Attributes:
-        ros: With what underlays the assignment names.
-        sandbox: What it is built in, or None.
-        on_output: Called with each line of the build's log as it comes; an earlier build's log
-            comes at once.
-        tested: Packages whose own tests are run after the build, by what was read before it.
+        on_output: Called with the log of an earlier build, too.
+        choose_tested: Packages whose own tests are run after the build, by what was read before it.
         source_folder: Where the text files of the submission are kept, or None.
         with_bags: Whether its bags are read.
         place: Entered for the time of the build, and with True for one that is repeated because of
             the machine: nothing else of rosgrade's is to run beside that.
     """
 
-    ros: RosInstallation
     cache: Path
-    limits: BuildLimits = field(default_factory=BuildLimits)
-    on_progress: Callable[[str], None] = lambda _: None
-    sandbox: Sandbox | None = None
-    stop: threading.Event | None = None
-    on_output: Callable[[str], None] = lambda _: None
-    tested: Callable[[SubmissionRecord], frozenset[str]] = lambda _: frozenset()
+    choose_tested: Callable[[SubmissionRecord], frozenset[str]] = lambda _: frozenset()
     source_folder: Path | None = None
     with_bags: bool = False
     place: Callable[[bool], AbstractContextManager[object]] = nullcontext
@@ -99,23 +89,13 @@ def prepare(path: Path | str, how: Preparation) -> Prepared:
     how.on_progress("reading the submission")
     installed = replace(how.ros, underlays=())
     store = UnderlayStore(how.cache, installed, how.on_progress, stop=how.stop)
-    builder = Builder(
-        ros=how.ros,
-        cache=BuildCache(how.cache),
-        limits=how.limits,
-        sandbox=how.sandbox,
-        stop=how.stop,
-        on_progress=how.on_progress,
-        on_output=how.on_output,
-    )
 
     def attempt(is_second: bool) -> Prepared:
         with how.place(is_second), opened(source) as located:
             if how.source_folder is not None:
                 keep_source(located.root, how.source_folder)
             bags = read_bags(located, how.ros, how.sandbox) if how.with_bags else None
-            builds = replace(builder, is_second=is_second)
-            prepared = _prepare(located, builds, store, how.tested)
+            prepared = _prepare(located, how, store, is_second)
             return replace(prepared, record=replace(prepared.record, bags=bags))
 
     try:
@@ -172,13 +152,8 @@ def _hash(source: Path) -> str:
     return total.hexdigest()
 
 
-def _prepare(
-    located: Located,
-    builder: Builder,
-    store: UnderlayStore,
-    tested: Callable[[SubmissionRecord], frozenset[str]],
-) -> Prepared:
-    ros, allowance = builder.ros, Allowance()
+def _prepare(located: Located, how: Preparation, store: UnderlayStore, is_second: bool) -> Prepared:
+    ros, allowance = how.ros, Allowance()
     packages = [
         read_package(located, folder, ros, allowance) for folder in located.packages[:_MAX_PACKAGES]
     ]
@@ -201,7 +176,8 @@ def _prepare(
         folders={package.name: package.folder for package in packages},
         texts={path: lines for package in packages for path, lines in package.texts.items()},
     )
-    built = replace(builder, ros=ros, tested=tested(record)).build(
+    setting = replace(how, ros=ros, tested=how.choose_tested(record))
+    built = Builder(setting, BuildCache(how.cache), is_second).build(
         located,
         sources,
         only_python=all(package.build_type == "ament_python" for package in packages),
@@ -209,7 +185,7 @@ def _prepare(
     )
     if built.build.cached:
         for line in built.build.log.splitlines():
-            builder.on_output(line)
+            how.on_output(line)
     installed = None
     if built.install is not None:
         hashes = {path: digest for p in packages for path, digest in p.hashes.items()}

@@ -250,7 +250,7 @@ def test_a_misnamed_package_is_found_by_the_names_that_the_submission_chose(
     asked: list[frozenset[str]] = []
 
     def note(_path: Path, how: Preparation) -> Prepared:
-        asked.append(how.tested(record))
+        asked.append(how.choose_tested(record))
         return Prepared(record=record, install=None)
 
     monkeypatch.setattr(spine, "prepare", note)

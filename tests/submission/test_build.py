@@ -38,7 +38,7 @@ FOLDER = "src/bot_publisher"
 def prepared(tree: Tree, ros: RosInstallation, python_s: float = 60.0) -> Prepared:
     limits = BuildLimits(python_s=python_s)
     cache = tree.root.parent / "cache"
-    return prepare(tree.root, Preparation(ros, cache, limits=limits))
+    return prepare(tree.root, Preparation(ros=ros, cache=cache, limits=limits))
 
 
 def build_of(found: Prepared) -> BuildRecord:
@@ -115,7 +115,7 @@ def test_a_zip_of_a_whole_workspace_is_built_once(
     content = ((f"ws/{path.relative_to(root)}", path.read_bytes()) for path in files)
     archive = tmp_path / "alice.zip"
     archive.write_bytes(zip_bytes(*content))
-    found = prepare(archive, Preparation(real_ros, tmp_path / "cache"))
+    found = prepare(archive, Preparation(ros=real_ros, cache=tmp_path / "cache"))
     assert [package.path for package in found.record.packages] == [FOLDER]
     assert build_of(found).succeeded
 
@@ -249,7 +249,7 @@ def test_a_build_without_cpu_is_repeated_alone_and_then_not_graded(
 
     monkeypatch.setattr("grader.submission.build.bounded.OwnTime", Starving)
     with pytest.raises(GraderFault, match="this machine has too little time"):
-        prepare(tree.root, Preparation(real_ros, cache, place=place))
+        prepare(tree.root, Preparation(ros=real_ros, cache=cache, place=place))
     assert places == [False, True]
     assert list(cache.rglob("build.json")) == []
 
@@ -263,7 +263,9 @@ def test_what_was_built_before_another_package_hangs_counts(
     tree.write(INTERFACES)
     tree.package({"setup.py": f"import time\ntime.sleep(900)\n{SETUP_PY}"})
     limits = BuildLimits(other_s=20.0)
-    found = prepare(tree.root, Preparation(real_ros, tree.root.parent / "cache", limits=limits))
+    found = prepare(
+        tree.root, Preparation(ros=real_ros, cache=tree.root.parent / "cache", limits=limits)
+    )
     build = build_of(found)
     assert (build.timed_out, build.failed_packages) == (True, ("bot_publisher",)), build.log
     interface = {"interface": "bot_msgs/msg/Bot"}
@@ -341,7 +343,7 @@ def test_a_sandbox_that_does_not_start_is_no_fault_of_the_student(
     with monkeypatch.context() as patched:
         patched.setenv("PATH", f"{bwrap.parent}:{os.environ['PATH']}")
         with pytest.raises(GraderFault, match="sandbox of the build could not be started"):
-            prepare(tree.root, Preparation(real_ros, cache, sandbox=Sandbox(cache)))
+            prepare(tree.root, Preparation(ros=real_ros, cache=cache, sandbox=Sandbox(cache)))
     assert list(cache.rglob("build.json")) == []
 
 
@@ -389,7 +391,9 @@ def test_as_many_files_are_compiled_at_once_as_there_is_memory_for(
     manifest = INTERFACES["src/bot_msgs/package.xml"]
     tree.write({"src/bot_msgs/package.xml": manifest, "src/bot_msgs/CMakeLists.txt": COMPILERS})
     limits = BuildLimits(room=replace(BUILD, memory_bytes=most * 2**30))
-    found = prepare(tree.root, Preparation(real_ros, tree.root.parent / "cache", limits=limits))
+    found = prepare(
+        tree.root, Preparation(ros=real_ros, cache=tree.root.parent / "cache", limits=limits)
+    )
     build = build_of(found)
     assert build.succeeded, build.log
     numbers = [int(line) for line in build.log.splitlines() if line.isdecimal()]
@@ -404,7 +408,7 @@ def test_as_many_builds_compile_at_once_as_there_is_memory_for(gib: int, builds:
 def test_without_colcon_the_text_says_how_to_get_it(tree: Tree, named_ros: RosInstallation) -> None:
     tree.package()
     with pytest.raises(GraderFault, match="colcon is not installed"):
-        prepare(tree.root, Preparation(named_ros, tree.root.parent / "cache"))
+        prepare(tree.root, Preparation(ros=named_ros, cache=tree.root.parent / "cache"))
 
 
 def test_a_build_depends_on_the_submission_and_the_installation(
@@ -457,7 +461,9 @@ def test_a_build_that_is_killed_from_outside_is_built_again_and_never_kept(
 
     def graded_now() -> Prepared:
         sandbox = Sandbox(cache) if enclosed else None
-        return prepare(tree.root, Preparation(real_ros, cache, sandbox=sandbox, on_output=kill))
+        return prepare(
+            tree.root, Preparation(ros=real_ros, cache=cache, sandbox=sandbox, on_output=kill)
+        )
 
     if graded:
         build = build_of(graded_now())
@@ -484,7 +490,10 @@ def test_the_students_own_tests_run_with_what_was_built(
     )
     cache = tree.root.parent / "cache"
     record = prepare(
-        tree.root, Preparation(real_ros, cache, tested=lambda _: frozenset({"bot_publisher"}))
+        tree.root,
+        Preparation(
+            ros=real_ros, cache=cache, choose_tested=lambda _: frozenset({"bot_publisher"})
+        ),
     ).record.build
     assert record is not None
     [run] = record.tests

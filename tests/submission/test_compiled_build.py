@@ -57,9 +57,11 @@ def built(
     tree.write({f"{FOLDER}/{name}": text for name, text in {**files, **(changes or {})}.items()})
     cache = tree.root.parent / "cache"
     if not memory_mib:
-        return prepare(tree.root, Preparation(ros, cache))
+        return prepare(tree.root, Preparation(ros=ros, cache=cache))
     limits = BuildLimits(room=replace(BUILD, memory_bytes=memory_mib * MIB))
-    return prepare(tree.root, Preparation(ros, cache, limits=limits, sandbox=Sandbox(cache)))
+    return prepare(
+        tree.root, Preparation(ros=ros, cache=cache, limits=limits, sandbox=Sandbox(cache))
+    )
 
 
 def judged(found: Prepared, check: str = "package.builds") -> Finding:

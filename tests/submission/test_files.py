@@ -106,7 +106,8 @@ def test_a_bag_is_read_only_where_a_check_asks_for_it(tmp_path: Path) -> None:
     write_bag(tmp_path / "submission", "MCAP")
     for asked in (True, False):
         record = prepare(
-            tmp_path / "submission", Preparation(find_ros(), tmp_path / "cache", with_bags=asked)
+            tmp_path / "submission",
+            Preparation(ros=find_ros(), cache=tmp_path / "cache", with_bags=asked),
         ).record
         assert (record.bags is not None) is asked
 

@@ -14,7 +14,7 @@ from tests.submission.samples import NODE, Tree, tar_bytes, tar_member, zip_byte
 
 
 def prepared(path: Path, ros: RosInstallation) -> Prepared:
-    return prepare(path, Preparation(ros, path.parent / "cache"))
+    return prepare(path, Preparation(ros=ros, cache=path.parent / "cache"))
 
 
 def problem(path: Path, ros: RosInstallation) -> str:

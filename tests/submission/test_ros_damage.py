@@ -158,7 +158,7 @@ def test_a_build_that_a_damaged_package_stops_costs_nothing_and_is_not_kept(
     tree.write({f"{FOLDER}/{name}": text for name, text in files.items()})
 
     def built() -> Prepared:
-        return prepare(tree.root, Preparation(ros, tmp_path / "cache"))
+        return prepare(tree.root, Preparation(ros=ros, cache=tmp_path / "cache"))
 
     found = built()
     cause = why_not_built(found.record, "bot_publisher")
@@ -181,7 +181,7 @@ def test_a_failure_is_built_again_once_when_any_file_of_a_sourced_ros_changed(
     tree.package({"setup.py": "import nothing_at_all\n"})
 
     def is_kept() -> bool:
-        build = prepare(tree.root, Preparation(ros, tmp_path / "cache")).record.build
+        build = prepare(tree.root, Preparation(ros=ros, cache=tmp_path / "cache")).record.build
         assert build is not None and not build.succeeded
         return build.cached
 

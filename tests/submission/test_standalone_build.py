@@ -133,7 +133,7 @@ def test_an_install_space_is_laid_where_it_belongs(tmp_path: Path) -> None:
 
 
 def built(tree: Tree, ros: RosInstallation) -> Prepared:
-    return prepare(tree.root, Preparation(ros, tree.root.parent / "cache"))
+    return prepare(tree.root, Preparation(ros=ros, cache=tree.root.parent / "cache"))
 
 
 def kept(tree: Tree) -> set[str]:

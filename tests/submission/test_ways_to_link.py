@@ -75,6 +75,8 @@ def test_every_way_to_use_a_package_of_ros_in_cmake_builds(tree: Tree, tmp_path:
             }
         )
     tree.write({"src/below/below/CMakeLists.txt": WAYS["by_ament"]})
-    build = prepare(tree.root, Preparation(ros_module.find(), tmp_path / "cache")).record.build
+    build = prepare(
+        tree.root, Preparation(ros=ros_module.find(), cache=tmp_path / "cache")
+    ).record.build
     assert build is not None
     assert (build.failed_packages, "Warning" in build.log) == ((), False), build.log

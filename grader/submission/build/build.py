@@ -97,13 +97,14 @@ def once_more(attempt: Callable[[bool], _T]) -> _T:
         return attempt(True)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Builder(BuildSetting):
+@dataclass(frozen=True)
+class Builder:
     """Builds submissions in one setting, or takes them from the cache.
 
     The cache keeps failed builds, too, where it is certain that the reason is the student's.
     """
 
+    setting: BuildSetting
     cache: BuildCache
     is_second: bool = False
 
@@ -127,14 +128,19 @@ class Builder(BuildSetting):
         Raises:
             BuildKilled: The build was ended, although it was within its limits.
         """
-        wall_s = self.limits.python_s if only_python else self.limits.other_s
+        wall_s = self.setting.limits.python_s if only_python else self.setting.limits.other_s
         if key is None:
             key = build_key(
-                located.sha256, self.ros, self.limits, self.sandbox, is_standalone, self.tested
+                located.sha256,
+                self.setting.ros,
+                self.setting.limits,
+                self.setting.sandbox,
+                is_standalone,
+                self.setting.tested,
             )
-        self.on_progress("looking for an earlier build")
+        self.setting.on_progress("looking for an earlier build")
         with self.cache.locked(key, wait_s=wall_s + COMPILE_S):
-            state = partial(state_of, self.ros)
+            state = partial(state_of, self.setting.ros)
             found = self.cache.find(key, state)
             if found is not None:
                 return found
@@ -144,7 +150,7 @@ class Builder(BuildSetting):
                 scratch = located.root.with_name("scratch")
                 scratch.mkdir()
                 colcon = Colcon(
-                    self,
+                    self.setting,
                     located.root,
                     sources.folders,
                     scratch,
@@ -165,7 +171,8 @@ class Builder(BuildSetting):
         One that does not build alone is left out: it is built with the others, which also tells
         the student why it fails.
         """
-        quiet = replace(self, on_output=lambda _: None, tested=frozenset())
+        setting = replace(self.setting, on_output=lambda _: None, tested=frozenset())
+        quiet = replace(self, setting=setting)
         for name in names:
             with only(located, sources.folders[name], name) as part:
                 files = {file.path for file in part.files}
@@ -184,12 +191,12 @@ class Builder(BuildSetting):
             assert part.install is not None
             standalone_build.lay(name, part.install, install)
             for line in part.build.log.splitlines():
-                self.on_output(line)
+                self.setting.on_output(line)
         finished = set(parts)
         # Made before the student's code runs, which could otherwise put a link in its place.
         install.mkdir(exist_ok=True)
         kills = oom_kills()
-        check_python = self.sandbox.watched() if self.sandbox else None
+        check_python = self.setting.sandbox.watched() if self.setting.sandbox else None
         outcome = colcon.build(finished)
         self._check_machine(outcome, colcon, memory_ran_out=kills != oom_kills())
         if check_python is not None and outcome.status != 0:
@@ -197,8 +204,8 @@ class Builder(BuildSetting):
         problem = tidy(
             install,
             colcon.root,
-            most_bytes=self.limits.install_bytes,
-            most_files=self.limits.install_files,
+            most_bytes=self.setting.limits.install_bytes,
+            most_files=self.setting.limits.install_files,
         )
         if problem is not None:
             # Nothing of it is there any more.
@@ -217,7 +224,7 @@ class Builder(BuildSetting):
             record,
             tests=tuple(
                 own_tests.pytest_record(name, *colcon.test(sources.folders[name]))
-                for name in sorted(self.tested & finished)
+                for name in sorted(self.setting.tested & finished)
             ),
             duration_s=round(record.duration_s + sum(one.duration_s for one in builds), 3),
             log=build_log.ending("".join(one.log for one in builds) + record.log),
@@ -255,7 +262,7 @@ class Builder(BuildSetting):
         failed: set[str],
         problem: str | None,
     ) -> tuple[BuildRecord, bool]:
-        ros = [*self.ros.underlays, *self.ros.prefixes]
+        ros = [*self.setting.ros.underlays, *self.setting.ros.prefixes]
         paths = {
             str(colcon.root): "",
             str(colcon.scratch / "build"): "build",
@@ -290,9 +297,14 @@ class Builder(BuildSetting):
         """What ROS 2 Jazzy has and is neither handed in nor whole on this machine."""
         named = build_log.not_found(log)
         wanted = named | build_log.modules_not_found(log)
-        missing = wanted & PACKAGES - self.ros.packages - set(sources.folders)
-        tools = missing_tools(self.ros.environment({})["PATH"])
-        return missing | missing_here(named) | set(tools) | damaged(log, self.ros, sources.folders)
+        missing = wanted & PACKAGES - self.setting.ros.packages - set(sources.folders)
+        tools = missing_tools(self.setting.ros.environment({})["PATH"])
+        return (
+            missing
+            | missing_here(named)
+            | set(tools)
+            | damaged(log, self.setting.ros, sources.folders)
+        )
 
 
 def _is_cut_off(status: int, output: str) -> bool:

@@ -29,7 +29,7 @@ from grader.sandbox.python_tree import not_installed
 from grader.submission.build.build import Builder, once_more
 from grader.submission.build.build_cache import BUILDS, INSTALL, BuildCache, CachedBuild
 from grader.submission.build.build_error_location import Sources
-from grader.submission.build.colcon import BuildLimits
+from grader.submission.build.colcon import BuildLimits, BuildSetting
 from grader.submission.build.toolchain import check_toolchain, missing_tools
 from grader.submission.intake.listing import find_packages
 from grader.submission.intake.locate import opened
@@ -362,16 +362,14 @@ class UnderlayStore:
                 only_python = not any((root / "CMakeLists.txt").exists() for root in roots)
                 if not only_python:
                     check_toolchain(ros.environment({})["PATH"])
-                builder = Builder(
+                setting = BuildSetting(
                     ros=ros,
-                    cache=cache,
                     limits=_LIMITS,
                     sandbox=self._sandbox,
                     stop=self._stop,
                     on_progress=progress,
-                    is_second=is_second,
                 )
-                return builder.build(
+                return Builder(setting, cache, is_second).build(
                     located,
                     Sources({file.path for file in located.files}, places),
                     only_python=only_python,
