@@ -12,9 +12,24 @@ from typing import Any
 
 import yaml
 
-from grader.batch import handed_in
 from grader.batch.groups import with_groups
-from grader.batch.handed_in import HandedIn
+from grader.batch.hand_in_time import (
+    CANVAS_TIMES,
+    NOT_KNOWN,
+    of_canvas,
+    of_metadata,
+    of_name,
+    timed,
+)
+from grader.batch.handed_in import (
+    FOREIGN,
+    NOTHING,
+    HandedIn,
+    is_ignored,
+    only_archive,
+    stem_of,
+    submission_in,
+)
 from grader.batch.roster import Roster, Student
 from grader.batch.roster_match import matched, unique
 from grader.course.load import Course
@@ -51,17 +66,14 @@ def take_in(
     _refuse_single(folder, source)
     entries = list(_entries(folder, staging, on_left_out, out))
     if any(row.download for row in entries):
-        times = handed_in.of_canvas(
-            folder, source.parent if source.is_file() else None, on_left_out
-        )
+        times = of_canvas(folder, source.parent if source.is_file() else None, on_left_out)
         entries = [
-            row.at(times.get(row.names[0], handed_in.NOT_KNOWN)) if row.download else row
-            for row in entries
+            row.at(times.get(row.names[0], NOT_KNOWN)) if row.download else row for row in entries
         ]
     if not entries:
         raise UsageError(f"{source}: holds no submission; expected one folder or archive for each")
     rows = matched(entries, roster) if roster else entries
-    return with_groups(handed_in.timed(unique(rows), staging), course)
+    return with_groups(timed(unique(rows), staging), course)
 
 
 def take_in_roster(
@@ -86,13 +98,13 @@ def take_in_roster(
         if _REPOSITORY.match(student.submission):
             cloned.setdefault(student.submission, row)
         on_taken(student.key)
-    return with_groups(handed_in.timed(unique(rows), staging), course)
+    return with_groups(timed(unique(rows), staging), course)
 
 
 def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn | None) -> HandedIn:
     row = HandedIn("").of(student)
     if not student.submission:
-        return row.with_problem(handed_in.NOTHING)
+        return row.with_problem(NOTHING)
     if cloned is not None:
         return replace(row, path=cloned.path, fault=cloned.fault)
     if _REPOSITORY.match(student.submission):
@@ -133,7 +145,7 @@ def _opened(source: Path, staging: Path) -> Path:
 
 def _inner(folder: Path, *, is_unpacked: bool) -> Path:
     """The only folder in a folder, where it is that of the class: an archive or an export of it."""
-    inside = [item for item in folder.iterdir() if not handed_in.is_ignored(item)]
+    inside = [item for item in folder.iterdir() if not is_ignored(item)]
     if len(inside) != 1 or not inside[0].is_dir():
         return folder
     is_export = (inside[0] / GRADESCOPE_METADATA).is_file()
@@ -161,11 +173,7 @@ def _entries(
     metadata = _gradescope(folder / GRADESCOPE_METADATA)
     canvas: dict[str, list[tuple[Path, re.Match[str]]]] = {}
     for item in sorted(folder.iterdir(), key=lambda path: os.fsencode(path.name)):
-        if (
-            handed_in.is_ignored(item)
-            or item.name == GRADESCOPE_METADATA
-            or item.match(handed_in.CANVAS_TIMES)
-        ):
+        if is_ignored(item) or item.name == GRADESCOPE_METADATA or item.match(CANVAS_TIMES):
             continue
         # Path.resolve() raises at a link that leads to itself.
         if out is not None and os.path.realpath(item) == os.path.realpath(out):
@@ -175,13 +183,13 @@ def _entries(
             yield from _of_gradescope(item, metadata[item.name])
         elif match:
             canvas.setdefault(match["user"], []).append((item, match))
-        elif item.is_dir() or item.name.lower().endswith((*SUFFIXES, *handed_in.FOREIGN)):
-            stem = handed_in.stem_of(item)
+        elif item.is_dir() or item.name.lower().endswith((*SUFFIXES, *FOREIGN)):
+            stem = stem_of(item)
             moodle = _MOODLE.fullmatch(stem)
             names = (moodle["name"] if moodle else stem,)
-            row = HandedIn(shown(stem), path=handed_in.submission_in(item), item=item, names=names)
+            row = HandedIn(shown(stem), path=submission_in(item), item=item, names=names)
             # Moodle names the folder, but the student the archive.
-            yield row if moodle else row.at(handed_in.of_name(item.name))
+            yield row if moodle else row.at(of_name(item.name))
         else:
             why = "is neither a folder nor an archive, so it is left out"
             on_left_out(f"{shown(item.name)} {why}")
@@ -192,7 +200,7 @@ def _entries(
 def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> HandedIn:
     match = files[0][1]
     named, again = _names(files)
-    path, fault = handed_in.only_archive(named), ""
+    path, fault = only_archive(named), ""
     if path is None:
         path = staging / f"canvas-{match['user']}"
         fault = _gather(named, path)
@@ -277,9 +285,9 @@ def _of_gradescope(item: Path, about: Any) -> Iterator[HandedIn]:
     submitters = about.get(":submitters") if isinstance(about, dict) else None
     listed = submitters if isinstance(submitters, list) else []
     people = [person for person in listed if isinstance(person, dict)]
-    time = handed_in.of_metadata(about if isinstance(about, dict) else {})
+    time = of_metadata(about if isinstance(about, dict) else {})
     for person in people or [{}]:
         values = (person.get(field) for field in (":sid", ":email", ":name"))
         names = tuple(str(value) for value in values if value) or (item.name,)
-        name, path = shown(str(person.get(":name") or "")), handed_in.submission_in(item)
+        name, path = shown(str(person.get(":name") or "")), submission_in(item)
         yield HandedIn(shown(names[0]), name=name, path=path, item=item, names=names).at(time)

@@ -47,8 +47,9 @@ def grade(handed_in: HandedIn, grading: Grading) -> Graded:
 def take_in(handed_in: HandedIn, grading: Grading) -> Prepared:
     """Read a submission and build it."""
     given = tuple(sorted({**grading.loaded.given, **handed_in.given}.items()))
-    how = grading.preparation(given, handed_in.folder / SOURCE_FOLDER)
-    prepared = handed_in.refused or prepare(handed_in.path, how)
+    source = handed_in.folder / SOURCE_FOLDER
+    # Of what is refused nothing is built, so that nothing needs to be there for it.
+    prepared = handed_in.refused or prepare(handed_in.path, grading.preparation(given, source))
     record = replace(prepared.record, id=handed_in.name or prepared.record.id, given=given)
     return replace(prepared, record=record)
 

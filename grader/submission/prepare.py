@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from grader.errors import SubmissionError
 from grader.machine.ros import RosInstallation
@@ -31,9 +30,6 @@ from grader.submission.read.package import Package, read_package, record_package
 from grader.submission.read.parameter_file import read_parameter_files
 from grader.submission.read.source import Allowance
 from grader.submission.underlay.store import UnderlayStore
-
-if TYPE_CHECKING:
-    pass
 
 _MAX_PACKAGES = 200
 _MOST_PATHS = 5000

@@ -167,6 +167,18 @@ def test_the_client_library_is_the_dependency_where_there_is_no_other() -> None:
     assert depends(made("dependency_missing", alone)) == []
 
 
+def test_what_is_written_otherwise_in_package_xml_is_seen_all_the_same() -> None:
+    written = XML.replace(
+        "  <depend>rclpy", "  <!-- <depend>std_msgs</depend> -->\n  <depend>rclpy"
+    )
+    written = written.replace("<exec_depend>", '<exec_depend condition="$ROS_VERSION == 2">')
+    other = replace(PYTHON, texts={**PYTHON.texts, "package.xml": written})
+    assert depends(made("dependency_missing", other)) == ["rclpy"]
+    quoted = written.replace('email="student@example.com"', "email='student@example.com'")
+    other = replace(PYTHON, texts={**PYTHON.texts, "package.xml": quoted})
+    assert 'email="student@laptop"' in text_of("email_invalid", other, "package.xml")
+
+
 def test_an_address_becomes_invalid() -> None:
     text = text_of("email_invalid", PYTHON, "package.xml")
     assert ElementTree.fromstring(text)[1].get("email") == "student@laptop"

@@ -22,3 +22,4 @@ def test_launch_file_not_installed() -> None:
     )
     found = failing("node.exists", run, name="/bot")
     assert "installed no `bot.launch.py`" in found and "glob('launch/*')" in found
+    assert "DESTINATION share/${PROJECT_NAME})" in found

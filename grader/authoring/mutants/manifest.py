@@ -23,6 +23,7 @@ Files = Mapping[str, str | None]
 CMAKE = "CMakeLists.txt"
 _CLIENT_LIBRARIES = ("rclpy", "rclcpp")
 _GENERATE = "rosidl_generate_interfaces"
+_COMMENT = re.compile("<!--.*?-->", re.DOTALL)
 _HEADER = re.compile(r"(#include\s*[<\"]\w+/(?:msg|srv|action)/)(\w+)(?=\.hpp)")
 
 
@@ -45,8 +46,9 @@ class PackageFiles:
     about: str = ""
 
     def text(self, path: str) -> str:
-        """A file of the package; nothing if it is not there."""
-        return self.texts.get(f"{self.folder}{path}", "")
+        """A file of the package; nothing if it is not there. Comments in package.xml are none."""
+        text = self.texts.get(f"{self.folder}{path}", "")
+        return _COMMENT.sub("", text) if path == "package.xml" else text
 
     def edited(self, path: str, edit: Callable[[str], str]) -> Files:
         """A file of the package that is different after an edit."""
@@ -69,7 +71,7 @@ class PackageFiles:
         """The packages that the definition uses; of another package, all that it depends on."""
         if "/" not in self.about:
             manifest = self.text("package.xml")
-            names = re.findall(r"<(?:build_|exec_)?depend>\s*([^\s<]+)", manifest)
+            names = re.findall(r"<(?:build_|exec_)?depend\b[^>]*>\s*([^\s<]+)", manifest)
             others = (name for name in names if name not in _CLIENT_LIBRARIES)
             return tuple(others) or tuple(names)
         text = self.text(self.definition)
@@ -159,7 +161,7 @@ def misspelt(name: str) -> str:
 def dependency_inside_export(package: PackageFiles) -> Files:
     """package.xml names a package that the code uses inside <export>, where it does not count."""
     first = "".join(map(re.escape, package.used[:1]))
-    tag = re.compile(rf"<((?:build_|exec_)?depend)>\s*{first}\s*</\1>")
+    tag = re.compile(rf"<((?:build_|exec_)?depend)\b[^>]*>\s*{first}\s*</\1>")
 
     def moved(text: str) -> str:
         inside = "".join(found[0] for found in tag.finditer(text))

@@ -1,4 +1,7 @@
-"""What to try after an exception: the tables beside this module, and what no table can tell."""
+"""What to try after an exception: by its table, ``exceptions.yaml``, and what no table can tell.
+
+What the explanations below advise stands in ``hints.yaml``, as for all others.
+"""
 
 from __future__ import annotations
 
