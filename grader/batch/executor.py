@@ -1,4 +1,7 @@
-"""Executors that grade a batch: threads of this process, or the workers of a Dask cluster."""
+"""Executors that grade a batch: threads of this process, or the workers of a Dask cluster.
+
+Below them what a worker gets and sends: its order, a submission as a parcel, the files of a grade.
+"""
 
 from __future__ import annotations
 
