@@ -44,5 +44,6 @@ def test_a_signal_from_outside_costs_no_points(
         thread.join()
     assert graded.recordings, graded.prepared.record.build
     assert not graded.grade.graded
-    (fault,) = graded.recordings["run"].faults
-    assert fault.endswith(f"got {number.name} from outside its sandbox during the run")
+    # What stood still may have missed something else, too.
+    told = f"got {number.name} from outside its sandbox during the run"
+    assert any(fault.endswith(told) for fault in graded.recordings["run"].faults)
