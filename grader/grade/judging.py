@@ -61,50 +61,80 @@ def judge_all(
         loaded, submission, unnamed = with_chosen_names(loaded, submission, recordings)
     bound = {item.spec.id: item for item in loaded.checks}
     known = with_runtime_imports(submission, recordings.values())
+    parameters_first = _parameters_first(bound)
+    order = TopologicalSorter(
+        {name: (*item.spec.requires, *parameters_first[name]) for name, item in bound.items()}
+    )
     results: dict[str, CheckResult] = {}
-    requires = {name: item.spec.requires for name, item in bound.items()}
-    taking = [name for name, item in bound.items() if item.check.name == PARAMETERS_GIVEN]
-    before = set(taking).union(*(required_by(name, requires) for name in taking))
-    sooner = {name: () if name in before else taking for name in bound}
-    order = TopologicalSorter({name: (*requires[name], *sooner[name]) for name in bound})
     for name in order.static_order():
-        roots = _roots(requires[name], results)
-        spec = bound[name].spec
-        is_unnamed = unnamed and _needs_names(bound[name], loaded, unnamed.variables)
+        item = bound[name]
+        blockers = _blockers(item.spec.requires, results)
+        lacking = _blockers(parameters_first[name], results)
+        is_unnamed = unnamed and _needs_names(item, loaded, unnamed.variables)
         why = unnamed.finding if unnamed and is_unnamed else None
-        with speaking(known.spoken(_about(bound[name], loaded))):
-            hints = tuple(map(str, spec.hints))
-            findings = tuple(
-                [_skipped([results[root] for root in roots])]
-                if roots
-                else _findings(bound[name], loaded, known, recordings, faults, why)
-            )
-        lacking = _roots(sooner[name], results)
-        lost = _counted(spec.counts, [item.finding for item in findings])
-        other = any(_has_other_parameters(item, recordings) for item in findings)
+        with speaking(known.spoken(_about(item, loaded))):
+            hints = tuple(map(str, item.spec.hints))
+            found = () if blockers else _findings(item, loaded, known, recordings, faults, why)
+            findings = tuple(found)
         # One mistake costs its own check, and takes no credit from another.
-        if lacking and other and lost == (Status.FAILED, 0.0):
-            roots, findings = lacking, (_skipped([results[root] for root in lacking]),)
-        status, credit = _counted(spec.counts, [item.finding for item in findings])
-        put_right = all(_is_put_right(item, recordings) for item in findings)
-        results[name] = CheckResult(
-            id=name,
-            title=bound[name].title,
-            status=status,
-            points=points_for(spec.points, credit),
-            max_points=spec.points,
-            visibility=spec.visibility,
-            scenarios=tuple(scenario.id for scenario in loaded.scenarios_of(bound[name])),
-            findings=findings,
-            waits_for=roots,
-            hints=hints,
-            credit=credit,
-            put_right=put_right and status is Status.FAILED,
-            asked_name=getattr(bound[name].parameters, "asked_name", None),
-        )
+        if findings and lacking and _is_lost_by_parameters(item, findings, recordings):
+            blockers = lacking
+        if blockers:
+            findings = (_skipped([results[one] for one in blockers]),)
+        results[name] = _result(item, loaded, findings, recordings, blockers, hints)
     ordered = tuple(results[name] for name in bound)
     return Grade(
         loaded.assignment, loaded.sha256, submission, ordered, loaded.withheld, loaded.location
+    )
+
+
+def _parameters_first(bound: Mapping[str, BoundCheck]) -> dict[str, list[str]]:
+    """By check, the checks of given parameters: all others are judged after them.
+
+    But not what these require themselves.
+    """
+    requires = {name: item.spec.requires for name, item in bound.items()}
+    checks = [name for name, item in bound.items() if item.check.name == PARAMETERS_GIVEN]
+    before = set(checks).union(*(required_by(name, requires) for name in checks))
+    return {name: [] if name in before else checks for name in bound}
+
+
+def _is_lost_by_parameters(
+    bound: BoundCheck, findings: Sequence[ScenarioFinding], recordings: Mapping[str, Recording]
+) -> bool:
+    """Whether a check failed without credit in a run whose parameters the nodes do not take."""
+    lost = _counted(bound.spec.counts, [item.finding for item in findings])
+    return lost == (Status.FAILED, 0.0) and any(
+        _has_other_parameters(item, recordings) for item in findings
+    )
+
+
+def _result(
+    bound: BoundCheck,
+    loaded: LoadedAssignment,
+    findings: tuple[ScenarioFinding, ...],
+    recordings: Mapping[str, Recording],
+    blockers: tuple[str, ...],
+    hints: tuple[str, ...],
+) -> CheckResult:
+    """What a check is worth by its findings."""
+    spec = bound.spec
+    status, credit = _counted(spec.counts, [item.finding for item in findings])
+    put_right = all(_is_put_right(item, recordings) for item in findings)
+    return CheckResult(
+        id=spec.id,
+        title=bound.title,
+        status=status,
+        points=points_for(spec.points, credit),
+        max_points=spec.points,
+        visibility=spec.visibility,
+        scenarios=tuple(scenario.id for scenario in loaded.scenarios_of(bound)),
+        findings=findings,
+        waits_for=blockers,
+        hints=hints,
+        credit=credit,
+        put_right=put_right and status is Status.FAILED,
+        asked_name=getattr(bound.parameters, "asked_name", None),
     )
 
 
@@ -142,16 +172,16 @@ def _has_other_parameters(item: ScenarioFinding, recordings: Mapping[str, Record
     return why_not_taken(recording, recording.given_parameters) is not None
 
 
-def _roots(requires: Iterable[str], results: Mapping[str, CheckResult]) -> tuple[str, ...]:
+def _blockers(requires: Iterable[str], results: Mapping[str, CheckResult]) -> tuple[str, ...]:
     """Of the checks that a check requires, or of theirs, those that failed or ended as an error."""
     required = [results[name] for name in requires]
     lacking = [one for one in required if one.status != Status.PASSED and not one.put_right]
     return tuple(dict.fromkeys(root for item in lacking for root in item.waits_for or (item.id,)))
 
 
-def _skipped(roots: Sequence[CheckResult]) -> ScenarioFinding:
-    titles = " and ".join(f"“{root.title}”" for root in roots)
-    if any(root.status is Status.ERROR for root in roots):
+def _skipped(blockers: Sequence[CheckResult]) -> ScenarioFinding:
+    titles = " and ".join(f"“{one.title}”" for one in blockers)
+    if any(one.status is Status.ERROR for one in blockers):
         observed, hint = f"{titles} could not be judged, so neither could this", NOT_YOURS
     else:
         observed = f"{titles} did not pass, so this could not be judged"
