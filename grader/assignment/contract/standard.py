@@ -538,11 +538,16 @@ ACTION = (
     ),
 )
 
+
+def _asked_of(spot: Spot) -> dict[str, Any]:
+    return {"server": spot.name, "more": True}
+
+
 CALL = (
     Fact(
         "calls",
         "client.asks",
-        lambda it: {"server": it.name, "more": True},
+        _asked_of,
         "{subject} calls the service {name}",
         Words(
             "self.create_client({short}, '{name}').call_async(request) sends a request.",
@@ -557,7 +562,7 @@ SENT_GOAL = (
     Fact(
         "sends_goals",
         "client.asks",
-        lambda it: {"server": it.name, "more": True},
+        _asked_of,
         "{subject} sends a goal to the action {name}",
         Words(
             "ActionClient(self, {short}, '{name}').send_goal_async(goal) sends a goal.",

@@ -1,8 +1,8 @@
 """Mistakes in the files of a package, made in any package that is right.
 
 Each function is called like the mutant that it makes, and its docstring is the mutant's title. It
-takes the files of a package and gives those that are different, None for one that is gone; nothing
-where the package has no place for the mistake.
+gets the files of a package and returns only those that the mistake changes, by path: the new text,
+or None for a file that is deleted. It returns an empty mapping where the mistake cannot be made.
 """
 
 from __future__ import annotations

@@ -59,10 +59,11 @@ class Asks(Parameters):
 
     def _asked(self) -> str:
         wanted = "; ".join(words(fields) if fields else "anything" for fields in self.sequence)
+        what = f" for {wanted}" if self.sequence != ({},) else ""
         order = ", each after the result of the one before" if self.after_result else ""
         span = map(format_duration, self.cancels or ())
         cancels = f", and cancels the last one after {' to '.join(span)}" if self.cancels else ""
-        return f"the client asks {code(self.server)} for {wanted}{order}{cancels}"
+        return f"the client asks {code(self.server)}{what}{order}{cancels}"
 
 
 @check("client.asks", Subject.RECORDING, Asks)
