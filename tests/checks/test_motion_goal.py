@@ -626,6 +626,18 @@ class TestMistakes:
         finding = judge("motion.overshoot", early, goal=yaml((0.6, 0.0, 0.0)), most="4 cm")
         assert finding.status is Status.FAILED
 
+    def test_only_the_speed_at_which_it_passes_the_goal_explains_how_far(self):
+        def command(pose):
+            return (0.2 if pose.x_m < 0.3 else 0.05 if pose.x_m < 0.69 else 0.0, 0.0)
+
+        # Kept back for 0.4 s at 0.05 m/s, it goes 0.02 m: of the way before, nothing is left.
+        run = drive(on_odometry(command), seconds=20)
+        arrives_s = next(run.since_launch_s(step.time_ns) for step in run.truth if step.x_m > 0.55)
+        stall = taken(arrives_s, arrives_s + 0.5, waited_s=0.4)
+        late = simulated(run.truth, run.scene, messages=run.messages, disturbance=stall)
+        finding = judge("motion.overshoot", late, goal=yaml((0.6, 0.0, 0.0)), most="4 cm")
+        assert finding.status is Status.FAILED
+
 
 def test_drive_plain_silence_says_why():
     run = drive(lambda _: None, seconds=2)

@@ -207,9 +207,9 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     seen, plot = f"{metres(past_m[far])} past the goal", _plot(run, past_m, parameters.most)
     if past_m[far] <= parameters.most:
         return Finding.as_asked(seen, Evidence(plots=(plot,)))
-    arrived = run.truth[parameters.arrival(run)]
-    lost_s = stolen_s(recording, arrived.time_ns - _BRAKING_NS, far)
-    fastest_m_s = max(abs(step.linear_m_s) for step in run.truth)
+    since = run.truth[parameters.arrival(run)].time_ns - _BRAKING_NS
+    lost_s = stolen_s(recording, since, far)
+    fastest_m_s = max(abs(step.linear_m_s) for step in run.truth if since <= step.time_ns <= far)
     # The robot keeps its last command for as long as the machine keeps the next one back.
     if lost_s * fastest_m_s >= past_m[far] - parameters.most:
         return Finding.held_up(seen, lost_s)
