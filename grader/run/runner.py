@@ -287,7 +287,7 @@ class Runner:
         with self.admission.cell(alone=alone) as ticket:
             cell = self._take_cell(request.scenario)
             try:
-                order = self._order(request, cell.folder)
+                order = self._order(request, cell)
                 recording.parent.mkdir(parents=True, exist_ok=True)
                 launched_ns = time.time_ns()
                 try:
@@ -363,13 +363,13 @@ class Runner:
             self._server = PreforkServer(self.ros, self.sandbox)
         return CellProcess(self._server, imports)
 
-    def _order(self, request: RunRequest, folder: Path) -> CellOrder:
+    def _order(self, request: RunRequest, cell: CellProcess) -> CellOrder:
         from grader.assignment.random_values import draw_values
 
         assignment, scenario, submission = request.assignment, request.scenario, request.submission
         ros = replace(self.ros, underlays=request.underlays or self.ros.underlays)
         install, type_support, seed = request.install, request.type_support, request.seed
-        scratch = folder / SCRATCH
+        scratch = cell.folder / SCRATCH
         scratch.mkdir()
         values = draw_values(scenario, seed)
         commands = tuple(
@@ -415,7 +415,7 @@ class Runner:
             pauses=request.pauses,
         )
         if request.mistakes:
-            order = with_mistakes(order, request.mistakes, folder, ros)
+            order = with_mistakes(order, request.mistakes, cell.folder, ros)
         if self.sandbox is None or ros.source == "sourced":
             # A sandbox shows the system's libraries, which Python finds where ROS is sourced.
             shown = Path("/" if self.sandbox is None else "/usr")
@@ -425,4 +425,4 @@ class Runner:
             return order
         limits = (scenario.limits or assignment.limits).limits()
         sandbox = self.sandbox.allowing(assignment.libraries)
-        return sandboxed(order, folder, sandbox, ros, install, limits)
+        return sandboxed(order, cell, sandbox, ros, install, limits)

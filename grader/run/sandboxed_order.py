@@ -1,8 +1,8 @@
 """An order for a cell in a sandbox, from the same order for one without.
 
-A cell in a sandbox sees nothing but its own folder, so what the order names is copied there: the
-install spaces and the world. And the student, in a sandbox within, sees of that only what is
-installed.
+A cell in a sandbox sees nothing but its own folder and the underlays of the machine, so what else
+the order names is copied there: the student's install space and the world. And the student, in a
+sandbox within, sees of that only what is installed.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from grader.machine.ros import RosInstallation
+from grader.run.cell.cell_process import CellProcess
 from grader.run.compiled_tracer import IN_SANDBOX
 from grader.run.environment import TRACER, TRACER_IN_SANDBOX, sandboxed_environment
 from grader.run.imposing.mistake import IN_SANDBOX as MUTATION_IN_SANDBOX
@@ -34,20 +35,21 @@ _SYSTEM = "system"
 
 def sandboxed(
     order: CellOrder,
-    folder: Path,
+    cell: CellProcess,
     sandbox: Sandbox,
     ros: RosInstallation,
     install: Path,
     limits: SandboxLimits,
 ) -> CellOrder:
     """Make an order for a sandbox, and copy into the cell's folder what it needs."""
-    shown = [install, *ros.underlays]
+    folder, shown = cell.folder, [install, *ros.underlays]
     in_cell: dict[str, str] = {}
     seen: dict[str, str] = {}
     for number, path in enumerate(dict.fromkeys([*shown, *map(Path, order.type_support)])):
         place = f"install{number or ''}"
-        shutil.copytree(path, folder / place, symlinks=True)
-        in_cell[str(path)] = str(CELL / place)
+        if path not in cell.shown:
+            shutil.copytree(path, folder / place, symlinks=True)
+        in_cell[str(path)] = str(cell.shown.get(path, CELL / place))
         if path in shown:
             seen[str(path)] = f"{WORKSPACE}/{place}"
     for program, name in (

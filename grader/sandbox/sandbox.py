@@ -38,6 +38,8 @@ TREES = Path("/run/python")
 """Path of the students' Python environments in a cell."""
 ENVIRONMENT = Path("/run/environment")
 """Path of rosgrade's own Python environment in a cell."""
+UNDERLAYS = Path("/run/underlays")
+"""Folder of the underlays in a cell."""
 CODE = (Path(grader.__file__).resolve().parent, Path(sim.__file__).resolve().parent)
 
 _CELL_UID, _BUILD_UID = 2000, 1000
@@ -92,9 +94,17 @@ class Sandbox:
 
     @property
     def cached(self) -> tuple[Path, ...]:
-        """Folders of the cache that students' interpreters start from."""
+        """Folders of the cache that a cell sees."""
         own = (self.python_tree,) if _in_environment() else ()
-        return (trees_folder(self.cache), *own)
+        return (trees_folder(self.cache), *own, *(bind.source for bind in self.underlays()))
+
+    def underlays(self) -> list[Bind]:
+        """The underlays that are kept on this machine, as cells see them."""
+        found = sorted(self.cache.glob("underlays/builds/*/install"))
+        # A sandbox runs as another user, where rosgrade runs as root; built with a umask such as
+        # 077, an underlay is copied for it.
+        shown = [path for path in found if path.stat().st_mode & 0o555 == 0o555]
+        return [Bind(path, UNDERLAYS / path.parent.name) for path in shown]
 
     def watched(self) -> Callable[[], None]:
         """A function that raises :class:`GraderFault` if the students' Python was damaged."""

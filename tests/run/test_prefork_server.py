@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import os
 import select
+import shutil
 import signal
+import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,6 +25,8 @@ from grader.sandbox import bubblewrap
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
 from grader.sandbox.usage import usage_of
+from grader.submission.build.build_cache import BUILDS, INSTALL
+from grader.submission.underlay.store import UNDERLAYS
 from tests.run import nodes
 from tests.run.conftest import SUBMISSION, RunNode, assignment, install
 
@@ -136,6 +142,35 @@ def test_the_installation_of_a_package_meanwhile_spoils_no_run(
                 new = Path(etc, "ld.so.cache~")
                 new.write_bytes(b"new")
                 new.replace(linker_cache)
+
+
+def test_an_underlay_is_shown_to_each_run_and_copied_for_none_also_one_that_is_added_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sandbox: Sandbox
+) -> None:
+    copied: list[str] = []
+    copy = shutil.copytree
+
+    def watched(source: Path, *others: Any, **options: Any) -> Any:
+        copied.append(os.fspath(source))
+        return copy(source, *others, **options)
+
+    course = assignment(until={"messages": 3})
+    space = install(tmp_path, "import first_module\n" + nodes.timed())
+    monkeypatch.setattr(shutil, "copytree", watched)
+    kept = sandbox.cache / UNDERLAYS / BUILDS
+    with Runner(ros.find(), sandbox=sandbox) as runner:
+        underlays: tuple[Path, ...] = ()
+        for name in ("first", "second"):
+            underlays = (*underlays, kept / name / INSTALL)
+            site = underlays[-1] / f"lib/python3.{sys.version_info[1]}/site-packages"
+            site.mkdir(parents=True)
+            (site / f"{name}_module.py").write_text("import os; assert os.path.exists(__file__)\n")
+            file = tmp_path / f"{name}.mcap"
+            wanted = RunRequest(course, course.scenarios[0], SUBMISSION, space, 1)
+            runner.run(replace(wanted, underlays=underlays), file)
+            assert len(read_recording(file).on("/cmd_vel")) >= 3
+    assert str(space) in copied
+    assert not [path for path in copied if path.startswith(str(kept))]
 
 
 def test_a_student_inherits_no_descriptor_but_its_own(run_node: RunNode) -> None:

@@ -35,6 +35,7 @@ class CellProcess:
 
     Attributes:
         folder: Its own; gone after :meth:`close`.
+        shown: Underlays that it sees without a copy, and where.
         pid: As the prefork server counts processes; None before the fork.
         returncode: As in :mod:`subprocess`, or None while it runs.
         cpu_s: CPU time of the cell, of the student in it and of the prefork server for it; known at
@@ -43,6 +44,7 @@ class CellProcess:
 
     def __init__(self, prefork_server: PreforkServer, imports: Sequence[str] = ()) -> None:
         self._server = prefork_server
+        self.shown = prefork_server.shown
         self._closing, self._waiting = threading.Lock(), threading.Lock()
         self.pid: int | None = None
         self.returncode: int | None = None

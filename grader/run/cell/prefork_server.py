@@ -76,6 +76,9 @@ class PreforkServer:
 
     Args:
         sandbox: What it and its cells run in, or None.
+
+    Attributes:
+        shown: Underlays that its cells see, and where.
     """
 
     def __init__(self, ros: RosInstallation, sandbox: Sandbox | None = None) -> None:
@@ -83,13 +86,15 @@ class PreforkServer:
         compileall.compile_dir(TRACER, quiet=2)
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._sandbox = sandbox
-        self._trees = _trees_of(sandbox)
+        self._seen = _seen_of(sandbox)
         self._cells = Scratch("cells")
+        underlays = sandbox.underlays() if sandbox is not None else []
+        self.shown = {bind.source: bind.target for bind in underlays}
         command = [str(ros.python), "-m", "grader.run.cell.prefork_server", str(theirs.fileno())]
         environment = cell_environment(ros, sandboxed=sandbox is not None)
         if sandbox is not None:
             bubblewrap.give(self.cells)
-            shown = [Bind(TRACER, TRACER_IN_SANDBOX)]
+            shown = [Bind(TRACER, TRACER_IN_SANDBOX), *underlays]
             command = sandbox.server_command(command, ros, self.cells, environment, shown)
             environment = bubblewrap.PLAIN_ENVIRONMENT
         with theirs:
@@ -108,8 +113,8 @@ class PreforkServer:
 
     @property
     def is_alive(self) -> bool:
-        """Whether it still takes requests, and its cells would find the Pythons of the cache."""
-        return self._popen.poll() is None and self._trees == _trees_of(self._sandbox)
+        """Whether it still takes requests, and its cells see what is in the cache now."""
+        return self._popen.poll() is None and self._seen == _seen_of(self._sandbox)
 
     @property
     def cells(self) -> Path:
@@ -169,8 +174,8 @@ class PreforkServer:
         return frozenset(filter(is_stopped, pids))
 
 
-def _trees_of(sandbox: Sandbox | None) -> list[tuple[int, int]]:
-    """Identities of the cache folders in a sandbox, which change when one is deleted."""
+def _seen_of(sandbox: Sandbox | None) -> list[tuple[int, int]]:
+    """Identities of what a sandbox shows of the cache, which change when it is made anew."""
     found = [path.stat() for path in sandbox.cached] if sandbox is not None else []
     return [(status.st_dev, status.st_ino) for status in found]
 
