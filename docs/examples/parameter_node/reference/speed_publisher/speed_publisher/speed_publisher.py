@@ -44,8 +44,10 @@ class SpeedPublisher(Node):
                 self.timer = self.create_timer(parameter.value, self.publish)
 
     def publish(self) -> None:
-        """Publish the speed."""
-        self.publisher.publish(Float64(data=self.get_parameter('speed').value))
+        """Publish the speed, and log it once a second."""
+        message = Float64(data=self.get_parameter('speed').value)
+        self.publisher.publish(message)
+        self.get_logger().info(f'speed: {message.data:.2f} m/s', throttle_duration_sec=1.0)
 
 
 def main(args: list[str] | None = None) -> None:

@@ -11,13 +11,14 @@ from rclpy.node import Node
 from sensor_msgs.srv import SetCameraInfo
 
 WRITING_S = 0.4
+READING_S = 0.05
 
 
 class CameraServer(Node):
     """Offers /set_camera_info."""
 
     def __init__(self) -> None:
-        """Create the service."""
+        """Create the service and the timer."""
         super().__init__('camera_server')
         self.service = self.create_service(
             SetCameraInfo,
@@ -25,6 +26,11 @@ class CameraServer(Node):
             self.set_camera_info,
             callback_group=ReentrantCallbackGroup(),
         )
+        self.timer = self.create_timer(0.1, self.read_temperature)
+
+    def read_temperature(self) -> None:
+        """Read the camera's temperature."""
+        time.sleep(READING_S)
 
     def set_camera_info(
         self, request: SetCameraInfo.Request, response: SetCameraInfo.Response
