@@ -37,6 +37,7 @@ from grader.assignment.contract.derive import Derivation
 from grader.assignment.contract.model import Contract
 from grader.assignment.contract.table import rows
 from grader.assignment.load import LoadedAssignment, list_assignments, load_assignment
+from grader.checks.catalogue import CATALOGUE
 from grader.machine import resources
 from grader.report.html.handout import make_handout
 
@@ -173,3 +174,10 @@ def test_the_lesson_carries_most_of_the_points(loaded: LoadedAssignment, table: 
 def test_every_assignment_has_a_table() -> None:
     known = {*list_assignments(), *EXAMPLES}
     assert {path.stem for path in TABLES.glob("*.yaml")} == known
+
+
+def test_every_check_is_used_by_a_lesson_or_an_example() -> None:
+    """Else no right solution and no mutant tries it."""
+    every = [load_assignment(EXAMPLES.get(name, name)) for name in (*list_assignments(), *EXAMPLES)]
+    used = {bound.spec.uses for loaded in every for bound in loaded.checks}
+    assert not set(CATALOGUE) - used

@@ -18,6 +18,11 @@ STEP_S = 0.1
 LONGEST_M = 2.0
 
 
+def is_possible(distance: float) -> bool:
+    """Whether the robot can drive so far ahead, in m."""
+    return 0.0 < distance <= LONGEST_M
+
+
 class DriveServer(Node):
     """Offers the action drive in the namespace of the group."""
 
@@ -54,8 +59,7 @@ class DriveServer(Node):
 
     def decide(self, goal: Drive.Goal) -> GoalResponse:
         """Accept a distance of up to 2 m ahead."""
-        right = 0.0 < goal.distance <= LONGEST_M
-        return GoalResponse.ACCEPT if right else GoalResponse.REJECT
+        return GoalResponse.ACCEPT if is_possible(goal.distance) else GoalResponse.REJECT
 
     def cancel(self, handle: ServerGoalHandle) -> CancelResponse:
         """Agree to cancel."""
