@@ -101,15 +101,16 @@ class World:
 
 def read_world(file: Path, values: Values | None = None) -> World:
     """Read a world file."""
-    return _world(read_source(file), values or {})
+    return world_of(read_source(file), values or {})
 
 
 def parse_world(text: str, file: Path = Path("world.yaml"), values: Values | None = None) -> World:
     """Read a world from text; ``file`` is only named in errors."""
-    return _world(parse_source(text, file), values or {})
+    return world_of(parse_source(text, file), values or {})
 
 
-def _world(source: Source, values: Values) -> World:
+def world_of(source: Source, values: Values) -> World:
+    """A world from what its file says, with values in place of every ``$name``."""
     source = _with_values(source, values)
     model = source.read(WorldModel)
     shapes = _shapes(model, source)

@@ -14,15 +14,19 @@ from grader.spec.document import Place
 from grader.spec.source import Source, read_source
 from grader.spec.unit import format_duration
 from sim.robot import MODELS
-from sim.world import World, read_world
+from sim.world import World, world_of
 
 _TRIED_SEEDS = range(20)
 
 
 def read_scenario_world(file: Path, values: dict[str, str]) -> World:
     """Read a world; a scenario may have random values that its world does not use."""
-    used = read_source(file).data.get("values", {})
-    return read_world(file, {name: value for name, value in values.items() if name in used})
+    return _scenario_world(read_source(file), values)
+
+
+def _scenario_world(world: Source, values: dict[str, str]) -> World:
+    used = world.data.get("values", {})
+    return world_of(world, {name: value for name, value in values.items() if name in used})
 
 
 def problems(source: Source, assignment: Assignment, known: Interfaces) -> Iterator[Problem]:
@@ -69,14 +73,14 @@ def _parameters(
 
 
 def _world(source: Source, place: Place, scenario: Scenario) -> Iterator[Problem]:
-    file = source.file.parent / str(scenario.world)
-    for seed in _TRIED_SEEDS if scenario.random else (0,):
-        values = draw_values(scenario, seed)
-        try:
-            world = read_scenario_world(file, world_values(scenario, values))
+    values: dict[str, float] = {}
+    try:
+        written = read_source(source.file.parent / str(scenario.world))
+        for seed in _TRIED_SEEDS if scenario.random else (0,):
+            values = draw_values(scenario, seed)
+            world = _scenario_world(written, world_values(scenario, values))
             start = scenario.robot.pose if scenario.robot.pose is not None else world.start
             world.check_start(start, scenario.robot.radius or MODELS[scenario.robot.model].radius_m)
-        except (AssignmentError, UsageError) as error:
-            drawn = ", ".join(f"{name} = {value:g}" for name, value in values.items())
-            yield source.problem((*place, "world"), f"{error}{f' (with {drawn})' if drawn else ''}")
-            return
+    except (AssignmentError, UsageError) as error:
+        drawn = ", ".join(f"{name} = {value:g}" for name, value in values.items())
+        yield source.problem((*place, "world"), f"{error}{f' (with {drawn})' if drawn else ''}")
