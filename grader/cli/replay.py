@@ -62,7 +62,7 @@ def replay(
         how = Preparation(ros=installation, cache=cache_folder(), on_progress=progress.say)
         prepared = prepare(submission, how)
         record = replace(prepared.record, given=recorded.submission.given)
-        loaded, _, _ = with_chosen_names(loaded, record, {recorded.scenario: recorded})
+        loaded = with_chosen_names(loaded, record, {recorded.scenario: recorded}).loaded
         type_support = TypeSupport(loaded, ros.find(), cache_folder()).prefixes(progress.say)
     reason = why_not_run(prepared.record, [one.name for one in loaded.assignment.packages])
     if prepared.install is None or reason is not None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from grader.assignment.binding import BoundCheck
 from grader.checks.check import Parameters
 from grader.checks.doubt import is_doubtful
 from grader.diagnosis.no_parameter import why_not_taken
@@ -18,9 +19,6 @@ from grader.grade.origins import with_origins
 from grader.grade.windowed import judged_in
 from grader.recording.model import Recording
 from grader.recording.submission import SubmissionRecord
-
-if TYPE_CHECKING:
-    from grader.assignment.binding import BoundCheck
 
 NOT_YOURS = "Nothing to fix on your side: tell your instructor."
 
@@ -104,8 +102,7 @@ def with_what_was_not_taken(finding: Finding, case: Case) -> Finding:
     recording = case.recording
     if recording is None or finding.names:
         return finding
-    right = {one.asked for one in recording.names.wrong}
-    cause = why_not_taken(recording, set(recording.given_parameters) - right)
+    cause = not_taken(recording)
     if cause is None or finding.observed.startswith(cause.observed):
         return finding
     seen = f"{cause.observed}; {finding.observed}"
@@ -136,6 +133,12 @@ def why_incomplete(
         if cause is not None:
             return replace(cause.after(f"`{package}` could not run here"), expected=expected)
     return None
+
+
+def not_taken(recording: Recording) -> Finding | None:
+    """Which parameters the launch gives and no node takes, under no wrong name either; or None."""
+    right = {one.asked for one in recording.names.wrong}
+    return why_not_taken(recording, set(recording.given_parameters) - right)
 
 
 def fault(observed: str) -> Finding:

@@ -10,27 +10,22 @@ import statistics
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from graphlib import TopologicalSorter
-from typing import TYPE_CHECKING
 
+from grader.assignment.binding import BoundCheck
+from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Counts
 from grader.assignment.mutant import required_by
 from grader.checks.check import Subject
 from grader.checks.parameter.parameter import PARAMETERS_GIVEN
-from grader.diagnosis.no_parameter import why_not_taken
 from grader.diagnosis.not_built import why_not_built
 from grader.findings.finding import Finding, Status, Verdict
 from grader.findings.words import speaking
-from grader.grade.chain import NOT_YOURS, Case, fault, judged, why_incomplete
+from grader.grade.chain import NOT_YOURS, Case, fault, judged, not_taken, why_incomplete
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
 from grader.grade.naming import with_chosen_names
 from grader.grade.runtime_imports import with_runtime_imports
 from grader.recording.model import Ending, Recording
 from grader.recording.submission import CPP, SubmissionRecord
-
-if TYPE_CHECKING:
-    # Reading YAML is not needed to judge; a worker of a batch starts without it.
-    from grader.assignment.binding import BoundCheck
-    from grader.assignment.load import LoadedAssignment
 
 _CREDIT: Mapping[Counts, Callable[[Sequence[float]], float]] = {
     Counts.WORST: min,
@@ -58,7 +53,8 @@ def judge_all(
         faults: By scenario id: why there is no recording.
     """
     with speaking(submission.spoken(())):
-        loaded, submission, unnamed = with_chosen_names(loaded, submission, recordings)
+        named = with_chosen_names(loaded, submission, recordings)
+    loaded, submission, unnamed = named.loaded, named.submission, named.unnamed
     bound = {item.spec.id: item for item in loaded.checks}
     known = with_runtime_imports(submission, recordings.values())
     parameters_first = _parameters_first(bound)
@@ -104,9 +100,9 @@ def _is_lost_by_parameters(
 ) -> bool:
     """Whether a check failed without credit in a run whose parameters the nodes do not take."""
     lost = _counted(bound.spec.counts, [item.finding for item in findings])
-    return lost == (Status.FAILED, 0.0) and any(
-        _has_other_parameters(item, recordings) for item in findings
-    )
+    failed = {item.scenario for item in findings if item.finding.status is Status.FAILED}
+    runs = (run for name, run in recordings.items() if name in failed)
+    return lost == (Status.FAILED, 0.0) and any(map(not_taken, runs))
 
 
 def _result(
@@ -162,14 +158,6 @@ def _is_put_right(item: ScenarioFinding, recordings: Mapping[str, Recording]) ->
     runs = [run for name, run in recordings.items() if item.scenario in (None, name)]
     goes_on = item.finding.status is Status.PASSED or item.finding.stands_alone
     return goes_on or (bool(names) and all(names <= run.names for run in runs))
-
-
-def _has_other_parameters(item: ScenarioFinding, recordings: Mapping[str, Recording]) -> bool:
-    """Whether a finding is of a failure in a run whose parameters the student's nodes lack."""
-    recording = recordings.get(item.scenario or "")
-    if recording is None or item.finding.status is not Status.FAILED:
-        return False
-    return why_not_taken(recording, recording.given_parameters) is not None
 
 
 def _blockers(requires: Iterable[str], results: Mapping[str, CheckResult]) -> tuple[str, ...]:

@@ -7,8 +7,10 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING
 
+from grader.assignment.load import LoadedAssignment
+from grader.assignment.selection import with_values
+from grader.assignment.variable import ANY, Values, Variable, fill_text, form
 from grader.checks.interface.interface import Found as InterfaceFound
 from grader.checks.interface.interface import OfInterface
 from grader.checks.package.package import PackageFound
@@ -25,10 +27,6 @@ from grader.spec.name import INTERFACE
 from grader.spec.names import Names, Thing, WrongName
 from grader.spec.nearest_name import meant, nearest
 from grader.submission.read.cmake import read_commands
-
-if TYPE_CHECKING:
-    from grader.assignment.load import LoadedAssignment
-    from grader.assignment.variable import Values, Variable
 
 _WORDS = {
     "publishers": PUBLISHER,
@@ -49,6 +47,19 @@ class Unnamed:
 
     finding: Finding
     variables: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Named:
+    """An assignment with a submission's own names, and the submission, which says what is wrong.
+
+    Attributes:
+        unnamed: Why it cannot be run. The author's examples then stand for what was not found.
+    """
+
+    loaded: LoadedAssignment
+    submission: SubmissionRecord
+    unnamed: Unnamed | None
 
 
 def _with_stand_ins(loaded: LoadedAssignment, submission: SubmissionRecord) -> SubmissionRecord:
@@ -92,16 +103,12 @@ def with_chosen_names(
     loaded: LoadedAssignment,
     submission: SubmissionRecord,
     recordings: Mapping[str, Recording] = {},
-) -> tuple[LoadedAssignment, SubmissionRecord, Unnamed | None]:
+) -> Named:
     """Fill the student's own names in, and note in the submission which names are wrong.
 
     An assignment may ask for ``group{n}_bot``, and this submission has ``group7_bot``.
     What is found only in runs is the author's example until recordings show exactly one such name.
     So is an executable of what was not built: that is told first.
-
-    Returns:
-        The assignment, the submission, and why that cannot be run. The author's examples then
-        stand in place of the names that were not found.
 
     Raises:
         UsageError: The roster has no value for a variable.
@@ -110,7 +117,7 @@ def with_chosen_names(
     submission = _with_stand_ins(loaded, submission)
     interfaces = Names.of(_other_interfaces(loaded, submission))
     submission = replace(submission, names=submission.names | interfaces)
-    return _with_own_types(loaded, submission), submission, unnamed
+    return Named(_with_own_types(loaded, submission), submission, unnamed)
 
 
 def _other_interfaces(
@@ -143,12 +150,8 @@ def _with_own_types(loaded: LoadedAssignment, submission: SubmissionRecord) -> L
             own[one.asked] = one.own
         elif (package := submission.package(one.asked)) and package.definitions:
             own[f"{one.asked}/"] = f"{one.own}/"
-    if not own:
-        return loaded
-    from grader.assignment.selection import with_values
-
     try:
-        return with_values(loaded, {**loaded.values, **own})
+        return with_values(loaded, {**loaded.values, **own}) if own else loaded
     except AssignmentError:
         return loaded
 
@@ -160,10 +163,6 @@ def _with_chosen(
     variables = loaded.assignment.variables
     if not variables or submission.problem is not None:
         return loaded, None
-    # Reading YAML is not needed to judge what has no variables.
-    from grader.assignment.selection import with_values
-    from grader.assignment.variable import form
-
     given, values = dict(submission.given), dict[str, str]()
     unnamed = None
     for name, variable in variables.items():
@@ -173,17 +172,15 @@ def _with_chosen(
             continue
         if told or variable.match is None:
             raise UsageError(_not_given(name, variable, told))
-        offered = list(_offered(loaded, name, values, submission, recordings))
-        matches = filter(None, map(form(name, variables, values).fullmatch, offered))
-        found = {match["value"]: match[0] for match in matches}
+        search = _Search(loaded, submission, recordings, name, values)
+        found = search.found()
         if len(found) == 1:
-            values.update(dict.fromkeys([name], *found))
-        elif variable.is_of_runs or _unbuilt(loaded, name, values, submission):
+            (values[name],) = found
+        elif variable.is_of_runs or search.is_of_what_was_not_built():
             values[name] = str(variable.example)
         else:
-            why = _unnamed(loaded, name, values, list(found.values()), offered, submission)
             names = list(variables)
-            unnamed = Unnamed(why, frozenset(names[names.index(name) :]))
+            unnamed = Unnamed(search.why_none(), frozenset(names[names.index(name) :]))
             values = {**loaded.values, **values}
             break
     try:
@@ -195,23 +192,6 @@ def _with_chosen(
         return loaded, Unnamed(why, frozenset(variables))
 
 
-def _unbuilt(
-    loaded: LoadedAssignment, name: str, values: Values, submission: SubmissionRecord
-) -> bool:
-    """Whether a name is of what a build makes, and the package was not built."""
-    from grader.assignment.variable import fill_text
-
-    variable = loaded.assignment.variables[name]
-    if variable.in_ != "executables" or submission.build is None:
-        return False
-    packages = (
-        [fill_text(variable.of, values)]
-        if variable.of
-        else [package.name for package in submission.packages]
-    )
-    return any(why_not_built(submission, package) for package in packages)
-
-
 def _not_given(name: str, variable: Variable, told: str | None) -> str:
     origin = f"the column {variable.column!r} of the roster" if variable.column else "--set"
     kind = "digits" if isinstance(variable.example, int) else "letters, digits and underscores"
@@ -219,38 +199,100 @@ def _not_given(name: str, variable: Variable, told: str | None) -> str:
     return f"{origin} {wrong}; it stands for {{{name}}} (for one submission: --set {name}=VALUE)"
 
 
-def _offered(
-    loaded: LoadedAssignment,
-    name: str,
-    values: Values,
-    submission: SubmissionRecord,
-    recordings: Mapping[str, Recording],
-) -> Iterator[str]:
-    """The names among which that of a variable is."""
-    from grader.assignment.variable import fill_text
+@dataclass(frozen=True)
+class _Search:
+    """The search for the name that a submission has in the place of a variable.
 
-    variable = loaded.assignment.variables[name]
-    of = variable.of and fill_text(variable.of, values)
-    for package in submission.packages:
-        if variable.in_ == "packages":
-            yield package.name
-        elif variable.in_ == "executables" and of in (None, package.name):
-            yield from _programs(package)
-        elif variable.in_ == "interfaces":
-            for item in (*package.definitions, *package.generated):
-                file = PurePosixPath(item.file)
-                yield f"{package.name}/{file.suffix[1:]}/{file.stem}"
-    runs = loaded.source.data["scenarios"] if loaded.source and variable.is_of_runs else ()
-    using = {run["id"] for run in runs if f"{{{name}}}" in json.dumps(run)}
-    for recording in recordings.values():
-        # A run of a scenario that is repeated has a number behind the name.
-        if using.isdisjoint((recording.scenario, recording.scenario.rpartition("_")[0])):
-            continue
-        if variable.in_ == "nodes":
-            yield from (node.name for node in recording.student_nodes)
-        elif variable.in_ in _WORDS:
-            there = NoEndpoint(recording, _WORDS[variable.in_], "").there
-            yield from (item.name for item in there if of in (None, item.type))
+    Attributes:
+        values: Of the variables above it.
+    """
+
+    loaded: LoadedAssignment
+    submission: SubmissionRecord
+    recordings: Mapping[str, Recording]
+    name: str
+    values: Values
+
+    @property
+    def variable(self) -> Variable:
+        """What the assignment says of it."""
+        return self.loaded.assignment.variables[self.name]
+
+    @property
+    def of(self) -> str | None:
+        """The package or the type to which the search is limited, or None."""
+        return self.variable.of and fill_text(self.variable.of, self.values)
+
+    def found(self) -> dict[str, str]:
+        """The names of its form, by what is chosen in them."""
+        pattern = form(self.name, self.loaded.assignment.variables, self.values)
+        matches = filter(None, map(pattern.fullmatch, self.offered()))
+        return {match["value"]: match[0] for match in matches}
+
+    def is_of_what_was_not_built(self) -> bool:
+        """Whether it is of what a build makes, and the package was not built."""
+        if self.variable.in_ != "executables" or self.submission.build is None:
+            return False
+        packages = [self.of] if self.of else [one.name for one in self.submission.packages]
+        return any(why_not_built(self.submission, package) for package in packages)
+
+    def offered(self) -> Iterator[str]:
+        """The names among which it is."""
+        variable, of = self.variable, self.of
+        for package in self.submission.packages:
+            if variable.in_ == "packages":
+                yield package.name
+            elif variable.in_ == "executables" and of in (None, package.name):
+                yield from _programs(package)
+            elif variable.in_ == "interfaces":
+                for item in (*package.definitions, *package.generated):
+                    file = PurePosixPath(item.file)
+                    yield f"{package.name}/{file.suffix[1:]}/{file.stem}"
+        source = self.loaded.source
+        runs = source.data["scenarios"] if source and variable.is_of_runs else ()
+        using = {run["id"] for run in runs if f"{{{self.name}}}" in json.dumps(run)}
+        for recording in self.recordings.values():
+            # A run of a scenario that is repeated has a number behind the name.
+            if using.isdisjoint((recording.scenario, recording.scenario.rpartition("_")[0])):
+                continue
+            if variable.in_ == "nodes":
+                yield from (node.name for node in recording.student_nodes)
+            elif variable.in_ in _WORDS:
+                there = NoEndpoint(recording, _WORDS[variable.in_], "").there
+                yield from (item.name for item in there if of in (None, item.type))
+
+    def why_none(self) -> Finding:
+        """Which form was expected, and what was found."""
+        variable, of = self.variable, self.of
+        offered, fitting = list(self.offered()), self.found().values()
+        noun = variable.in_.removesuffix("s")
+        place = f" of {code(of)}" if of else ""
+        shape = fill_text(str(variable.match), self.values)
+        like = code(str(variable.example) if shape == ANY else fill_text(shape, self.loaded.values))
+        of_form = "of any name" if shape == ANY else f"with a name of the form {code(shape)}"
+        hint = f"Name the {noun} as {like} is named, with your own {code(self.name)}."
+        if noun == "package":
+            hint += worded(
+                python=" The same name stands in package.xml, setup.py, setup.cfg, resource/ and "
+                "for the folder of the Python module, or in CMakeLists.txt.",
+                cpp=" The same name stands in package.xml and in project(...) of CMakeLists.txt.",
+            )
+        asked = f"one {noun}{place} {of_form}, such as {like}"
+        if noun == "executable" and of and not offered:
+            cause = why_no_executable(self.submission, of, str(variable.example))
+            if cause is not None:
+                return replace(cause, expected=asked)
+        places = tuple(
+            SourceError(item.file(_defining(item, noun)), None, f"the package {code(item.name)}")
+            for item in self.submission.packages[:_MOST_PLACES]
+            if noun != "executable" or of in (None, item.name)
+        )
+        return Finding.failed(
+            asked,
+            f"found {codes(fitting or dict.fromkeys(offered)) or f'no {noun}'}",
+            f"Hand in one {noun} of this form only." if fitting else hint,
+            Evidence(places=places),
+        )
 
 
 def _defining(package: PackageRecord, noun: str) -> str:
@@ -258,46 +300,3 @@ def _defining(package: PackageRecord, noun: str) -> str:
     if noun != "executable":
         return "package.xml"
     return "setup.py" if package.build_type == "ament_python" else "CMakeLists.txt"
-
-
-def _unnamed(
-    loaded: LoadedAssignment,
-    name: str,
-    values: Values,
-    fitting: list[str],
-    offered: list[str],
-    submission: SubmissionRecord,
-) -> Finding:
-    """Which form was expected, and what was found."""
-    from grader.assignment.variable import ANY, fill_text
-
-    variable = loaded.assignment.variables[name]
-    noun = variable.in_.removesuffix("s")
-    of = variable.of and fill_text(variable.of, values)
-    place = f" of {code(of)}" if of else ""
-    shape = fill_text(str(variable.match), values)
-    like = code(str(variable.example) if shape == ANY else fill_text(shape, loaded.values))
-    of_form = "of any name" if shape == ANY else f"with a name of the form {code(shape)}"
-    hint = f"Name the {noun} as {like} is named, with your own {code(name)}."
-    if noun == "package":
-        hint += worded(
-            python=" The same name stands in package.xml, setup.py, setup.cfg, resource/ and for "
-            "the folder of the Python module, or in CMakeLists.txt.",
-            cpp=" The same name stands in package.xml and in project(...) of CMakeLists.txt.",
-        )
-    asked = f"one {noun}{place} {of_form}, such as {like}"
-    if noun == "executable" and of and not offered:
-        cause = why_no_executable(submission, of, str(variable.example))
-        if cause is not None:
-            return replace(cause, expected=asked)
-    places = tuple(
-        SourceError(item.file(_defining(item, noun)), None, f"the package {code(item.name)}")
-        for item in submission.packages[:_MOST_PLACES]
-        if noun != "executable" or of in (None, item.name)
-    )
-    return Finding.failed(
-        asked,
-        f"found {codes(fitting or dict.fromkeys(offered)) or f'no {noun}'}",
-        f"Hand in one {noun} of this form only." if fitting else hint,
-        Evidence(places=places),
-    )

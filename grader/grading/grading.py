@@ -104,8 +104,9 @@ class Grading:
 
         def tested(record: SubmissionRecord) -> frozenset[str]:
             self.told.recorded(record, {})
-            loaded, record, _ = with_chosen_names(self.loaded, replace(record, given=given))
-            return frozenset(one.name for name in _tested(loaded) if (one := record.package(name)))
+            named = with_chosen_names(self.loaded, replace(record, given=given))
+            found = map(named.submission.package, _tested(named.loaded))
+            return frozenset(package.name for package in found if package)
 
         return Preparation(
             ros=ros,

@@ -30,18 +30,19 @@ class Runs:
 
     def __init__(self, grading: Grading, prepared: Prepared, folder: Path) -> None:
         """Set up, and note what was handed in; recordings of before are gone then."""
-        self._loaded, record, unnamed = with_chosen_names(grading.loaded, prepared.record)
+        named = with_chosen_names(grading.loaded, prepared.record)
+        self._loaded = named.loaded
         self._grading = grading
         self._support = grading.type_support_of(self._loaded)
-        self._prepared = replace(prepared, record=record)
+        self._prepared = replace(prepared, record=named.submission)
         self._folder = folder
-        self._can_run = prepared.install is not None and unnamed is None
+        self._can_run = prepared.install is not None and named.unnamed is None
         self._recordings: dict[str, Recording] = {}
         self._faults: dict[str, str] = {}
         self._grade: Grade
         for old in folder.glob("*.mcap"):
             old.unlink()
-        write_whole(folder / SUBMISSION_FILE, to_json(record))
+        write_whole(folder / SUBMISSION_FILE, to_json(self._record))
         self._tell()
 
     def make(self, runs: Sequence[Run]) -> None:
@@ -58,9 +59,8 @@ class Runs:
         )
         if grade.assignment != self._loaded.assignment:
             # Some names that students choose, such as that of a service, show only in a run.
-            self._loaded, _, _ = with_chosen_names(
-                self._grading.loaded, self._record, self._recordings
-            )
+            named = with_chosen_names(self._grading.loaded, self._record, self._recordings)
+            self._loaded = named.loaded
         disturbed = grade.disturbed_scenarios(Status.ERROR)
         faulty = [name for name, recording in self._recordings.items() if recording.faults]
         return Round(

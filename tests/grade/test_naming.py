@@ -89,8 +89,9 @@ def test_names_of_the_submission_stand_everywhere_and_a_number_alone_is_a_number
     loaded: LoadedAssignment,
 ) -> None:
     record = submission("group12_gp2", "blue_maps", scripts=("driver",))
-    found, _, why = with_chosen_names(loaded, record)
-    assert why is None
+    named = with_chosen_names(loaded, record)
+    found = named.loaded
+    assert named.unnamed is None
     launch = found.assignment.scenarios[0].launch[0]
     assert (launch.package, launch.executable) == ("group12_gp2", "driver")
     assert launch.parameters == {"group": 12}
@@ -100,7 +101,7 @@ def test_names_of_the_submission_stand_everywhere_and_a_number_alone_is_a_number
 
 def test_a_part_of_an_assignment_stays_the_same_part(loaded: LoadedAssignment) -> None:
     part = select(loaded, ("maps",))
-    found, *_ = with_chosen_names(part, submission("group12_gp2", "blue_maps"))
+    found = with_chosen_names(part, submission("group12_gp2", "blue_maps")).loaded
     assert [check.spec.id for check in found.checks] == ["maps"]
     assert found.assignment.scenarios == ()
 
@@ -128,7 +129,8 @@ def test_two_names_that_fit_are_both_told(loaded: LoadedAssignment) -> None:
 
 
 def test_a_free_choice_must_be_a_single_one(loaded: LoadedAssignment) -> None:
-    *_, why = with_chosen_names(loaded, submission("group7_gp2", scripts=("bot", "test")))
+    record = submission("group7_gp2", scripts=("bot", "test"))
+    why = with_chosen_names(loaded, record).unnamed
     assert why is not None
     assert why.finding.expected == "one executable of `group7_gp2` of any name, such as `bot`"
     assert why.finding.observed == "found `bot` and `test`"
@@ -150,14 +152,16 @@ def test_a_name_of_what_was_not_built_is_not_asked_for_and_the_build_is_told(
     loaded: LoadedAssignment,
 ) -> None:
     record = failed_build(submission("group12_gp2", "red_maps"), "group12_gp2")
-    found, _, why = with_chosen_names(loaded, record)
-    assert why is None
+    named = with_chosen_names(loaded, record)
+    found = named.loaded
+    assert named.unnamed is None
     assert (found.assignment.title, found.values["run"]) == ("The bot of group 12", "driver")
     silent = dataclasses.replace(
         record, packages=tuple(dataclasses.replace(one, cmake="") for one in record.packages)
     )
-    found, _, why = with_chosen_names(loaded, silent)
-    assert why is None
+    named = with_chosen_names(loaded, silent)
+    found = named.loaded
+    assert named.unnamed is None
     assert (found.assignment.title, found.values["run"]) == ("The bot of group 12", "bot")
 
 
@@ -174,7 +178,7 @@ def test_a_check_of_a_name_that_was_found_does_not_fail_by_another(
 
 def test_the_roster_comes_before_what_was_handed_in(loaded: LoadedAssignment) -> None:
     record = submission("group7_gp2", "blue_maps", team="green")
-    found, *_ = with_chosen_names(loaded, record)
+    found = with_chosen_names(loaded, record).loaded
     assert found.values["team"] == "green"
     result = judge_all(loaded, record, {}).result("maps")
     assert "green_maps" in result.decisive.finding.expected
@@ -189,8 +193,9 @@ def test_a_value_of_the_roster_that_is_no_name_is_no_fault_of_the_student(
 
 def test_a_service_of_any_name_is_found_in_the_run_by_its_type(loaded: LoadedAssignment) -> None:
     record = submission("group7_gp2", "red_maps")
-    assert with_chosen_names(loaded, record)[0].values["toggle"] == "/toggle"
-    assert with_chosen_names(loaded, record, runs(record, "/light"))[0].values["toggle"] == "/light"
+    before = with_chosen_names(loaded, record)
+    after = with_chosen_names(loaded, record, runs(record, "/light"))
+    assert [one.loaded.values["toggle"] for one in (before, after)] == ["/toggle", "/light"]
     graded = judge_all(loaded, record, runs(record, "/light"))
     assert graded.result("service").status is Status.PASSED
 
@@ -210,8 +215,9 @@ def test_a_package_name_that_begins_with_a_digit_breaks_rep_144_and_is_graded(
     loaded: LoadedAssignment,
 ) -> None:
     record = submission("group7_gp2", "7up_maps")
-    found, _, why = with_chosen_names(loaded, record)
-    assert why is None and found.values["team"] == "7up"
+    named = with_chosen_names(loaded, record)
+    found = named.loaded
+    assert named.unnamed is None and found.values["team"] == "7up"
     finding = judge_all(loaded, record, {}).result("maps").decisive.finding
     assert finding.status is Status.FAILED
     assert "REP-144" in finding.observed
@@ -222,7 +228,8 @@ def test_a_name_that_ros_does_not_allow_is_told_and_not_run(tmp_path: Path) -> N
     folder.mkdir()
     text = YAML.replace('{call: "{toggle}"', '{call: "/{team}/toggle"')
     (folder / "assignment.yaml").write_text(text, encoding="utf-8")
-    *_, why = with_chosen_names(load_assignment(folder), submission("group7_gp2", "7up_maps"))
+    loaded, record = load_assignment(folder), submission("group7_gp2", "7up_maps")
+    why = with_chosen_names(loaded, record).unnamed
     assert why is not None
     assert "'/7up/toggle' is not a ROS topic name" in why.finding.observed
 
@@ -257,7 +264,7 @@ def stand_in(tmp_path: Path, **facts: Any) -> tuple[Grade, SubmissionRecord]:
     loaded = load_assignment(folder)
     package = PackageRecord(**{"name": "bot_publish", "path": "bot_publish", **facts})
     record = dataclasses.replace(submission(), packages=(package,))
-    return judge_all(loaded, record, {}), with_chosen_names(loaded, record)[1]
+    return judge_all(loaded, record, {}), with_chosen_names(loaded, record).submission
 
 
 @pytest.mark.parametrize(
@@ -360,7 +367,8 @@ def test_an_interface_under_another_name_is_used_instead_and_costs_its_own_check
             PackageRecord(package, package, "ament_cmake", definitions=(definition,)),
         ),
     )
-    found, record, _ = with_chosen_names(loaded, record)
+    named = with_chosen_names(loaded, record)
+    found, record = named.loaded, named.submission
     type_ = f"{package}/msg/{interface}"
     assert found.assignment.scenarios[0].record[0].type == type_
     run = dataclasses.replace(recording(), scenario="main", submission=record, names=record.names)
