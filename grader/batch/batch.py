@@ -12,8 +12,8 @@ from itertools import count
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
+from grader.batch.collected import Collected
 from grader.batch.executor import BatchExecutor, ExecutorLost
-from grader.batch.handed_in import HandedIn
 from grader.batch.ledger import Entry, Ledger, TakenFrom
 from grader.batch.used_assignment import regrade_command
 from grader.errors import GraderFault, RosgradeError, UsageError, machine_fault
@@ -65,7 +65,7 @@ class Batch:
     _given: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def read(
-        self, rows: Sequence[HandedIn], on_read: Callable[[str], None] = lambda _: None
+        self, rows: Sequence[Collected], on_read: Callable[[str], None] = lambda _: None
     ) -> tuple[list[Entry], dict[str, Path]]:
         """Read what was handed in, and find identical submissions."""
         earlier = self._earlier()

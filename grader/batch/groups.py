@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 from grader.batch.batch import copy_result, with_teams
-from grader.batch.handed_in import NOTHING, HandedIn
+from grader.batch.collected import NOTHING, Collected
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.used_assignment import load_used, refuse_changed
 from grader.course.load import Course, written
@@ -78,7 +78,7 @@ def _alone(row: R) -> R:
     return replace(row, **nothing, shared_by="", team="").with_problem(NOTHING)
 
 
-def strangers(rows: Sequence[HandedIn], course: Course) -> Iterator[str]:
+def strangers(rows: Sequence[Collected], course: Course) -> Iterator[str]:
     """Students that the rules name and that the class has not, a line each."""
     keys = [row.key for row in rows]
     known = {written(key) for key in keys}

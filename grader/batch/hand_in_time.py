@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from grader.batch.handed_in import HandedIn
+from grader.batch.collected import Collected
 from grader.course.instant import read_time
 from grader.errors import GraderFault, UsageError
 from grader.submission.git import run_git
@@ -25,7 +25,7 @@ _COMMITTER = re.compile(r"^committer .*> (\d{1,11}) ([+-]\d{4})$", re.MULTILINE)
 _GIT_LIMIT_S = 20.0
 
 
-def timed(rows: Sequence[HandedIn], staging: Path) -> list[HandedIn]:
+def timed(rows: Sequence[Collected], staging: Path) -> list[Collected]:
     """Rows with their times: the roster is asked first, then platform and names, then git."""
     found = []
     for given in rows:

@@ -12,6 +12,15 @@ from typing import Any
 
 import yaml
 
+from grader.batch.collected import (
+    FOREIGN,
+    NOTHING,
+    Collected,
+    is_ignored,
+    only_archive,
+    stem_of,
+    submission_in,
+)
 from grader.batch.groups import with_groups
 from grader.batch.hand_in_time import (
     CANVAS_TIMES,
@@ -20,15 +29,6 @@ from grader.batch.hand_in_time import (
     of_metadata,
     of_name,
     timed,
-)
-from grader.batch.handed_in import (
-    FOREIGN,
-    NOTHING,
-    HandedIn,
-    is_ignored,
-    only_archive,
-    stem_of,
-    submission_in,
 )
 from grader.batch.roster import Roster, Student
 from grader.batch.roster_match import matched, unique
@@ -53,37 +53,35 @@ _CLONE_LIMIT_S = 120.0
 _CLASS_LIMITS = ArchiveLimits(total_bytes=8192 * MIB, members=500_000)
 
 
-def take_in(
+def collect(
     source: Path,
     staging: Path,
     roster: Roster | None = None,
     on_left_out: Callable[[str], None] = lambda _: None,
     out: Path | None = None,
     course: Course | None = None,
-) -> list[HandedIn]:
+) -> list[Collected]:
     """Find out who handed in what, and when."""
     folder = _opened(source, staging)
     _refuse_single(folder, source)
-    entries = list(_entries(folder, staging, on_left_out, out))
-    if any(row.download for row in entries):
-        times = of_canvas(folder, source.parent if source.is_file() else None, on_left_out)
-        entries = [
-            row.at(times.get(row.names[0], NOT_KNOWN)) if row.download else row for row in entries
-        ]
-    if not entries:
+    rows = list(_rows(folder, staging, on_left_out, out))
+    if not rows:
         raise UsageError(f"{source}: holds no submission; expected one folder or archive for each")
-    rows = matched(entries, roster) if roster else entries
+    if any(row.download for row in rows):
+        times = of_canvas(folder, source.parent if source.is_file() else None, on_left_out)
+        rows = [row.at(times.get(row.names[0], NOT_KNOWN)) if row.download else row for row in rows]
+    rows = matched(rows, roster) if roster else rows
     return with_groups(timed(unique(rows), staging), course)
 
 
-def take_in_roster(
+def collect_roster(
     roster: Roster,
     base: Path,
     staging: Path,
     on_taken: Callable[[str], None] = lambda _: None,
     course: Course | None = None,
-) -> list[HandedIn]:
-    """Take in what a roster itself names, as paths or URLs of git repositories."""
+) -> list[Collected]:
+    """Find what a roster itself names, as paths or URLs of git repositories."""
     if not any(student.submission for student in roster.students):
         raise UsageError(
             "the roster names no submissions; give it a column `submission` with paths or URLs, "
@@ -91,7 +89,7 @@ def take_in_roster(
         )
     rows = []
     # A repository that a whole team names is fetched once.
-    cloned: dict[str, HandedIn] = {}
+    cloned: dict[str, Collected] = {}
     for student in roster.students:
         row = _from_roster(student, base, staging, cloned.get(student.submission))
         rows.append(row)
@@ -101,8 +99,10 @@ def take_in_roster(
     return with_groups(timed(unique(rows), staging), course)
 
 
-def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn | None) -> HandedIn:
-    row = HandedIn("").of(student)
+def _from_roster(
+    student: Student, base: Path, staging: Path, cloned: Collected | None
+) -> Collected:
+    row = Collected("").of(student)
     if not student.submission:
         return row.with_problem(NOTHING)
     if cloned is not None:
@@ -167,9 +167,9 @@ def _manifest_of_one(folder: Path) -> Path | None:
     return next((file.relative_to(folder) for file in found if file.is_file()), None)
 
 
-def _entries(
+def _rows(
     folder: Path, staging: Path, on_left_out: Callable[[str], None], out: Path | None
-) -> Iterator[HandedIn]:
+) -> Iterator[Collected]:
     metadata = _gradescope(folder / GRADESCOPE_METADATA)
     canvas: dict[str, list[tuple[Path, re.Match[str]]]] = {}
     for item in sorted(folder.iterdir(), key=lambda path: os.fsencode(path.name)):
@@ -187,7 +187,7 @@ def _entries(
             stem = stem_of(item)
             moodle = _MOODLE.fullmatch(stem)
             names = (moodle["name"] if moodle else stem,)
-            row = HandedIn(shown(stem), path=submission_in(item), item=item, names=names)
+            row = Collected(shown(stem), path=submission_in(item), item=item, names=names)
             # Moodle names the folder, but the student the archive.
             yield row if moodle else row.at(of_name(item.name))
         else:
@@ -197,14 +197,14 @@ def _entries(
         yield _of_canvas(files, staging)
 
 
-def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> HandedIn:
+def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> Collected:
     match = files[0][1]
     named, again = _names(files)
     path, fault = only_archive(named), ""
     if path is None:
         path = staging / f"canvas-{match['user']}"
         fault = _gather(named, path)
-    return HandedIn(
+    return Collected(
         shown(f"{match['name']}_{match['user']}"),
         late=any(one["late"] for _, one in files),
         fault=fault,
@@ -280,7 +280,7 @@ def _gradescope(file: Path) -> Mapping[str, Any]:
     return data if isinstance(data, dict) else {}
 
 
-def _of_gradescope(item: Path, about: Any) -> Iterator[HandedIn]:
+def _of_gradescope(item: Path, about: Any) -> Iterator[Collected]:
     """An exported folder, for each of its team; Gradescope writes keys with a colon in front."""
     submitters = about.get(":submitters") if isinstance(about, dict) else None
     listed = submitters if isinstance(submitters, list) else []
@@ -290,4 +290,4 @@ def _of_gradescope(item: Path, about: Any) -> Iterator[HandedIn]:
         values = (person.get(field) for field in (":sid", ":email", ":name"))
         names = tuple(str(value) for value in values if value) or (item.name,)
         name, path = shown(str(person.get(":name") or "")), submission_in(item)
-        yield HandedIn(shown(names[0]), name=name, path=path, item=item, names=names).at(time)
+        yield Collected(shown(names[0]), name=name, path=path, item=item, names=names).at(time)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
 
-from grader.batch.handed_in import NOTHING, HandedIn, stem_of
+from grader.batch.collected import NOTHING, Collected, stem_of
 from grader.batch.roster import Roster, Student, name_forms, resemblance
 from grader.course.load import written
 from grader.findings.words import listing
@@ -21,7 +21,7 @@ _MOST_TWICE = 10
 class _Names:
     """Finds the students of a roster that an entry may belong to."""
 
-    def __init__(self, students: Sequence[Student], entries: Sequence[HandedIn]) -> None:
+    def __init__(self, students: Sequence[Student], entries: Sequence[Collected]) -> None:
         """Collect the names of a class."""
         self._alike: dict[str, list[Student]] = {}
         for student in students:
@@ -49,7 +49,7 @@ class _Names:
         is_sure = len(fitting) == 1 and (len(known) == 1 or known[fitting[0]] > 1)
         return fitting[0] if is_sure else ""
 
-    def exact(self, entry: HandedIn) -> set[str]:
+    def exact(self, entry: Collected) -> set[str]:
         """Students with exactly its names; several where two of its names contradict each other."""
         keys: set[str] = set()
         for name in entry.names:
@@ -62,7 +62,7 @@ class _Names:
             keys = keys & found or keys | found
         return keys or self._login_behind(self._prefix, stem_of(entry.item))
 
-    def alike(self, entry: HandedIn) -> set[str]:
+    def alike(self, entry: Collected) -> set[str]:
         """Students with a name that is written alike, or with which the entry's name ends."""
         parts = stem_of(entry.item).split("-")[-_MOST_HYPHENS:]
         ends = ["-".join(parts[first:]) for first in range(1, len(parts))]
@@ -76,7 +76,7 @@ class _Names:
         return {student.key for student in alike if written(login) in student.logins}
 
 
-def matched(entries: list[HandedIn], roster: Roster) -> list[HandedIn]:
+def matched(entries: list[Collected], roster: Roster) -> list[Collected]:
     """Give each entry to the student of the roster that it names.
 
     A name that is only similar is not matched; the rows of submission and student say so.
@@ -88,7 +88,7 @@ def matched(entries: list[HandedIn], roster: Roster) -> list[HandedIn]:
         if student.submission:
             file = PurePosixPath(student.submission).name.removesuffix(".git")
             named.setdefault(file, set()).add(student.key)
-    rows: list[HandedIn] = []
+    rows: list[Collected] = []
     handed: dict[str, list[tuple[int, str]]] = {}
     doubtful: dict[str, list[str]] = {}
     for entry in entries:
@@ -119,11 +119,11 @@ def matched(entries: list[HandedIn], roster: Roster) -> list[HandedIn]:
                 why += f": {shown(student.submission)} is not among the submissions"
             other = doubtful.get(student.key)
             theirs = f"{listing(other)} may be theirs" if other else ""
-            rows.append(HandedIn("").with_problem(why, theirs).of(student))
+            rows.append(Collected("").with_problem(why, theirs).of(student))
     return rows
 
 
-def unique(rows: list[HandedIn]) -> list[HandedIn]:
+def unique(rows: list[Collected]) -> list[Collected]:
     """Rows sorted by key, with a number behind a key that is there already."""
     # A browser numbers what it saves in the same way, so `ana (2)` may be there as well.
     taken = {row.key for row in rows}

@@ -16,7 +16,7 @@ from grader.assignment.load import load_assignment
 from grader.batch import executor as executors
 from grader.batch.batch import Batch, Done
 from grader.batch.groups import strangers
-from grader.batch.intake import take_in, take_in_roster
+from grader.batch.intake import collect, collect_roster
 from grader.batch.ledger import Ledger, TakenFrom
 from grader.batch.roster import read_roster
 from grader.batch.used_assignment import in_use, load_used
@@ -120,9 +120,9 @@ def batch(
         names = read_roster(listed) if listed is not None else None
         if names is not None and is_roster:
             progress.begin("fetching", len(names.students))
-            rows = take_in_roster(names, submissions.parent, staging, progress.advance, rules)
+            rows = collect_roster(names, submissions.parent, staging, progress.advance, rules)
         else:
-            rows = take_in(submissions, staging, names, progress.note, out, rules)
+            rows = collect(submissions, staging, names, progress.note, out, rules)
         for problem in names.problems if names is not None else ():
             progress.note(f"{listed}: {problem}")
         for stranger in strangers(rows, rules) if rules is not None else ():

@@ -22,7 +22,7 @@ from grader.batch.batch import Batch, Done
 from grader.batch.executor import LocalExecutor
 from grader.grading.files import REPORT_FILE
 from grader.grading.grading import Grading
-from grader.batch.intake import take_in
+from grader.batch.intake import collect
 from grader.batch.ledger import Ledger
 from grader.findings.finding import Status
 from grader.report.model.result import grade_json
@@ -637,7 +637,7 @@ def grade_class(folder: Path, members: dict[str, Attack]) -> dict[str, Handed]:
     staging.mkdir(parents=True)
     for name, member in members.items():
         member.write(submissions / name)
-    rows = take_in(submissions, staging)
+    rows = collect(submissions, staging)
     random.Random(1).shuffle(rows)
     loaded = load_assignment(LESSON)
     cache = folder / "cache"

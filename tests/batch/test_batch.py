@@ -17,9 +17,9 @@ import pytest
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.variable import Variable
 from grader.batch.batch import Batch, Done
+from grader.batch.collected import Collected
 from grader.batch.executor import BatchExecutor, ExecutorLost, LocalExecutor
-from grader.batch.handed_in import HandedIn
-from grader.batch.intake import take_in
+from grader.batch.intake import collect
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.roster import parse_roster
 from grader.errors import GraderFault, UsageError
@@ -75,7 +75,7 @@ class Class:
         """Run a batch to its end."""
         with self.ledger.opened():
             batch = Batch(self.loaded, self.ledger, frozenset(retry))
-            _, to_do = batch.read(take_in(self.folder / "class", self.folder))
+            _, to_do = batch.read(collect(self.folder / "class", self.folder))
             done = {item.entry.key: item for item in batch.grade(to_do, executor)}
         executor.close()
         return done
@@ -138,7 +138,7 @@ def test_of_the_same_submissions_either_may_be_named_to_be_graded_again(
 def test_an_unknown_name_to_grade_again_is_reported_with_the_nearest(
     course: Class, named: str, said: str
 ) -> None:
-    rows = take_in(course.folder / "class", course.folder)
+    rows = collect(course.folder / "class", course.folder)
     with course.ledger.opened(), pytest.raises(UsageError) as caught:
         Batch(course.loaded, course.ledger, frozenset({named})).read(rows)
     assert str(caught.value) == f"--retry: there is no submission {said}"
@@ -249,7 +249,7 @@ def test_a_batch_of_another_assignment_replaces_no_grades(course: Class) -> None
     (other / "assignment.yaml").write_text(YAML.replace("id: lesson", "id: other"))
     with pytest.raises(UsageError, match="holds the grades of lesson; use a new folder"):
         Batch(load_assignment(other), course.ledger, frozenset({"all"})).read(
-            take_in(course.folder / "class", course.folder)
+            collect(course.folder / "class", course.folder)
         )
     assert course.written() == before
     assert course.ledger.read().assignment == "lesson"
@@ -273,8 +273,8 @@ def test_what_is_gone_has_no_grade(course: Class) -> None:
     shutil.rmtree(course.folder / "class" / "ben")
     with course.ledger.opened():
         batch = Batch(course.loaded, course.ledger)
-        rows = take_in(course.folder / "class", course.folder)
-        batch.read([*rows, HandedIn("ben", problem="handed in nothing")])
+        rows = collect(course.folder / "class", course.folder)
+        batch.read([*rows, Collected("ben", problem="handed in nothing")])
         done = {item.entry.key: item for item in batch.grade({}, None)}
     assert done["ben"].result is None and done["ana"].result is not None
     assert [folder.name for folder in find_reports(course.ledger.out)] == ["ana", "cai"]
@@ -299,7 +299,7 @@ def test_an_interrupted_batch_knows_what_it_has_not_come_to(course: Class) -> No
     (course.folder / "class" / "ben" / "notes.txt").write_text("handed in again")
     with course.ledger.opened():
         batch = Batch(course.loaded, course.ledger, frozenset({"ana"}))
-        _, to_do = batch.read(take_in(course.folder / "class", course.folder))
+        _, to_do = batch.read(collect(course.folder / "class", course.folder))
         assert set(to_do) == {"ana", "ben", "dee"}
         left = {item.entry.key: item for item in all_standing(course.ledger)}
     graded = {key for key, item in left.items() if item.result is not None}
@@ -314,7 +314,7 @@ def test_the_same_submission_of_another_team_is_graded_with_the_names_of_that_te
     variables = {"team": Variable(column="Team", example="red")}
     assignment = course.loaded.assignment.model_copy(update={"variables": variables})
     roster = parse_roster(f"login,team\nana,red\nben,\ncai,{team}\n", "class.csv")
-    rows = take_in(course.folder / "class", course.folder, roster)
+    rows = collect(course.folder / "class", course.folder, roster)
     with course.ledger.opened():
         batch = Batch(replace(course.loaded, assignment=assignment), course.ledger)
         entries, to_do = batch.read(rows)

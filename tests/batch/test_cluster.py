@@ -23,7 +23,7 @@ from grader.batch.executor import (
     Order,
     make_grading,
 )
-from grader.batch.intake import take_in
+from grader.batch.intake import collect
 from grader.batch.ledger import Ledger
 from grader.errors import UsageError
 from grader.machine import resources
@@ -83,7 +83,7 @@ def grade(
     staging.mkdir()
     with Ledger(out).opened() as ledger:
         batch = Batch(load_assignment(ASSIGNMENT), ledger)
-        _, to_do = batch.read(take_in(submissions, staging))
+        _, to_do = batch.read(collect(submissions, staging))
         for item in batch.grade(to_do, executor):
             done.append(item)
             if len(done) == 1 and callable(on_first):

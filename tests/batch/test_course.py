@@ -18,7 +18,7 @@ import pytest
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.batch import Batch, Done
 from grader.batch.groups import regroup, strangers
-from grader.batch.intake import take_in
+from grader.batch.intake import collect
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.roster import parse_roster
 from grader.errors import UsageError
@@ -145,7 +145,7 @@ class Class:
         with Ledger(self.out).opened() as ledger:
             place = str(course.file.resolve()) if course else None
             batch = Batch(self.loaded, ledger, course=place, keep=handed is not None)
-            _, to_do = batch.read(take_in(handed or self.handed, staging, known, course=course))
+            _, to_do = batch.read(collect(handed or self.handed, staging, known, course=course))
             done: list[Done] = list(batch.grade(to_do, Reader(self.loaded)))
             write_class(bring_up_to_date(done, ledger, now), ledger)
         return {row.id: row for row in read_class(self.out)}
@@ -210,7 +210,7 @@ def test_without_rules_nothing_is_deducted_and_the_times_are_kept(course: Class)
     course.hand_in("ana_2030-01-01T10-00-00Z", "bot")
     with Ledger(course.out).opened() as ledger:
         batch = Batch(course.loaded, ledger)
-        _, to_do = batch.read(take_in(course.handed, course.folder))
+        _, to_do = batch.read(collect(course.handed, course.folder))
         done = list(batch.grade(to_do, Reader(course.loaded)))
         write_class(bring_up_to_date(done, ledger, NOW), ledger)
         (entry,) = ledger.read().entries
@@ -376,7 +376,7 @@ def test_students_that_only_the_rules_know_are_named(course: Class) -> None:
     course.hand_in("ana", "bot")
     rules = course_of(course.out, course.folder / "course.yaml", "lesson")
     assert rules is not None
-    (line,) = strangers(take_in(course.handed, course.folder), rules)
+    (line,) = strangers(collect(course.handed, course.folder), rules)
     assert line.endswith("an extension names 'anna', not in this class. Did you mean 'ana'?")
 
 
@@ -514,7 +514,7 @@ def test_what_an_interrupted_batch_left_is_graded_by_the_next_from_where_it_lay(
         course.hand_in(name, "bot", text=text)
     with Ledger(course.out).opened() as ledger:
         batch = Batch(course.loaded, ledger)
-        _, to_do = batch.read(take_in(course.handed, course.folder))
+        _, to_do = batch.read(collect(course.handed, course.folder))
         assert list(to_do) == ["ana", "ben", "cai"]
     # What was changed meanwhile is not what she handed in.
     (course.handed / "ana" / "notes.txt").write_text("changed")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.batch.intake import take_in, take_in_roster
+from grader.batch.intake import collect, collect_roster
 from grader.batch.roster import Roster, Student, parse_roster, read_roster
 from grader.errors import UsageError
 from grader.submission.read.manifest import MANIFEST
@@ -50,7 +50,7 @@ def test_folders_and_archives_are_named_after_themselves(course: Path, staging: 
     archive(course / "ben.zip")
     (course / "notes.txt").write_text("not a submission")
     (course / ".DS_Store").write_text("")
-    rows = take_in(course, staging)
+    rows = collect(course, staging)
     assert [(row.key, row.path) for row in rows] == [
         ("ana", course / "ana"),
         ("ben", course / "ben.zip"),
@@ -62,7 +62,7 @@ def test_an_archive_of_a_kind_that_cannot_be_read_is_a_row_all_the_same(
     course: Path, staging: Path, suffix: str
 ) -> None:
     (course / f"ana{suffix}").write_bytes(b"Rar!")
-    (row,) = take_in(course, staging, Roster((Student(2, login="ana"),)))
+    (row,) = collect(course, staging, Roster((Student(2, login="ana"),)))
     assert (row.key, row.path) == ("ana", course / f"ana{suffix}")
 
 
@@ -72,7 +72,7 @@ def test_files_that_are_taken_for_no_submission_are_named(course: Path, staging:
     (course / ".DS_Store").write_text("")
     (course / "__MACOSX").mkdir()
     left_out: list[str] = []
-    take_in(course, staging, None, left_out.append)
+    collect(course, staging, None, left_out.append)
     assert left_out == ["ben.py is neither a folder nor an archive, so it is left out"]
 
 
@@ -81,7 +81,7 @@ def test_canvas_names_are_read(course: Path, staging: Path) -> None:
     (course / "ngwei_90212_77_package.xml").write_text("<package/>")
     (course / "ngwei_90212_78_my_node.py").write_text("pass")
     roster = parse_roster('Student,ID\n"Lopez, Ana",90211\n"Ng, Wei",90212\n', "r.csv")
-    ana, wei = take_in(course, staging, roster)
+    ana, wei = collect(course, staging, roster)
     assert (ana.key, ana.name, ana.late, ana.problem) == ("90211", "Lopez, Ana", True, "")
     assert (wei.key, wei.late) == ("90212", False)
     assert wei.path is not None
@@ -96,7 +96,7 @@ def test_gradescope_s_export_is_read(course: Path, staging: Path) -> None:
         "    :email: ana@example.edu\n  :created_at: 2026-10-01 10:00:00 Z\n"
         "submission_12:\n  :submitters:\n  - :name: Wei Ng\n    :email: wei@example.edu\n"
     )
-    rows = take_in(course, staging)
+    rows = collect(course, staging)
     named = [(row.key, row.name) for row in rows]
     assert named == [("7", "Ana Lopez"), ("wei@example.edu", "Wei Ng")]
 
@@ -114,14 +114,14 @@ def canvas_files(course: Path, *names: str) -> None:
 
 def test_a_report_beside_the_archive_in_canvas_takes_no_points(course: Path, staging: Path) -> None:
     canvas_files(course, "report.pdf", "ws-1.zip", "Comment.TXT")
-    (row,) = take_in(course, staging)
+    (row,) = collect(course, staging)
     assert (row.path, row.fault) == (course / "lopezana_90211_1_ws-1.zip", "")
 
 
 def test_several_archives_in_canvas_are_unpacked_side_by_side(course: Path, staging: Path) -> None:
     canvas_files(course, "bot.zip", "bot_msgs.zip", "report.pdf")
     (course / "lopezana_90211_9_broken.zip").write_text("no archive")
-    (row,) = take_in(course, staging)
+    (row,) = collect(course, staging)
     assert row.path is not None
     files = sorted(str(f.relative_to(row.path)) for f in row.path.rglob("*") if f.is_file())
     assert files == [
@@ -137,7 +137,7 @@ def test_of_an_archive_that_canvas_has_twice_the_last_one_counts(
 ) -> None:
     for attachment, name in ((99, "ws.zip"), (100, "ws-1.zip")):
         archive(course / f"lopezana_90211_{attachment}_{name}")
-    (row,) = take_in(course, staging)
+    (row,) = collect(course, staging)
     assert row.path == course / "lopezana_90211_100_ws-1.zip"
     assert row.download == "lopezana_90211_100_ws-1.zip"
 
@@ -145,7 +145,7 @@ def test_of_an_archive_that_canvas_has_twice_the_last_one_counts(
 def test_two_archives_of_one_name_and_two_numbers_leave_a_note(course: Path, staging: Path) -> None:
     for attachment, name in ((99, "x-1.zip"), (100, "x-2.zip")):
         archive(course / f"lopezana_90211_{attachment}_{name}")
-    (row,) = take_in(course, staging)
+    (row,) = collect(course, staging)
     assert row.path == course / "lopezana_90211_100_x-2.zip"
     assert row.problem.startswith("x-1.zip and x-2.zip are taken for one archive")
 
@@ -156,12 +156,12 @@ def test_canvas_says_when_something_was_handed_in(course: Path, staging: Path) -
     told = '[{"user_id": 90211, "submitted_at": "2026-10-12T22:20:00Z"}]'
     (course / "submissions-1.json").write_text(told)
     left_out: list[str] = []
-    ana, wei = take_in(course, staging, None, left_out.append)
+    ana, wei = collect(course, staging, None, left_out.append)
     assert (ana.handed_in, ana.handed_in_from) == ("2026-10-12T22:20:00+00:00", "Canvas")
     assert (wei.handed_in, left_out) == ("", [])
     (course / "submissions-1.json").write_text('{"errors": []}')
     with pytest.raises(UsageError, match=r"submissions-1\.json: is no list of submissions"):
-        take_in(course, staging)
+        collect(course, staging)
 
 
 @pytest.mark.parametrize("content", ['{"a": 1}', "[1]", "{", '[{"submitted_at": "2026-10-12"}]'])
@@ -178,7 +178,7 @@ def test_a_foreign_file_beside_the_archive_of_a_class_refuses_nobody(
     left_out: list[str] = []
     for one, told in (("lopezana_90211_1_ws", "Canvas"), ("ana", "")):
         (staging / one).mkdir()
-        (row,) = take_in(tmp_path / f"{one}-class.zip", staging / one, None, left_out.append)
+        (row,) = collect(tmp_path / f"{one}-class.zip", staging / one, None, left_out.append)
         assert row.handed_in_from == told
     assert left_out == [
         "submissions-index.json is no list of submissions of Canvas, so it is left out"
@@ -191,7 +191,7 @@ def test_moodle_s_folders_and_files_are_read(course: Path, staging: Path) -> Non
     (ana / "report.pdf").write_text("text")
     archive(course / "Wei Ng_4712_assignsubmission_file_ws.zip")
     roster = parse_roster('login,name\nana,"Lopez, Ana"\nwei,Wei Ng\n', "r.csv")
-    rows = take_in(course, staging, roster)
+    rows = collect(course, staging, roster)
     assert [(row.key, row.path) for row in rows] == [
         ("ana", ana / "my_ws.zip"),
         ("wei", course / "Wei Ng_4712_assignsubmission_file_ws.zip"),
@@ -210,7 +210,7 @@ def test_an_archive_within_a_submission_is_not_taken_for_it(
         archive(course / "ana" / "ws.zip")
         (course / "ana" / beside).parent.mkdir(exist_ok=True)
         (course / "ana" / beside).write_text("")
-    (row,) = take_in(course, staging)
+    (row,) = collect(course, staging)
     assert row.path == course / "ana"
 
 
@@ -223,13 +223,13 @@ TEAM = (
 def test_everybody_of_a_team_in_gradescope_s_export_has_a_row(course: Path, staging: Path) -> None:
     folder(course / "submission_11")
     (course / "submission_metadata.yml").write_text(TEAM)
-    assert [(row.key, row.name) for row in take_in(course, staging)] == [
+    assert [(row.key, row.name) for row in collect(course, staging)] == [
         ("7", "Ana Lopez"),
         ("Cy", "Cy"),
         ("bo@example.edu", "Bo Du"),
     ]
     roster = parse_roster("login,id,email,name\nal,7,,\nbd,8,bo@example.edu,\nc,9,,Cy\n", "r.csv")
-    rows = take_in(course, staging, roster)
+    rows = collect(course, staging, roster)
     assert [(row.key, row.problem) for row in rows] == [("al", ""), ("bd", ""), ("c", "")]
     assert {row.path for row in rows} == {course / "submission_11"}
 
@@ -240,7 +240,7 @@ def test_gradescope_s_export_is_found_in_the_folder_that_it_was_unpacked_to(
     folder(course / "assignment_1_export" / "submission_11")
     (course / "assignment_1_export" / "submission_metadata.yml").write_text(TEAM)
     (course / ".DS_Store").write_text("")
-    assert [row.key for row in take_in(course, staging)] == ["7", "Cy", "bo@example.edu"]
+    assert [row.key for row in collect(course, staging)] == ["7", "Cy", "bo@example.edu"]
 
 
 @pytest.mark.parametrize("metadata", ["submission_11: 2026-13-41", "\tx: y"])
@@ -250,13 +250,13 @@ def test_a_broken_export_of_gradescope_is_refused(
     folder(course / "submission_11")
     (course / "submission_metadata.yml").write_text(metadata)
     with pytest.raises(UsageError, match=r"submission_metadata\.yml: cannot be read: "):
-        take_in(course, staging)
+        collect(course, staging)
 
 
 def test_an_export_without_submitters_is_taken_by_its_folders(course: Path, staging: Path) -> None:
     folder(course / "submission_11")
     (course / "submission_metadata.yml").write_text("submission_11:\n  :submitters: 7\n")
-    assert [row.key for row in take_in(course, staging)] == ["submission_11"]
+    assert [row.key for row in collect(course, staging)] == ["submission_11"]
 
 
 def test_an_archive_of_the_class_is_opened(tmp_path: Path, staging: Path) -> None:
@@ -264,7 +264,7 @@ def test_an_archive_of_the_class_is_opened(tmp_path: Path, staging: Path) -> Non
     with zipfile.ZipFile(tmp_path / "submissions.zip", "w") as file:
         file.write(inner, "submissions/ana.zip")
         file.write(inner, "submissions/ben.zip")
-    rows = take_in(tmp_path / "submissions.zip", staging)
+    rows = collect(tmp_path / "submissions.zip", staging)
     assert [row.key for row in rows] == ["ana", "ben"]
 
 
@@ -272,7 +272,7 @@ def test_github_classroom_repositories_go_to_their_logins(course: Path, staging:
     for login in ("ana-l", "bo", "a-wei"):
         folder(course / f"timed-publisher-{login}")
     roster = parse_roster("name,github\nAna Lopez,ana-l\nBo Ek,Bo\nWei Ng,wei\n", "r.csv")
-    bo, ana, stranger, wei = take_in(course, staging, roster)
+    bo, ana, stranger, wei = collect(course, staging, roster)
     assert (ana.key, ana.name, ana.problem) == ("ana-l", "Ana Lopez", "")
     assert (bo.key, bo.name, bo.problem) == ("Bo", "Bo Ek", "")
     # a-wei is another login than wei.
@@ -311,7 +311,7 @@ def test_no_submission_is_given_by_a_guess_to_a_student_whose_it_may_not_be(
         Student(2, login="ada", email="ada.l@example.org", name="Ada Lovelace"),
         Student(3, login="bob"),
     )
-    rows = {row.key: row for row in take_in(course, staging, Roster(students))}
+    rows = {row.key: row for row in collect(course, staging, Roster(students))}
     assert rows["ada"].path == (course / owner if owner else None)
     for name in folders:
         if name == owner or name.endswith(("bob", "zed")):
@@ -331,7 +331,7 @@ def test_a_submission_with_contradicting_names_is_given_to_no_student(
         Student(3, id="12", name="Lopez, Ana"),
         Student(4, id="35", name="Ng, Wei"),
     )
-    rows = {row.key: row for row in take_in(course, staging, Roster(students))}
+    rows = {row.key: row for row in collect(course, staging, Roster(students))}
     assert rows["lopezana_34"].problem == "may be 12 or 34"
     # Of two with one name the number decides.
     assert rows["35"].path is not None and not rows["35"].problem
@@ -345,7 +345,7 @@ def test_a_few_names_with_the_same_beginning_are_no_repositories(
         folder(course / name)
     rows = {
         row.key: row
-        for row in take_in(
+        for row in collect(
             course, staging, Roster((Student(2, login="ada"), Student(3, login="bob")))
         )
     }
@@ -357,7 +357,7 @@ def test_a_name_is_the_same_however_its_accents_are_encoded(course: Path, stagin
     folder(course / unicodedata.normalize("NFD", "Núñez, Ana"))
     folder(course / "muller")
     students = (Student(2, login="s1", name="Ana Núñez"), Student(3, login="s2", name="Müller"))
-    rows = {row.key: row for row in take_in(course, staging, Roster(students))}
+    rows = {row.key: row for row in collect(course, staging, Roster(students))}
     assert rows["s1"].path is not None and not rows["s1"].problem
     assert rows["s2"].problem == "handed in nothing; muller may be theirs"
 
@@ -372,7 +372,7 @@ def test_a_student_who_is_not_in_the_roster_is_graded_and_named(
     course: Path, staging: Path
 ) -> None:
     folder(course / "stranger")
-    (row,) = take_in(course, staging, Roster(()))
+    (row,) = collect(course, staging, Roster(()))
     assert (row.key, row.problem) == ("stranger", "not in the roster")
     assert row.path is not None
 
@@ -380,7 +380,7 @@ def test_a_student_who_is_not_in_the_roster_is_graded_and_named(
 def test_a_name_that_two_students_have_is_given_to_neither(course: Path, staging: Path) -> None:
     folder(course / "Ana Lopez")
     roster = Roster((Student(2, id="1", name="Ana Lopez"), Student(3, id="2", name="Lopez, Ana")))
-    rows = {row.key: row for row in take_in(course, staging, roster)}
+    rows = {row.key: row for row in collect(course, staging, roster)}
     assert rows["Ana Lopez"].problem == "may be 1 or 2"
     for key in ("1", "2"):
         assert rows[key].path is None
@@ -400,7 +400,7 @@ def test_a_submission_in_a_roster_belongs_to_the_student_of_its_row(
         Student(5, id="4", submission="https://example.org/them/team.git"),
         Student(6, id="5", submission="lost.zip"),
     )
-    rows = {row.key: row for row in take_in(course, staging, Roster(students))}
+    rows = {row.key: row for row in collect(course, staging, Roster(students))}
     found = {key: row.path and row.path.name for key, row in rows.items()}
     assert found == {
         "1": "hw1-final",
@@ -416,7 +416,7 @@ def test_a_submission_in_a_roster_belongs_to_the_student_of_its_row(
 def test_two_submissions_of_one_student_are_both_rows(course: Path, staging: Path) -> None:
     folder(course / "ana")
     archive(course / "Ana.zip")
-    rows = take_in(course, staging, Roster((Student(2, login="ana"),)))
+    rows = collect(course, staging, Roster((Student(2, login="ana"),)))
     assert [row.key for row in rows] == ["ana", "ana (2)"]
     assert [row.problem for row in rows] == [
         "handed in twice: ana too",
@@ -427,7 +427,7 @@ def test_two_submissions_of_one_student_are_both_rows(course: Path, staging: Pat
 @pytest.mark.parametrize("name", ["a\nb", "q'\"uote", "🤖", "\u202eevil", "-rf", "a b.zip.d"])
 def test_any_file_name_is_a_row(course: Path, staging: Path, name: str) -> None:
     folder(course / name)
-    (row,) = take_in(course, staging)
+    (row,) = collect(course, staging)
     assert row.path == course / name
     assert "\n" not in row.key and "\u202e" not in row.key
 
@@ -435,7 +435,7 @@ def test_any_file_name_is_a_row(course: Path, staging: Path, name: str) -> None:
 @pytest.mark.parametrize("name", [b"a\nb", b"\x1b[31mred", b"latin\xe9", "\u202eevil".encode()])
 def test_any_name_that_canvas_gives_is_a_row(course: Path, staging: Path, name: bytes) -> None:
     file = archive(course / os.fsdecode(name + b"_12_34_ws.zip"))
-    (row,) = take_in(course, staging)
+    (row,) = collect(course, staging)
     assert row.path == file
     assert row.key.isprintable() and row.key.endswith("_12")
 
@@ -449,7 +449,7 @@ def test_files_of_canvas_that_cannot_be_read_are_reported_on_their_row(
     (course / "ben_2_20_node.py").write_text("pass")
     (course / "ben_2_21_..").write_text("pass")
     archive(course / "cai_3_30_ws.zip")
-    rows = {row.key: row for row in take_in(course, staging)}
+    rows = {row.key: row for row in collect(course, staging)}
     assert rows["ana_1"].path is None
     assert rows["ana_1"].fault == "the files hold more than 256 MiB"
     assert rows["ben_2"].path is None
@@ -462,7 +462,7 @@ def test_a_student_who_is_in_the_roster_twice_has_one_row_and_is_named(
 ) -> None:
     folder(course / "ana")
     roster = parse_roster("login,name\nana,Ana\nben,Ben\nana,Ana\n", "r.csv")
-    assert [(row.key, row.problem) for row in take_in(course, staging, roster)] == [
+    assert [(row.key, row.problem) for row in collect(course, staging, roster)] == [
         ("ana", ""),
         ("ben", "handed in nothing"),
     ]
@@ -473,7 +473,7 @@ def test_a_numbered_name_stays_that_of_its_entry(course: Path, staging: Path) ->
     folder(course / "ana")
     archive(course / "ana.zip")
     archive(course / "ana (2).zip")
-    rows = take_in(course, staging)
+    rows = collect(course, staging)
     assert {row.key: row.path for row in rows} == {
         "ana": course / "ana",
         "ana (2)": course / "ana (2).zip",
@@ -484,7 +484,7 @@ def test_a_numbered_name_stays_that_of_its_entry(course: Path, staging: Path) ->
 def test_the_folder_of_the_results_is_no_submission(course: Path, staging: Path) -> None:
     folder(course / "ana")
     (course / "results").mkdir()
-    (row,) = take_in(course, staging, out=course / ".." / "class" / "results")
+    (row,) = collect(course, staging, out=course / ".." / "class" / "results")
     assert row.key == "ana"
 
 
@@ -494,7 +494,7 @@ def test_two_files_of_canvas_that_differ_by_a_number_are_both_kept(
     (course / "ana_1_10_node-1.py").write_text("one")
     (course / "ana_1_11_node-2.py").write_text("two")
     (course / "ana_1_12_setup-3.py").write_text("three")
-    (row,) = take_in(course, staging)
+    (row,) = collect(course, staging)
     assert row.path is not None
     assert {file.name: file.read_text() for file in row.path.iterdir()} == {
         "node-1.py": "one",
@@ -509,12 +509,12 @@ def test_one_submission_is_not_taken_for_a_class(course: Path, staging: Path) ->
     with pytest.raises(
         UsageError, match=r"one submission \(src/pkg/package.xml is in it\).*rosgrade check"
     ):
-        take_in(course, staging)
+        collect(course, staging)
 
 
 def test_an_empty_class_is_reported(course: Path, staging: Path) -> None:
     with pytest.raises(UsageError, match="holds no submission"):
-        take_in(course, staging)
+        collect(course, staging)
 
 
 def repository(path: Path) -> Path:
@@ -534,7 +534,7 @@ def test_a_roster_may_name_paths_and_repositories(tmp_path: Path, staging: Path)
         "roster.csv",
     )
     taken: list[str] = []
-    rows = {row.key: row for row in take_in_roster(roster, tmp_path, staging, taken.append)}
+    rows = {row.key: row for row in collect_roster(roster, tmp_path, staging, taken.append)}
     assert taken == ["ana", "ben", "cai", "dee", "eli"]
     assert rows["ana"].path == tmp_path / "here"
     assert rows["ben"].path is not None and (rows["ben"].path / "pkg" / "package.xml").is_file()
@@ -549,7 +549,7 @@ def test_a_roster_may_name_paths_and_repositories(tmp_path: Path, staging: Path)
 def test_a_team_s_repository_is_fetched_once(tmp_path: Path, staging: Path) -> None:
     url = f"file://{repository(tmp_path / 'one')}"
     roster = parse_roster(f"login,submission\nana,{url}\nben,{url}\ncai,\n", "roster.csv")
-    ana, ben, cai = take_in_roster(roster, tmp_path, staging)
+    ana, ben, cai = collect_roster(roster, tmp_path, staging)
     assert ana.path is not None and ana.path == ben.path
     assert [row.problem for row in (ana, ben, cai)] == ["", "", "handed in nothing"]
 
@@ -558,7 +558,7 @@ def test_a_path_that_no_file_can_have_is_reported_on_its_row(tmp_path: Path, sta
     folder(tmp_path / "here")
     named = {"ana": "here", "ben": "x" * 300, "cai": "a\0b"}
     roster = Roster(tuple(Student(2, login=who, submission=path) for who, path in named.items()))
-    ana, ben, cai = take_in_roster(roster, tmp_path, staging)
+    ana, ben, cai = collect_roster(roster, tmp_path, staging)
     assert ana.path == tmp_path / "here"
     assert ben.fault.endswith("xxx does not exist")
     assert cai.fault == f"{tmp_path}/a\\x00b does not exist"

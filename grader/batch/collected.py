@@ -18,8 +18,8 @@ NOTHING = "handed in nothing"
 
 
 @dataclass(frozen=True)
-class HandedIn(Entry):
-    """A row of the class, with what is not written down about it.
+class Collected(Entry):
+    """A row of the class, with what the ledger does not write down about it.
 
     Attributes:
         path: What was handed in, or None for nothing; those of a team have the same.
@@ -33,12 +33,12 @@ class HandedIn(Entry):
     names: tuple[str, ...] = ()
     columns: Mapping[str, str] = field(default_factory=dict, compare=False)
 
-    def of(self, student: Student) -> HandedIn:
+    def of(self, student: Student) -> Collected:
         """The row with what a roster says of its student."""
         known = replace(self, key=student.key, name=student.name, email=student.email)
         return replace(known, columns=student.columns)
 
-    def at(self, time: tuple[str, str]) -> HandedIn:
+    def at(self, time: tuple[str, str]) -> Collected:
         """The row with when it was handed in, and what tells that."""
         return replace(self, handed_in=time[0], handed_in_from=time[1])
 
