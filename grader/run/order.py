@@ -91,9 +91,11 @@ class CellOrder:
     """One scenario for one cell.
 
     Attributes:
+        student_environment: Environment variables of the student's processes.
         scratch: Folder of the student: working directory, home and temporary files.
         stimuli: With their values.
-        submission: The submission's facts, as JSON, to go into the recording unread.
+        submission: Its record as JSON, to go into the recording unread.
+        environment: What the recording says of the place of the run, as ``Recording.environment``.
         simulator: The simulated robot, or None.
         compiled_tracer: The library that compiled programs are started with, or None.
         mutation: Folder with mistakes that selftest imposes on right programs, or None.
@@ -105,7 +107,7 @@ class CellOrder:
     scenario: str
     seed: int
     commands: tuple[ProcessCommand, ...]
-    environment: dict[str, str]
+    student_environment: dict[str, str]
     prefixes: tuple[str, ...]
     topics: tuple[Topic, ...]
     stimuli: tuple[StimulusModel, ...]
@@ -115,7 +117,7 @@ class CellOrder:
     submission: str
     simulator: SimulatorOrder | None = None
     values: dict[str, float] = field(default_factory=dict)
-    facts: dict[str, str] = field(default_factory=dict)
+    environment: dict[str, str] = field(default_factory=dict)
     type_support: tuple[str, ...] = ()
     compiled_tracer: str | None = None
     mutation: str | None = None

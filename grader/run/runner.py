@@ -385,7 +385,7 @@ class Runner:
             scenario=scenario.id,
             seed=seed,
             commands=commands,
-            environment=student_environment(ros, install, scratch, tracer),
+            student_environment=student_environment(ros, install, scratch, tracer),
             compiled_tracer=str(tracer) if tracer else None,
             prefixes=tuple(map(str, (*type_support, install, *ros.underlays, *ros.prefixes))),
             topics=_topics(scenario),
@@ -396,7 +396,7 @@ class Runner:
             submission=to_json(submission).decode(),
             simulator=_simulator(scenario, request.worlds, values, seed),
             values=values,
-            facts={
+            environment={
                 "assignment": assignment.id,
                 "ros_distro": self.ros.distro,
                 "ros_source": self.ros.source,
@@ -420,7 +420,7 @@ class Runner:
             # A sandbox shows the system's libraries, which Python finds where ROS is sourced.
             shown = Path("/" if self.sandbox is None else "/usr")
             modules = unlisted(submission.foreign_imports, assignment.libraries, shown)
-            order = replace(order, facts={**order.facts, "unlisted": " ".join(modules)})
+            order.environment["unlisted"] = " ".join(modules)
         if self.sandbox is None:
             return order
         limits = (scenario.limits or assignment.limits).limits()

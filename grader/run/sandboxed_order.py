@@ -77,7 +77,7 @@ def sandboxed(
     return replace(
         order,
         commands=tuple(replace(one, argv=_moved(one.argv, seen)) for one in order.commands),
-        environment=sandboxed_environment(order.environment, places),
+        student_environment=sandboxed_environment(order.student_environment, places),
         prefixes=_moved(order.prefixes, in_cell),
         type_support=_moved(order.type_support, in_cell),
         scratch=str(CELL),
@@ -91,7 +91,7 @@ def sandboxed(
             limits=limits,
             folders={inside: in_cell[outside] for outside, inside in seen.items()},
         ),
-        facts={**order.facts, "sandbox": sandbox.description},
+        environment={**order.environment, "sandbox": sandbox.description},
     )
 
 

@@ -71,7 +71,7 @@ def order(scenario: Scenario) -> CellOrder:
         scenario=scenario.id,
         seed=0,
         commands=tuple(ProcessCommand(launch.program, ()) for launch in scenario.launch),
-        environment={},
+        student_environment={},
         prefixes=(),
         topics=(),
         stimuli=(),

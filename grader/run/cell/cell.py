@@ -195,7 +195,7 @@ class Cell:
             values=self._order.values,
             names=self._order.names,
             environment={
-                **self._order.facts,
+                **self._order.environment,
                 "domain_id": str(self._domain_id),
                 **({"other_domains": others} if others else {}),
             },
@@ -281,12 +281,13 @@ class Cell:
         self._start(next(item for item in self._order.commands if item.name == name))
 
     def _start(self, command: ProcessCommand) -> None:
+        order = self._order
         of_run = {
             "ROS_DOMAIN_ID": str(self._domain_id),
-            "ROSGRADE_HOLD": ":".join(topic.name for topic in self._order.topics),
+            "ROSGRADE_HOLD": ":".join(topic.name for topic in order.topics),
         }
         self._students.launch(
-            command.name, command.argv, self._order.environment, of_run, Path(self._order.scratch)
+            command.name, command.argv, order.student_environment, of_run, Path(order.scratch)
         )
 
     def _await_sandboxes(self) -> Ending | None:

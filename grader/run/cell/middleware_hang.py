@@ -96,6 +96,6 @@ def hung_recording(order: CellOrder, submission: SubmissionRecord, launched_ns: 
         processes=tuple(ended),
         breaches=(breach,),
         values=order.values,
-        environment=order.facts,
+        environment=order.environment,
         names=order.names,
     )

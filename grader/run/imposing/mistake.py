@@ -49,5 +49,6 @@ def with_mistakes(
         library = build_library(_HERE / "mutation.c", ros, cache_folder())
         assert library is not None
         before["LD_PRELOAD"] = Path(shutil.copyfile(library, place / "mutation.so"))
-    joined = {name: f"{path}{os.pathsep}{order.environment[name]}" for name, path in before.items()}
-    return replace(order, environment=order.environment | joined, mutation=str(place))
+    usual = order.student_environment
+    joined = {name: f"{path}{os.pathsep}{usual[name]}" for name, path in before.items()}
+    return replace(order, student_environment=usual | joined, mutation=str(place))
