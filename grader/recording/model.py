@@ -23,6 +23,8 @@ from grader.recording.submission import SubmissionRecord
 from grader.spec.names import NO_NAMES, Names
 
 NS = 1_000_000_000
+PROBE_NODE = "rosgrade_probe"
+"""Name of the node through which a run is watched."""
 
 
 class Owner(str, Enum):

@@ -16,12 +16,9 @@ from grader.diagnosis.no_endpoint import ENDPOINTS, meant_endpoint, why_no_endpo
 from grader.diagnosis.no_node import why_no_node
 from grader.findings.finding import Evidence, Finding, endpoints_seen, nodes_seen
 from grader.findings.words import code, codes, type_in_code
-from grader.recording.model import Kind, Recording
+from grader.recording.model import PROBE_NODE, Kind, Recording
 from grader.spec.name import InterfaceName, TopicName
 from grader.spec.names import Thing
-
-PROBE = "rosgrade_probe"
-"""Name of the node through which a run is watched."""
 
 
 class Topic(Named):
@@ -156,7 +153,7 @@ def untouched(recording: Recording, parameters: Untouched) -> Finding:
                 Evidence(moments=endpoints_seen(recording, [endpoint])),
             )
     for node in recording.student_nodes:
-        if node.name.rpartition("/")[2] == PROBE:
+        if node.name.rpartition("/")[2] == PROBE_NODE:
             return mistaken(
                 "probes_name",
                 f"a node of the submission is called {code(node.name)}, which is the name of the "

@@ -15,13 +15,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from grader.checks.topic.topic import PROBE, Untouched
+from grader.checks.topic.topic import Untouched
 from grader.errors import UsageError
 from grader.findings.finding import Status
 from grader.findings.words import code, codes, counted
 from grader.grade.model import CheckResult, Grade, ScenarioFinding
 from grader.measure.transforms import TRANSFORMS
-from grader.recording.model import NS, Kind, Owner, Recording
+from grader.recording.model import NS, PROBE_NODE, Kind, Owner, Recording
 from grader.report.model import result_model as model
 from grader.report.model.facts import RunFacts
 from grader.report.model.mistakes import first_to_fix
@@ -116,15 +116,9 @@ def _check(result: CheckResult) -> model.CheckPart:
 
 
 def _finding(item: ScenarioFinding) -> dict[str, Any]:
-    return {
-        "scenario": item.scenario,
-        "traceback": item.traceback,
-        **{
-            name: getattr(item.finding, name)
-            for name in model.FindingPart.model_fields
-            if hasattr(item.finding, name)
-        },
-    }
+    own = {"scenario": item.scenario, "traceback": item.traceback}
+    names = model.FindingPart.model_fields.keys() - own.keys()
+    return {**own, **{name: getattr(item.finding, name) for name in names}}
 
 
 def _scenario(recording: Recording, facts: RunFacts) -> model.ScenarioPart:
@@ -159,7 +153,7 @@ def remarks(recording: Recording) -> tuple[str, ...]:
 def _posing(recording: Recording) -> Iterator[str]:
     """Names of the probe and topics of the robot, unless the assignment asks for them."""
     for node in recording.student_nodes:
-        if node.name.rpartition("/")[2] == PROBE:
+        if node.name.rpartition("/")[2] == PROBE_NODE:
             name = code(node.name)
             yield f"a node of the submission is called {name}, like the node that watches the run"
     heard = [e for e in recording.endpoints if e.owner is Owner.PROBE]

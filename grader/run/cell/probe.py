@@ -27,11 +27,10 @@ from rclpy.subscription import Subscription
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.interface import FEEDBACK
 from grader.recording.mcap_writer import RawMessage
-from grader.recording.model import NS, Call, Endpoint, Kind, LogLine, Owner
+from grader.recording.model import NS, PROBE_NODE, Call, Endpoint, Kind, LogLine, Owner
 from grader.run.order import RunLimits, Topic
 from grader.run.process.output import KeptLines
 
-NAME = "rosgrade_probe"
 _BEFORE_ALL_NS = 1
 _LAST_SEQUENCE = 2**32 - 1
 # One lost answer must not end the observation, and a blocked node must not be flooded.
@@ -114,7 +113,7 @@ class Probe:
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain_id)
         self.node = Node(
-            NAME,
+            PROBE_NODE,
             context=self._context,
             start_parameter_services=False,
             enable_rosout=False,
