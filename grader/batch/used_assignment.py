@@ -17,9 +17,7 @@ def load_used(
     """The assignment that a class is graded with, or another one that is named."""
     used = ledger.read()
     words = (command, str(ledger.out))
-    return load_assignment(
-        named or stored_assignment(ledger.out, used.assignment, used.location, *words)
-    )
+    return load_assignment(named or stored_assignment(used.assignment, used.location, *words))
 
 
 def in_use(ledger: Ledger, named: LoadedAssignment) -> LoadedAssignment:

@@ -20,7 +20,7 @@ from grader.gradebook.class_files import GRADES_FILE, class_rows
 from grader.gradebook.class_regrading import regrade_class, write_regraded
 from grader.grading.attempts import with_history
 from grader.grading.files import REPORT_FILE, write_graded
-from grader.grading.regrading import compare, find_recordings, refuse_other, stored_assignment
+from grader.grading.regrading import compare, find_recordings, refuse_other
 from grader.grading.regrading import regrade as judge_again
 from grader.report.model.facts import Clock, RunFacts
 from grader.report.model.result import make_result
@@ -58,10 +58,7 @@ def regrade(
 
 def _one(path: Path, assignment: str | None, *, write: bool) -> None:
     found = find_recordings(path)
-    words = ("regrade", str(path))
-    loaded = load_assignment(
-        assignment or stored_assignment(path, found.assignment, found.location, *words)
-    )
+    loaded = load_assignment(assignment or found.assignment_folder("regrade", str(path)))
     # One recording says nothing of the checks of other scenarios.
     before = found.result if path.is_dir() else None
     if before is not None:

@@ -14,7 +14,7 @@ from grader.cli.screen.progress import Progress
 from grader.errors import UsageError
 from grader.grade.judging import why_not_run
 from grader.grade.naming import with_chosen_names
-from grader.grading.regrading import find_recordings, stored_assignment
+from grader.grading.regrading import find_recordings
 from grader.grading.type_support import TypeSupport
 from grader.machine import ros
 from grader.machine.resources import cache_folder
@@ -51,9 +51,7 @@ def replay(
     recorded = read_recording(recording)
     found = find_recordings(recording)
     words = ("replay", str(recording), str(submission))
-    loaded = load_assignment(
-        assignment or stored_assignment(recording, found.assignment, found.location, *words)
-    )
+    loaded = load_assignment(assignment or found.assignment_folder(*words))
     check_path(submission)
     progress = Progress(quiet)
     installation = ros.find()

@@ -71,12 +71,8 @@ def render_again(
     """
     found = regrading.find_recordings(folder)
     result = found.result or read_result(folder / RESULT_FILE)
-    used = result.assignment
-    words = ("report", str(folder))
-    loaded = _load(
-        assignment or regrading.stored_assignment(folder, used.id, used.location, *words)
-    )
-    refuse_changed(folder, used.sha256, loaded)
+    loaded = _load(assignment or found.assignment_folder("report", str(folder)))
+    refuse_changed(folder, result.assignment.sha256, loaded)
     shown = visible_part(loaded) if result.withheld.checks else loaded
     graded = regrading.regrade(select(shown, tuple(check.id for check in result.checks)), found)
     before = {check.id: check.status for check in result.checks}

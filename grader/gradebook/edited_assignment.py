@@ -64,6 +64,5 @@ def load_before(ledger: Ledger) -> LoadedAssignment | None:
     file = Path(used.location or "").parent / _BEFORE
     if not file.is_file():
         return None
-    words = ("regrade", str(out))
     before = json.loads(file.read_text())["location"]
-    return load_assignment(stored_assignment(out, used.assignment, before, *words))
+    return load_assignment(stored_assignment(used.assignment, before, "regrade", str(out)))

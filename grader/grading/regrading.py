@@ -34,20 +34,15 @@ class FoundRecordings:
     submission: SubmissionRecord
     result: Result | None
 
-    @property
-    def assignment(self) -> str:
-        """Id of the assignment that they were recorded for."""
+    def assignment_folder(self, *command: str) -> str:
+        """As :func:`stored_assignment`, of what they were recorded for."""
         if self.result is not None:
-            return self.result.assignment.id
+            used = self.result.assignment
+            return stored_assignment(used.id, used.location, *command)
         for recording in self.recordings.values():
-            if "assignment" in recording.environment:
-                return recording.environment["assignment"]
+            if name := recording.environment.get("assignment"):
+                return stored_assignment(name, None, *command)
         raise UsageError(f"{self.folder}: the assignment is not stored here; name it too")
-
-    @property
-    def location(self) -> str | None:
-        """Where that assignment lay; None for one of rosgrade's own, or where it is not known."""
-        return self.result.assignment.location if self.result is not None else None
 
 
 def find_recordings(path: Path) -> FoundRecordings:
@@ -74,8 +69,13 @@ def find_recordings(path: Path) -> FoundRecordings:
     return FoundRecordings(report, recordings, files, submission, result)
 
 
-def stored_assignment(path: Path, name: str, location: str | None, *command: str) -> str:
-    """Name the assignment that something was graded with, to load it again."""
+def stored_assignment(name: str, location: str | None, *command: str) -> str:
+    """The folder of the assignment that something was graded with, to load it again.
+
+    Args:
+        location: Where it lay; None for one of rosgrade's own, or where it is not known.
+        command: What the user asked for: the subcommand, then the path of what was graded.
+    """
     if location is None and name in list_assignments():
         # And not one of that name in the current folder.
         return str(resources.assignments() / name)
@@ -83,7 +83,7 @@ def stored_assignment(path: Path, name: str, location: str | None, *command: str
         return location
     lay = f" in {location}, which does not exist any more" if location else ""
     raise UsageError(
-        f"{path}: was graded with the assignment {name!r}{lay}; name its folder: "
+        f"{command[1]}: was graded with the assignment {name!r}{lay}; name its folder: "
         f"`{shlex.join(('rosgrade', *command))} FOLDER`"
     )
 

@@ -486,7 +486,7 @@ def test_a_regrade_says_who_gains_what_and_why(
         YAML.replace("within: 2 s", "within: 3 s"), encoding="utf-8"
     )
     found = find_recordings(tmp_path)
-    assert found.assignment == "lesson"
+    assert found.assignment_folder("regrade", str(tmp_path)) == str(lesson.folder)
     assert found.result is not None
     lines = compare(found.result, regrade(load_assignment(lesson.folder), found).grade)
     assert lines[0].startswith("ends: failed -> passed, 0 -> 1 points: ")
