@@ -30,7 +30,6 @@ from grader.findings.words import Words, listing
 from grader.spec.document import Place
 
 ANY = "any"
-_NAME_HINT = "The {} argument of create_{} is the name of the topic."
 
 
 @dataclass(frozen=True)
@@ -122,10 +121,8 @@ class Spot:
                 for name, value in each_field(self.part.value)
             )
         if isinstance(self.part, Interface):
-            found["interface"], found["file"] = (
-                self.interface,
-                f"{self.name}.{self.name.split('/')[0]}",
-            )
+            found["interface"] = self.interface
+            found["file"] = f"{self.name}.{self.name.split('/')[0]}"
         return found
 
 
@@ -185,6 +182,13 @@ def _connection(spot: Spot) -> Connection:
 def _publication(spot: Spot) -> Publication:
     assert isinstance(spot.part, Publication)
     return spot.part
+
+
+def _name_hint(end: str) -> Words:
+    """What to compare where a publisher or a subscription is not on its topic."""
+    hint = "The {} argument of create_{} is the name of the topic."
+    hint += " `ros2 topic list` shows all topics."
+    return Words(hint.format("second", end), hint.format("first", end))
 
 
 def _sent(spot: Spot) -> dict[str, Any] | None:
@@ -311,10 +315,7 @@ PUBLICATION = (
         "topic.published",
         lambda it: {"topic": it.name, "remap": True},
         "{subject} publishes on {name}",
-        Words(
-            _NAME_HINT.format("second", "publisher") + " `ros2 topic list` shows all topics.",
-            _NAME_HINT.format("first", "publisher") + " `ros2 topic list` shows all topics.",
-        ),
+        _name_hint("publisher"),
         ("starts",),
         2,
     ),
@@ -435,10 +436,7 @@ SUBSCRIPTION = (
         "topic.subscribed",
         lambda it: {"topic": it.name, "remap": True},
         "{subject} subscribes to {name}",
-        Words(
-            _NAME_HINT.format("second", "subscription") + " `ros2 topic list` shows all topics.",
-            _NAME_HINT.format("first", "subscription") + " `ros2 topic list` shows all topics.",
-        ),
+        _name_hint("subscription"),
         ("starts",),
         2,
     ),
