@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from graphlib import TopologicalSorter
 
 from grader.assignment.binding import BoundCheck
@@ -22,7 +22,7 @@ from grader.findings.finding import Finding, Status, Verdict
 from grader.findings.words import speaking
 from grader.grade.chain import NOT_YOURS, Case, fault, judged, not_taken, why_incomplete
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
-from grader.grade.naming import with_chosen_names
+from grader.grade.naming import Unnamed, with_chosen_names
 from grader.grade.runtime_imports import with_runtime_imports
 from grader.recording.model import Ending, Recording
 from grader.recording.submission import CPP, SubmissionRecord
@@ -54,9 +54,10 @@ def judge_all(
     """
     with speaking(submission.spoken(())):
         named = with_chosen_names(loaded, submission, recordings)
-    loaded, submission, unnamed = named.loaded, named.submission, named.unnamed
+    loaded, submission = named.loaded, named.submission
+    imported = with_runtime_imports(submission, recordings.values())
+    known = _Known(loaded, imported, recordings, faults, named.unnamed)
     bound = {item.spec.id: item for item in loaded.checks}
-    known = with_runtime_imports(submission, recordings.values())
     parameters_first = _parameters_first(bound)
     order = TopologicalSorter(
         {name: (*item.spec.requires, *parameters_first[name]) for name, item in bound.items()}
@@ -66,18 +67,15 @@ def judge_all(
         item = bound[name]
         blockers = _blockers(item.spec.requires, results)
         lacking = _blockers(parameters_first[name], results)
-        is_unnamed = unnamed and _needs_names(item, loaded, unnamed.variables)
-        why = unnamed.finding if unnamed and is_unnamed else None
-        with speaking(known.spoken(_about(item, loaded))):
+        with speaking(imported.spoken(known.about(item))):
             hints = tuple(map(str, item.spec.hints))
-            found = () if blockers else _findings(item, loaded, known, recordings, faults, why)
-            findings = tuple(found)
+            findings = () if blockers else tuple(known.findings(item))
         # One mistake costs its own check, and takes no credit from another.
-        if findings and lacking and _is_lost_by_parameters(item, findings, recordings):
+        if findings and lacking and known.is_lost_by_parameters(item, findings):
             blockers = lacking
         if blockers:
             findings = (_skipped([results[one] for one in blockers]),)
-        results[name] = _result(item, loaded, findings, recordings, blockers, hints)
+        results[name] = known.result(item, findings, blockers, hints)
     ordered = tuple(results[name] for name in bound)
     return Grade(
         loaded.assignment, loaded.sha256, submission, ordered, loaded.withheld, loaded.location
@@ -95,43 +93,113 @@ def _parameters_first(bound: Mapping[str, BoundCheck]) -> dict[str, list[str]]:
     return {name: [] if name in before else checks for name in bound}
 
 
-def _is_lost_by_parameters(
-    bound: BoundCheck, findings: Sequence[ScenarioFinding], recordings: Mapping[str, Recording]
-) -> bool:
-    """Whether a check failed without credit in a run whose parameters the nodes do not take."""
-    lost = _counted(bound.spec.counts, [item.finding for item in findings])
-    failed = {item.scenario for item in findings if item.finding.status is Status.FAILED}
-    runs = (run for name, run in recordings.items() if name in failed)
-    return lost == (Status.FAILED, 0.0) and any(map(not_taken, runs))
+@dataclass(frozen=True)
+class _Known:
+    """All that is known of a submission when its checks are judged.
 
+    Attributes:
+        loaded: The assignment, with the names that the submission chose.
+        unnamed: Why some of these names are not known, or None.
+    """
 
-def _result(
-    bound: BoundCheck,
-    loaded: LoadedAssignment,
-    findings: tuple[ScenarioFinding, ...],
-    recordings: Mapping[str, Recording],
-    blockers: tuple[str, ...],
-    hints: tuple[str, ...],
-) -> CheckResult:
-    """What a check is worth by its findings."""
-    spec = bound.spec
-    status, credit = _counted(spec.counts, [item.finding for item in findings])
-    put_right = all(_is_put_right(item, recordings) for item in findings)
-    return CheckResult(
-        id=spec.id,
-        title=bound.title,
-        status=status,
-        points=points_for(spec.points, credit),
-        max_points=spec.points,
-        visibility=spec.visibility,
-        scenarios=tuple(scenario.id for scenario in loaded.scenarios_of(bound)),
-        findings=findings,
-        waits_for=blockers,
-        hints=hints,
-        credit=credit,
-        put_right=put_right and status is Status.FAILED,
-        asked_name=getattr(bound.parameters, "asked_name", None),
-    )
+    loaded: LoadedAssignment
+    submission: SubmissionRecord
+    recordings: Mapping[str, Recording]
+    faults: Mapping[str, str]
+    unnamed: Unnamed | None
+
+    def about(self, bound: BoundCheck) -> list[str]:
+        """The packages that a check is about: one that it names, or what its scenarios launch."""
+        named = getattr(bound.parameters, "package", None)
+        scenarios = self.loaded.scenarios_of(bound)
+        return [named] if named else [name for one in scenarios for name in self._launched(one.id)]
+
+    def findings(self, bound: BoundCheck) -> Iterator[ScenarioFinding]:
+        """What a check says of the submission, or of each of its scenarios."""
+        scenarios = [scenario.id for scenario in self.loaded.scenarios_of(bound)]
+        if self.unnamed is not None and self._needs(bound, self.unnamed.variables):
+            yield from (ScenarioFinding(one, self.unnamed.finding) for one in scenarios or (None,))
+        elif bound.check.subject is Subject.SUBMISSION:
+            yield self._of_submission(bound)
+        elif not scenarios:
+            # Else a check that judges nothing would pass, and every student would get its points.
+            yield ScenarioFinding(None, fault("there is no scenario that this check could judge"))
+        else:
+            yield from (self._of_run(bound, scenario) for scenario in scenarios)
+
+    def is_lost_by_parameters(self, bound: BoundCheck, findings: Sequence[ScenarioFinding]) -> bool:
+        """Whether a check failed without credit in a run whose parameters the nodes do not take."""
+        lost = _counted(bound.spec.counts, [item.finding for item in findings])
+        failed = {item.scenario for item in findings if item.finding.status is Status.FAILED}
+        runs = (run for name, run in self.recordings.items() if name in failed)
+        return lost == (Status.FAILED, 0.0) and any(map(not_taken, runs))
+
+    def result(
+        self,
+        bound: BoundCheck,
+        findings: tuple[ScenarioFinding, ...],
+        blockers: tuple[str, ...],
+        hints: tuple[str, ...],
+    ) -> CheckResult:
+        """What a check is worth by its findings."""
+        spec = bound.spec
+        status, credit = _counted(spec.counts, [item.finding for item in findings])
+        return CheckResult(
+            id=spec.id,
+            title=bound.title,
+            status=status,
+            points=points_for(spec.points, credit),
+            max_points=spec.points,
+            visibility=spec.visibility,
+            scenarios=tuple(scenario.id for scenario in self.loaded.scenarios_of(bound)),
+            findings=findings,
+            waits_for=blockers,
+            hints=hints,
+            credit=credit,
+            put_right=status is Status.FAILED and all(map(self._is_put_right, findings)),
+            asked_name=getattr(bound.parameters, "asked_name", None),
+        )
+
+    def _needs(self, bound: BoundCheck, variables: Collection[str]) -> bool:
+        """Whether a check needs a run, or the value of one of some variables."""
+        own = str(self.loaded.entries.get(bound.spec.id, {}).get("with"))
+        is_run = bound.check.subject is Subject.RECORDING
+        return is_run or any(f"{{{name}}}" in own for name in variables)
+
+    def _launched(self, scenario: str) -> tuple[str, ...]:
+        """Packages that a scenario launches something of."""
+        assignment = self.loaded.assignment
+        launches = next(item.launch for item in assignment.scenarios if item.id == scenario)
+        default = assignment.packages[0].name
+        return tuple(dict.fromkeys(launch.package or default for launch in launches))
+
+    def _of_submission(self, bound: BoundCheck) -> ScenarioFinding:
+        only = bound.parameters.only
+        if only in ("", CPP) or self.submission.spoken(self.about(bound)) != CPP:
+            return judged(Case(bound, self.submission))
+        unread = f"this check reads {only}, and the package is written in C++"
+        asked = bound.parameters.asked_for
+        return ScenarioFinding(None, Finding.error(asked, unread, hint=NOT_YOURS))
+
+    def _of_run(self, bound: BoundCheck, scenario: str) -> ScenarioFinding:
+        recording, launched = self.recordings.get(scenario), self._launched(scenario)
+        if recording is None:
+            lost = self.faults.get(scenario, f"there is no recording of the scenario {scenario!r}")
+            packages = [*launched, *(one.name for one in self.loaded.assignment.packages)]
+            finding = why_incomplete(self.submission, launched, "a run of what was handed in")
+            finding = finding or why_not_run(self.submission, packages) or fault(lost)
+        elif why := _why_unusable(recording, scenario, self.submission):
+            finding = fault(why)
+        else:
+            return judged(Case(bound, self.submission, recording, scenario, launched))
+        return ScenarioFinding(scenario, finding)
+
+    def _is_put_right(self, item: ScenarioFinding) -> bool:
+        """Whether no check has to wait for a finding: it passed, or the others do not need it."""
+        names = item.finding.names
+        runs = [run for name, run in self.recordings.items() if item.scenario in (None, name)]
+        goes_on = item.finding.status is Status.PASSED or item.finding.stands_alone
+        return goes_on or (bool(names) and all(names <= run.names for run in runs))
 
 
 def _counted(counts: Counts, findings: Sequence[Finding]) -> tuple[Status, float]:
@@ -150,14 +218,6 @@ def _counted(counts: Counts, findings: Sequence[Finding]) -> tuple[Status, float
     if least < credit:
         return Status.ERROR, 0.0
     return (Status.PASSED if credit == 1.0 else Status.FAILED), credit
-
-
-def _is_put_right(item: ScenarioFinding, recordings: Mapping[str, Recording]) -> bool:
-    """Whether no check has to wait for a finding: it passed, or the others do not need it."""
-    names = item.finding.names
-    runs = [run for name, run in recordings.items() if item.scenario in (None, name)]
-    goes_on = item.finding.status is Status.PASSED or item.finding.stands_alone
-    return goes_on or (bool(names) and all(names <= run.names for run in runs))
 
 
 def _blockers(requires: Iterable[str], results: Mapping[str, CheckResult]) -> tuple[str, ...]:
@@ -179,60 +239,6 @@ def _skipped(blockers: Sequence[CheckResult]) -> ScenarioFinding:
     )
 
 
-def _about(bound: BoundCheck, loaded: LoadedAssignment) -> list[str]:
-    """The packages that a check is about: one that it names, or what its scenarios launch."""
-    named = getattr(bound.parameters, "package", None)
-    scenarios = loaded.scenarios_of(bound)
-    return [named] if named else [name for one in scenarios for name in _launched(loaded, one.id)]
-
-
-def _findings(
-    bound: BoundCheck,
-    loaded: LoadedAssignment,
-    submission: SubmissionRecord,
-    recordings: Mapping[str, Recording],
-    faults: Mapping[str, str],
-    unnamed: Finding | None,
-) -> Iterator[ScenarioFinding]:
-    if unnamed is not None:
-        whole = [scenario.id for scenario in loaded.scenarios_of(bound)]
-        yield from (ScenarioFinding(scenario, unnamed) for scenario in whole or (None,))
-        return
-    if bound.check.subject is Subject.SUBMISSION:
-        only = bound.parameters.only
-        if only not in ("", CPP) and submission.spoken(_about(bound, loaded)) == CPP:
-            unread = f"this check reads {only}, and the package is written in C++"
-            asked = bound.parameters.asked_for
-            yield ScenarioFinding(None, Finding.error(asked, unread, hint=NOT_YOURS))
-            return
-        yield judged(Case(bound, submission))
-        return
-    scenarios = [scenario.id for scenario in loaded.scenarios_of(bound)]
-    if not scenarios:
-        # Else a check that judges nothing would pass, and every student would get its points.
-        yield ScenarioFinding(None, fault("there is no scenario that this check could judge"))
-    for scenario in scenarios:
-        recording = recordings.get(scenario)
-        if recording is None:
-            lost = faults.get(scenario, f"there is no recording of the scenario {scenario!r}")
-            launched, others = _launched(loaded, scenario), loaded.assignment.packages
-            finding = why_incomplete(submission, launched, "a run of what was handed in")
-            finding = finding or why_not_run(submission, [*launched, *(one.name for one in others)])
-            yield ScenarioFinding(scenario, finding or fault(lost))
-        elif why := _why_unusable(recording, scenario, submission):
-            yield ScenarioFinding(scenario, fault(why))
-        else:
-            launched = _launched(loaded, scenario)
-            yield judged(Case(bound, submission, recording, scenario, launched))
-
-
-def _needs_names(bound: BoundCheck, loaded: LoadedAssignment, names: Collection[str]) -> bool:
-    """Whether a check needs a run, or one of some names that the submission chooses."""
-    own = str(loaded.entries.get(bound.spec.id, {}).get("with"))
-    is_run = bound.check.subject is Subject.RECORDING
-    return is_run or any(f"{{{name}}}" in own for name in names)
-
-
 def why_not_run(submission: SubmissionRecord, packages: Iterable[str]) -> Finding | None:
     """Why nothing of a submission could be launched, or None where every package was built."""
     for package in packages:
@@ -243,14 +249,6 @@ def why_not_run(submission: SubmissionRecord, packages: Iterable[str]) -> Findin
                 expected=f"the package {package} to build, so that its nodes can be launched",
             )
     return None
-
-
-def _launched(loaded: LoadedAssignment, scenario: str) -> tuple[str, ...]:
-    """Packages that a scenario launches something of."""
-    assignment = loaded.assignment
-    launches = next(item.launch for item in assignment.scenarios if item.id == scenario)
-    default = assignment.packages[0].name
-    return tuple(dict.fromkeys(launch.package or default for launch in launches))
 
 
 def _why_unusable(recording: Recording, scenario: str, submission: SubmissionRecord) -> str | None:
