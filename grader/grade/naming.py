@@ -62,43 +62,6 @@ class Named:
     unnamed: Unnamed | None
 
 
-def _with_stand_ins(loaded: LoadedAssignment, submission: SubmissionRecord) -> SubmissionRecord:
-    """The submission, with the names of its packages that are misspelt.
-
-    If `bot_publisher` is asked for and there is only `bot_pubisher`, that one is judged, and the
-    wrong name costs one check. It is like the right one, or the package has one of the executables.
-    """
-    asked = {package.name: package for package in loaded.assignment.packages}
-    lacking = {
-        bound.parameters.package
-        for bound in loaded.checks
-        if isinstance(bound.parameters, PackageFound) and bound.parameters.remap
-    }
-    found: dict[str, str] = {}
-    for name in sorted(lacking - {package.name for package in submission.packages}):
-        programs = set(asked[name].executables) if name in asked else set()
-        others = [
-            package
-            for package in submission.packages
-            if package.name not in {*asked, *found.values()} and package.manifest_error is None
-        ]
-        having = [one.name for one in others if programs.intersection(_programs(one))]
-        only = having[0] if len(having) == 1 else None
-        if stand_in := only or nearest(name, having or [one.name for one in others]):
-            found[name] = stand_in
-    wrong = (WrongName(Thing.PACKAGE, own, asked) for asked, own in found.items())
-    return replace(submission, names=Names.of(wrong))
-
-
-def _programs(package: PackageRecord) -> list[str]:
-    """Executables of a package, by what was built, or else by what it says."""
-    found = [*package.executables, *dict(package.entry_points)]
-    if not found:
-        commands = read_commands(package.cmake or "")
-        found = [one.arguments[0] for one in commands if one.name == "add_executable"]
-    return list(dict.fromkeys(found))
-
-
 def with_chosen_names(
     loaded: LoadedAssignment,
     submission: SubmissionRecord,
@@ -114,10 +77,80 @@ def with_chosen_names(
         UsageError: The roster has no value for a variable.
     """
     loaded, unnamed = _with_chosen(loaded, submission, recordings)
-    submission = _with_stand_ins(loaded, submission)
+    packages = Names.of(_other_packages(loaded, submission))
+    submission = replace(submission, names=packages)
     interfaces = Names.of(_other_interfaces(loaded, submission))
-    submission = replace(submission, names=submission.names | interfaces)
+    submission = replace(submission, names=packages | interfaces)
     return Named(_with_own_types(loaded, submission), submission, unnamed)
+
+
+def _with_chosen(
+    loaded: LoadedAssignment, submission: SubmissionRecord, recordings: Mapping[str, Recording]
+) -> tuple[LoadedAssignment, Unnamed | None]:
+    """The assignment with a submission's values of its variables, and why one has none."""
+    variables = loaded.assignment.variables
+    if not variables or submission.problem is not None:
+        return loaded, None
+    given, values = dict(submission.given), dict[str, str]()
+    unnamed = None
+    for name, variable in variables.items():
+        told = given.get(name)
+        if told is not None and re.fullmatch(variable.part, told):
+            values[name] = told
+            continue
+        if told or variable.match is None:
+            raise UsageError(_not_given(name, variable, told))
+        search = _Search(loaded, submission, recordings, name, values)
+        found = search.found()
+        if len(found) == 1:
+            (values[name],) = found
+        elif variable.is_of_runs or search.is_of_what_was_not_built():
+            values[name] = str(variable.example)
+        else:
+            unnamed = Unnamed(search.why_none(), frozenset(variables.keys() - values.keys()))
+            values = {**loaded.values, **values}
+            break
+    try:
+        return with_values(loaded, values), unnamed
+    except AssignmentError as error:
+        chosen = codes(f"{name}: {value}" for name, value in values.items())
+        seen = f"with {chosen}, {error.problems[0].message}"
+        why = Finding.failed("names that ROS allows", seen, "Choose another name.")
+        return loaded, Unnamed(why, frozenset(variables))
+
+
+def _not_given(name: str, variable: Variable, told: str | None) -> str:
+    origin = f"the column {variable.column!r} of the roster" if variable.column else "--set"
+    kind = "digits" if isinstance(variable.example, int) else "letters, digits and underscores"
+    wrong = f"holds {told!r}, and not only {kind}" if told else "says nothing here"
+    return f"{origin} {wrong}; it stands for {{{name}}} (for one submission: --set {name}=VALUE)"
+
+
+def _other_packages(loaded: LoadedAssignment, submission: SubmissionRecord) -> Iterator[WrongName]:
+    """Packages under other names: the only one with an executable asked for, or the nearest name.
+
+    If `bot_publisher` is asked for and there is only `bot_pubisher`, that one is judged, and the
+    wrong name costs one check.
+    """
+    asked = {package.name: package for package in loaded.assignment.packages}
+    lacking = {
+        bound.parameters.package
+        for bound in loaded.checks
+        if isinstance(bound.parameters, PackageFound) and bound.parameters.remap
+    }
+    taken = set(asked)
+    for name in sorted(lacking - {package.name for package in submission.packages}):
+        programs = set(asked[name].executables) if name in asked else set()
+        others = [
+            package
+            for package in submission.packages
+            if package.name not in taken and package.manifest_error is None
+        ]
+        having = [one.name for one in others if programs.intersection(_programs(one))]
+        only = having[0] if len(having) == 1 else None
+        if own := only or nearest(name, having or [one.name for one in others]):
+            taken.add(own)
+            yield WrongName(Thing.PACKAGE, own, name)
 
 
 def _other_interfaces(
@@ -154,49 +187,6 @@ def _with_own_types(loaded: LoadedAssignment, submission: SubmissionRecord) -> L
         return with_values(loaded, {**loaded.values, **own}) if own else loaded
     except AssignmentError:
         return loaded
-
-
-def _with_chosen(
-    loaded: LoadedAssignment, submission: SubmissionRecord, recordings: Mapping[str, Recording]
-) -> tuple[LoadedAssignment, Unnamed | None]:
-    """The assignment with a submission's values of its variables, and why one has none."""
-    variables = loaded.assignment.variables
-    if not variables or submission.problem is not None:
-        return loaded, None
-    given, values = dict(submission.given), dict[str, str]()
-    unnamed = None
-    for name, variable in variables.items():
-        told = given.get(name)
-        if told is not None and re.fullmatch(variable.part, told):
-            values[name] = told
-            continue
-        if told or variable.match is None:
-            raise UsageError(_not_given(name, variable, told))
-        search = _Search(loaded, submission, recordings, name, values)
-        found = search.found()
-        if len(found) == 1:
-            (values[name],) = found
-        elif variable.is_of_runs or search.is_of_what_was_not_built():
-            values[name] = str(variable.example)
-        else:
-            names = list(variables)
-            unnamed = Unnamed(search.why_none(), frozenset(names[names.index(name) :]))
-            values = {**loaded.values, **values}
-            break
-    try:
-        return with_values(loaded, values), unnamed
-    except AssignmentError as error:
-        chosen = codes(f"{name}: {value}" for name, value in values.items())
-        seen = f"with {chosen}, {error.problems[0].message}"
-        why = Finding.failed("names that ROS allows", seen, "Choose another name.")
-        return loaded, Unnamed(why, frozenset(variables))
-
-
-def _not_given(name: str, variable: Variable, told: str | None) -> str:
-    origin = f"the column {variable.column!r} of the roster" if variable.column else "--set"
-    kind = "digits" if isinstance(variable.example, int) else "letters, digits and underscores"
-    wrong = f"holds {told!r}, and not only {kind}" if told else "says nothing here"
-    return f"{origin} {wrong}; it stands for {{{name}}} (for one submission: --set {name}=VALUE)"
 
 
 @dataclass(frozen=True)
@@ -293,6 +283,15 @@ class _Search:
             f"Hand in one {noun} of this form only." if fitting else hint,
             Evidence(places=places),
         )
+
+
+def _programs(package: PackageRecord) -> list[str]:
+    """Executables of a package, by what was built, or else by what it says."""
+    found = [*package.executables, *dict(package.entry_points)]
+    if not found:
+        commands = read_commands(package.cmake or "")
+        found = [one.arguments[0] for one in commands if one.name == "add_executable"]
+    return list(dict.fromkeys(found))
 
 
 def _defining(package: PackageRecord, noun: str) -> str:
