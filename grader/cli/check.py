@@ -81,7 +81,7 @@ def check(
             from grader.grading.spine import HandedIn, grade
             from grader.report.text.terminal import print_grade
             from grader.submission.intake.locate import check_path
-            from grader.submission.kept_source import SOURCE_FOLDER, read_source
+            from grader.submission.kept_source import SOURCE_FOLDER, read_kept_source
             from grader.submission.underlay.ros2_command import absence_note
 
             loaded = part.of(assignment)
@@ -104,7 +104,7 @@ def check(
             runner.close()
         history = partial(with_history, report)
         result = write_graded(graded, report, clock, json_file, history, submission)
-        console, source = output_console(), read_source(report / SOURCE_FOLDER).files
+        console, source = output_console(), read_kept_source(report / SOURCE_FOLDER).files
         print_grade(console, graded.grade.assignment.title, result, source)
         say(f"Report: {page}")
         note = absence_note(" ".join(f"{one.hint} {one.author_hint}" for one in result.checks))

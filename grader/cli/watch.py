@@ -40,7 +40,7 @@ from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
 from grader.server.watch import ReportPage
 from grader.submission.intake.locate import check_path
-from grader.submission.kept_source import SOURCE_FOLDER, read_source
+from grader.submission.kept_source import SOURCE_FOLDER, read_kept_source
 
 
 @options.expanded
@@ -183,7 +183,7 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
                     result = write_graded(
                         event.graded, work.report, clock, amended=work.amended, root=work.submission
                     )
-                source = read_source(work.report / SOURCE_FOLDER).files
+                source = read_kept_source(work.report / SOURCE_FOLDER).files
                 console.rule(f"{time.strftime('%H:%M:%S')}, after {clock.elapsed_s:.1f} s")
                 points = score(result)
                 changed = what_changed(work.before, result) if work.before is not None else ""

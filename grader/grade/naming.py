@@ -50,7 +50,7 @@ class Unnamed:
 
 
 @dataclass(frozen=True)
-class Named:
+class ChosenNames:
     """An assignment with a submission's own names, and the submission, which says what is wrong.
 
     Attributes:
@@ -66,7 +66,7 @@ def with_chosen_names(
     loaded: LoadedAssignment,
     submission: SubmissionRecord,
     recordings: Mapping[str, Recording] = {},
-) -> Named:
+) -> ChosenNames:
     """Fill the student's own names in, and note in the submission which names are wrong.
 
     An assignment may ask for ``group{n}_bot``, and this submission has ``group7_bot``.
@@ -81,7 +81,7 @@ def with_chosen_names(
     submission = replace(submission, names=packages)
     interfaces = Names.of(_other_interfaces(loaded, submission))
     submission = replace(submission, names=packages | interfaces)
-    return Named(_with_own_types(loaded, submission), submission, unnamed)
+    return ChosenNames(_with_own_types(loaded, submission), submission, unnamed)
 
 
 def _with_chosen(

@@ -20,7 +20,7 @@ from grader.grading.graded import RECORDINGS_FOLDER
 from grader.recording.mcap_reader import read_recording
 from grader.report.files import write_whole
 from grader.report.html.page import render_page
-from grader.submission.kept_source import SOURCE_FOLDER, read_source
+from grader.submission.kept_source import SOURCE_FOLDER, read_kept_source
 
 
 def write_similarity(loaded: LoadedAssignment, ledger: Ledger) -> tuple[Path, int]:
@@ -84,7 +84,7 @@ def _entries(ledger: Ledger) -> list[Entry]:
 
 
 def _files(ledger: Ledger, key: str) -> dict[str, str]:
-    return read_source(ledger.folder(key) / SOURCE_FOLDER).files
+    return read_kept_source(ledger.folder(key) / SOURCE_FOLDER).files
 
 
 def _known(loaded: LoadedAssignment) -> set[int]:
@@ -96,7 +96,7 @@ def _known(loaded: LoadedAssignment) -> set[int]:
             known |= similarity.all_hashes(starter_files(loaded, cpp=language is CPP))
         with suppress(UsageError):
             reference = reference_of(loaded.assignment.id, loaded.folder, language)
-            known |= similarity.all_hashes(read_source(reference).files)
+            known |= similarity.all_hashes(read_kept_source(reference).files)
     return known
 
 

@@ -19,7 +19,7 @@ from grader.report.html.source_code import ShownSource
 from grader.report.model.facts import Clock, RunFacts
 from grader.report.model.result import make_result, result_json
 from grader.report.model.result_model import Result
-from grader.submission.kept_source import SOURCE_FOLDER, read_source
+from grader.submission.kept_source import SOURCE_FOLDER, read_kept_source
 
 REPORT_FILE = "report.html"
 STUDENT_FILE = "student-report.html"
@@ -78,7 +78,7 @@ def write_report(
     if graded.recordings and (folder / RECORDINGS_FOLDER).is_dir():
         layout = render_layout(graded.recordings.values())
         write_whole(folder / RECORDINGS_FOLDER / LAYOUT_FILE, layout)
-    source = read_source(folder / SOURCE_FOLDER).files
+    source = read_kept_source(folder / SOURCE_FOLDER).files
     before = replays_before(folder, result.submission.sha256)
     shown = (graded.recordings, graded.references, before)
     root = root.resolve() if root is not None and root.is_dir() else None

@@ -36,7 +36,7 @@ def read_references(loaded: LoadedAssignment) -> dict[str, Replay]:
     return {
         scenario.id: found[scenario.id]["replay"]
         for scenario in loaded.assignment.scenarios
-        if scenario.id in found and found[scenario.id]["of"] == fingerprint(loaded, scenario)
+        if scenario.id in found and found[scenario.id]["of"] == scenario_hash(loaded, scenario)
     }
 
 
@@ -48,7 +48,7 @@ def keep_reference(
     if not grade.full_points:
         raise UsageError(f"{name}: the reference does not get full points, so no run is kept")
     runs = {
-        scenario.id: {"of": fingerprint(loaded, scenario), "replay": replay}
+        scenario.id: {"of": scenario_hash(loaded, scenario), "replay": replay}
         for scenario in loaded.assignment.scenarios
         if scenario.id in recordings
         and (replay := make_replay(recordings[scenario.id], scenario)) is not None
@@ -70,7 +70,7 @@ def _packed(runs: Mapping[str, Any]) -> bytes:
     return gzip.compress(text.encode(), mtime=0)
 
 
-def fingerprint(loaded: LoadedAssignment, scenario: Scenario) -> str:
+def scenario_hash(loaded: LoadedAssignment, scenario: Scenario) -> str:
     """Hash of everything that a run depends on: the scenario as it is read, and its world."""
     definition = scenario.model_dump_json(exclude_defaults=True, exclude={"title"})
     digest = hashlib.sha256(definition.encode())

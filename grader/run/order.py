@@ -64,8 +64,8 @@ class RunLimits:
 
 
 @dataclass(frozen=True)
-class Until:
-    """When to end early; None where not asked for. See the YAML's ``until``."""
+class UntilOrder:
+    """When to end early, as ``until`` in the YAML says; None where not asked for."""
 
     messages: int | None = None
     quiet_s: float | None = None
@@ -73,7 +73,7 @@ class Until:
     at_rest_s: float | None = None
     travelled_m: float | None = None
     stimuli_done: bool = False
-    any: tuple[Until, ...] = ()
+    any: tuple[UntilOrder, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class CellOrder:
     prefixes: tuple[str, ...]
     topics: tuple[Topic, ...]
     stimuli: tuple[StimulusModel, ...]
-    until: Until
+    until: UntilOrder
     limits: RunLimits
     scratch: str
     submission: str

@@ -28,14 +28,13 @@ from grader.run.cell.prefork_server import SIMULATOR_MODULE, PreforkServer
 from grader.run.compiled_tracer import compiled_tracer, has_compiled_programs
 from grader.run.environment import RMW, student_environment
 from grader.run.imposing.mistake import Mistake, with_mistakes
-from grader.run.order import CellOrder, ProcessCommand, RunLimits, SimulatorOrder, Topic, Until
+from grader.run.order import CellOrder, ProcessCommand, RunLimits, SimulatorOrder, Topic, UntilOrder
 from grader.run.sandboxed_order import sandboxed
 from grader.sandbox.python_tree import unlisted
 from grader.spec.names import NO_NAMES, Names, Thing
 
 if TYPE_CHECKING:
-    from grader.assignment.model import Assignment, Launch, Scenario
-    from grader.assignment.model import Until as UntilModel
+    from grader.assignment.model import Assignment, Launch, Scenario, Until
     from grader.assignment.stimuli.stimulus_model import StimulusModel
     from grader.sandbox.sandbox import Sandbox
 
@@ -160,8 +159,8 @@ def _topics(scenario: Scenario) -> tuple[Topic, ...]:
     return tuple(found.values())
 
 
-def _until(until: UntilModel) -> Until:
-    return Until(
+def _until(until: Until) -> UntilOrder:
+    return UntilOrder(
         messages=until.messages,
         quiet_s=until.quiet,
         elapsed_s=until.elapsed,

@@ -20,7 +20,7 @@ from grader.report.model.cluster import Cluster, clusters
 from grader.report.model.result_model import AdjustmentPart
 from grader.review.model import AttemptReview, StudentReview
 from grader.review.store import ReviewStore, Saved
-from grader.submission.kept_source import SOURCE_FOLDER, KeptSource, read_source
+from grader.submission.kept_source import SOURCE_FOLDER, KeptSource, read_kept_source
 
 _Read = tuple[Done, Saved[StudentReview], str]
 """A row, its review, and why that cannot be read."""
@@ -141,7 +141,7 @@ class ReviewedClass:
 
     def source(self, row: ReviewedRow) -> KeptSource:
         """What was handed in, as far as it is text and was kept."""
-        return read_source(self.ledger.folder(row.row.id) / SOURCE_FOLDER)
+        return read_kept_source(self.ledger.folder(row.row.id) / SOURCE_FOLDER)
 
     def _read(self, entry: Entry, adjust: ClassAdjustments) -> _Read:
         done = standing(self.ledger, entry)

@@ -64,7 +64,7 @@ def keep_source(root: Path, folder: Path) -> None:
         _write(folder / _LEFT_OUT, "\n".join(named).encode())
 
 
-def read_source(folder: Path) -> KeptSource:
+def read_kept_source(folder: Path) -> KeptSource:
     """Read what :func:`keep_source` wrote; empty where nothing was kept."""
     found = {
         file.relative_to(folder).as_posix(): file

@@ -31,7 +31,7 @@ from grader.grading.grading import Grading
 from grader.machine import ros
 from grader.report.model.result import make_result
 from grader.run.runner import Runner
-from grader.submission.kept_source import SOURCE_FOLDER, read_source
+from grader.submission.kept_source import SOURCE_FOLDER, read_kept_source
 from tests.report.sample import not_graded
 
 YAML = """\
@@ -158,7 +158,7 @@ def test_the_source_of_each_lies_beside_its_result_also_of_the_same_submission(
 ) -> None:
     course.grade(course.executor())
     kept = {
-        key: read_source(course.ledger.folder(key) / SOURCE_FOLDER).files
+        key: read_kept_source(course.ledger.folder(key) / SOURCE_FOLDER).files
         for key in ("ana", "ben", "cai")
     }
     first, second = {"notes.txt": "first"}, {"notes.txt": "second"}

@@ -14,7 +14,7 @@ from grader.checks.parameter.parameter import PARAMETERS_GIVEN
 from grader.findings.finding import Status
 from grader.grade.judging import judge_all
 from grader.run.cell.middleware_hang import ENDED_BY, HangMonitor, hung_recording
-from grader.run.order import CellOrder, ProcessCommand, RunLimits, Until
+from grader.run.order import CellOrder, ProcessCommand, RunLimits, UntilOrder
 from tests.checks.builder import submission
 
 
@@ -75,7 +75,7 @@ def order(scenario: Scenario) -> CellOrder:
         prefixes=(),
         topics=(),
         stimuli=(),
-        until=Until(),
+        until=UntilOrder(),
         limits=RunLimits(1.0, 1.0, 1.0),
         scratch="",
         submission="",

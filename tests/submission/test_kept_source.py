@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from grader.submission import kept_source
-from grader.submission.kept_source import KeptSource, keep_source, read_source
+from grader.submission.kept_source import KeptSource, keep_source, read_kept_source
 from tests.submission.samples import Tree
 
 
 def kept(root: Path, folder: Path) -> KeptSource:
     keep_source(root, folder)
-    return read_source(folder)
+    return read_kept_source(folder)
 
 
 def test_text_is_kept_as_it_was_handed_in_and_all_else_is_named(tree: Tree, tmp_path: Path) -> None:
@@ -70,4 +70,4 @@ def test_names_cannot_deceive_a_reader(tree: Tree, tmp_path: Path) -> None:
 
 
 def test_where_nothing_was_kept_nothing_is_read(tmp_path: Path) -> None:
-    assert read_source(tmp_path / "missing") == KeptSource()
+    assert read_kept_source(tmp_path / "missing") == KeptSource()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from grader.recording.model import NS, Owner
 from grader.run.cell.graph import GraphObserver
 from grader.run.host.disturbance import Stopwatch
-from grader.run.order import Until
+from grader.run.order import UntilOrder
 from grader.run.process.output import OutputReader
 from grader.run.process.student import StudentProcesses
 
@@ -35,7 +35,7 @@ class EndingConditions:
         """Whether the robot has touched something: no verdict can change any more."""
         return self._robot is not None and self._robot.in_contact_s > _AFTER_CONTACT_S
 
-    def met(self, until: Until, watch: Stopwatch) -> bool:
+    def met(self, until: UntilOrder, watch: Stopwatch) -> bool:
         """Whether everything that an ``until`` names holds; one without conditions is never met."""
         conditions = []
         if until.messages is not None:

@@ -20,7 +20,7 @@ from grader.gradebook.similarity import (
     shared_passages,
 )
 from grader.machine.scratch import Scratch
-from grader.submission.kept_source import read_source
+from grader.submission.kept_source import read_kept_source
 from tests.gradebook.similarity.copies import renamed
 
 Files = Mapping[str, str]
@@ -36,8 +36,8 @@ def solutions(lesson: str) -> tuple[dict[str, Files], frozenset[int]]:
     with Scratch("similarity") as scratch:
         for variant in mutants.variants:
             apply(variant, mutants.reference, scratch / variant.id)
-            found[variant.id] = read_source(scratch / variant.id).files
-    return found, frozenset(all_hashes(read_source(mutants.reference).files))
+            found[variant.id] = read_kept_source(scratch / variant.id).files
+    return found, frozenset(all_hashes(read_kept_source(mutants.reference).files))
 
 
 def copy_of(files: Files) -> Files:
