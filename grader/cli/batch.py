@@ -5,7 +5,8 @@ from __future__ import annotations
 import signal
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import closing, nullcontext
 from pathlib import Path
 from statistics import median
 from typing import Annotated
@@ -15,6 +16,7 @@ import typer
 from grader.assignment.load import load_assignment
 from grader.batch import executor as executors
 from grader.batch.batch import Batch, Done
+from grader.batch.collected import Collected
 from grader.batch.groups import strangers
 from grader.batch.intake import collect, collect_roster
 from grader.batch.ledger import Ledger, TakenFrom
@@ -24,6 +26,7 @@ from grader.cli import NOT_GRADED
 from grader.cli.options import Quiet, SandboxChoice, Seed, assignment_argument, assignment_places
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
+from grader.course.load import Course
 from grader.errors import UsageError
 from grader.gradebook.adjusting import ClassAdjustments, course_of
 from grader.gradebook.class_files import GRADES_FILE, all_standing, class_rows, copies, write_class
@@ -115,22 +118,7 @@ def batch(
                 progress.note(line)
         if again or loaded is not named:
             progress.note(f"graded with {loaded.file}, as the class is")
-        is_roster = submissions.suffix.lower() == ".csv" and submissions.is_file()
-        listed = submissions if is_roster else roster
-        names = read_roster(listed) if listed is not None else None
-        if names is not None and is_roster:
-            progress.begin("fetching", len(names.students))
-            rows = collect_roster(names, submissions.parent, staging, progress.advance, rules)
-        else:
-            rows = collect(submissions, staging, names, progress.note, out, rules)
-        for problem in names.problems if names is not None else ():
-            progress.note(f"{listed}: {problem}")
-        for stranger in strangers(rows, rules) if rules is not None else ():
-            progress.note(stranger)
-        for row in rows:
-            if row.path is not None:
-                # Results within a submission would be a part of it.
-                refuse_part(out, row.path, f"the submission of {row.key}")
+        rows = _rows(submissions, roster, rules, out, staging, progress)
         with Ledger(out).opened() as ledger:
             place = str(rules.file.resolve()) if rules is not None else None
             lists = str(roster.resolve()) if roster is not None else None
@@ -146,28 +134,10 @@ def batch(
                 executor = executors.DaskExecutor(scheduler, order)
             elif to_do and grading is not None:
                 executor = executors.LocalExecutor(grading, admission.most)
-            done: list[Done] = []
             known = [e for e in entries if e.key not in to_do and ledger.result(e.key) is not None]
             progress.begin("grading", len(entries), already=len(known))
-            try:
-                for item in work.grade(to_do, executor):
-                    done.append(item)
-                    progress.advance(item.entry.key, _said(item), fresh=item.fresh)
-            except (KeyboardInterrupt, executors.ExecutorLost):
-                # A second Ctrl-C takes away nothing of what is written because of the first.
-                signal.signal(signal.SIGINT, signal.SIG_IGN)
-                signal.signal(signal.SIGTERM, signal.SIG_IGN)
-                progress.note(
-                    f"interrupted; {len(done)} of {len(entries)} are in {out}. "
-                    f"`rosgrade batch {out}` grades the others"
-                )
-                write_class(bring_up_to_date(all_standing(ledger), ledger), ledger)
-                signal.signal(signal.SIGINT, signal.default_int_handler)
-                signal.signal(signal.SIGTERM, signal.default_int_handler)
-                raise
-            finally:
-                if executor is not None:
-                    executor.close()
+            with closing(executor) if executor is not None else nullcontext():
+                done = _graded(work, work.grade(to_do, executor), len(entries), progress)
             done = bring_up_to_date(done, ledger)
             overview = write_class(done, ledger)
     console = output_console()
@@ -175,6 +145,57 @@ def batch(
     say(f"Overview: {overview}")
     say(f"Grades: {overview.with_name(GRADES_FILE)}")
     raise typer.Exit(NOT_GRADED if any(row.cannot_be_graded for row in class_rows(done)) else 0)
+
+
+def _rows(
+    submissions: Path,
+    roster: Path | None,
+    rules: Course | None,
+    out: Path,
+    staging: Path,
+    progress: Progress,
+) -> list[Collected]:
+    """Who handed in what, with what is strange about it told; nothing of it holds the results."""
+    is_roster = submissions.suffix.lower() == ".csv" and submissions.is_file()
+    listed = submissions if is_roster else roster
+    names = read_roster(listed) if listed is not None else None
+    if names is not None and is_roster:
+        progress.begin("fetching", len(names.students))
+        rows = collect_roster(names, submissions.parent, staging, progress.advance, rules)
+    else:
+        rows = collect(submissions, staging, names, progress.note, out, rules)
+    for problem in names.problems if names is not None else ():
+        progress.note(f"{listed}: {problem}")
+    for stranger in strangers(rows, rules) if rules is not None else ():
+        progress.note(stranger)
+    for row in rows:
+        if row.path is not None:
+            # Results within a submission would be a part of it.
+            refuse_part(out, row.path, f"the submission of {row.key}")
+    return rows
+
+
+def _graded(work: Batch, finished: Iterator[Done], most: int, progress: Progress) -> list[Done]:
+    """The rows of a class as they are finished; what is there at an interrupt is written."""
+    done: list[Done] = []
+    try:
+        for item in finished:
+            done.append(item)
+            progress.advance(item.entry.key, _said(item), fresh=item.fresh)
+    except (KeyboardInterrupt, executors.ExecutorLost):
+        # A second Ctrl-C takes away nothing of what is written because of the first.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        ledger = work.ledger
+        progress.note(
+            f"interrupted; {len(done)} of {most} are in {ledger.out}. "
+            f"`rosgrade batch {ledger.out}` grades the others"
+        )
+        write_class(bring_up_to_date(all_standing(ledger), ledger), ledger)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        raise
+    return done
 
 
 def is_batch(name: str) -> bool:
