@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from grader.assignment.load import LoadedAssignment, list_assignments, load_assignment
+from grader.assignment.load import list_assignments, load_assignment
 from grader.assignment.mutant import CPP, PYTHON, reference_of
 from grader.authoring.mutants.selftest import (
     Role,
@@ -81,10 +80,6 @@ def selftest(
     language = CPP if cpp else PYTHON
     if cpp:
         UnderlayStore(cache_folder(), ros.find()).fetched([find_underlay("rclcpp")])
-    kept: list[str] = []
-
-    def keep_runs(loaded: LoadedAssignment, graded: Graded) -> None:
-        kept.append(keep_reference(loaded, graded.grade, graded.recordings))
 
     def chosen_trial(trial: Trial) -> bool:
         return trial.role is Role.REFERENCE if record else not only or trial.id in only
@@ -99,6 +94,7 @@ def selftest(
             refuse_part(keep, loaded.folder, f"the assignment in {loaded.folder}")
             refuse_part(keep, reference, f"the reference solution in {reference}")
         results: list[TrialResult] = []
+        graded: list[Graded] = []
         every = trials(loaded, language)
         for missing in {*(only or ())} - {trial.id for trial in every}:
             near = nearest_or_all(missing, [trial.id for trial in every])
@@ -106,7 +102,7 @@ def selftest(
         wanted = [*filter(chosen_trial, every)]
         with Runner(ros.find(), sandbox=chosen) as runner, Progress(quiet).shown() as progress:
             grading = Grading(loaded, runner, cache_folder())
-            on_graded = partial(keep_runs, loaded) if record else lambda _: None
+            on_graded = graded.append if record else lambda _: None
             setup = Setup(loaded, grading, reference, language, on_graded)
             kept_in = keep and keep / loaded.assignment.id
             for result in run_selftest(setup, wanted, jobs=jobs or 2 * cpu_count(), keep=kept_in):
@@ -116,19 +112,12 @@ def selftest(
                     f"{result.trial.id}: {'WRONG' if result.wrong else 'ok'}"
                 )
         if record:
-            say(kept[-1])
+            say(keep_reference(loaded, graded[0].grade, graded[0].recordings))
             continue
         score = mutation_score(results)
         perfect = perfect and score.perfect
-        derived = f" ({score.derived} follow from the contract)" if score.derived else ""
-        percent = 100.0 * score.killed / score.mutants if score.mutants else 0.0
         _print(console, loaded.assignment.id, results)
-        say(
-            f"{loaded.assignment.id}: {score.accepted} of {score.right} right solutions with "
-            f"full points, {score.killed} of {score.mutants} mutants judged as expected"
-            f"{derived}: "
-            f"mutation score {percent:.0f} %"
-        )
+        say(f"{loaded.assignment.id}: {score.words}")
     raise typer.Exit(0 if perfect else 1)
 
 

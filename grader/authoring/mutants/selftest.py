@@ -244,6 +244,16 @@ class MutationScore:
     right: int
     perfect: bool
 
+    @property
+    def words(self) -> str:
+        """It in a line."""
+        derived = f" ({self.derived} follow from the contract)" if self.derived else ""
+        percent = 100.0 * self.killed / self.mutants if self.mutants else 0.0
+        return (
+            f"{self.accepted} of {self.right} right solutions with full points, {self.killed} of "
+            f"{self.mutants} mutants judged as expected{derived}: mutation score {percent:.0f} %"
+        )
+
 
 def mutation_score(results: list[TrialResult]) -> MutationScore:
     """Count the results of one assignment."""
