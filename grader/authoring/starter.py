@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from grader.assignment.contract.standard import ANY, module_of
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Assignment, CheckSpec, Package, Visibility
+from grader.diagnosis.not_generated import InterfaceName
 from grader.errors import UsageError
 from grader.machine import resources
 from grader.report.files import check_folder, write_whole
@@ -34,19 +35,6 @@ class Program:
     def node_class(self) -> str:
         """Name of the node's class."""
         return "".join(word[:1].upper() + word[1:] for word in re.split(r"\W|_", self.module))
-
-
-@dataclass(frozen=True)
-class Interface:
-    """A definition that the student writes, such as ``BotStatus``."""
-
-    kind: str
-    name: str
-
-    @property
-    def file(self) -> str:
-        """Its place in the package."""
-        return f"{self.kind}/{self.name}.{self.kind}"
 
 
 def write_starter(loaded: LoadedAssignment, folder: Path, *, cpp: bool = False) -> tuple[Path, ...]:
@@ -84,7 +72,10 @@ def starter_files(loaded: LoadedAssignment, *, cpp: bool = False) -> dict[str, s
 
 
 def package_files(
-    package: Package, description: str, nodes: Mapping[str, str], interfaces: tuple[Interface, ...]
+    package: Package,
+    description: str,
+    nodes: Mapping[str, str],
+    interfaces: tuple[InterfaceName, ...],
 ) -> dict[str, str]:
     """Make a package around what its programs do."""
     cpp = is_cpp(package)
@@ -141,7 +132,7 @@ def programs(package: Package) -> tuple[Program, ...]:
 
 
 def _package(assignment: Assignment, package: Package) -> Iterator[tuple[str, str]]:
-    interfaces = tuple(_interfaces(assignment, package))
+    interfaces = _interfaces(assignment, package)
     nodes = {
         program.executable: rendered(
             f"starter/node.{'cpp' if is_cpp(package) else 'py'}",
@@ -187,17 +178,15 @@ def _visible(assignment: Assignment, uses: str) -> Iterator[CheckSpec]:
             yield spec
 
 
-def _interfaces(assignment: Assignment, package: Package) -> Iterator[Interface]:
+def _interfaces(assignment: Assignment, package: Package) -> tuple[InterfaceName, ...]:
     """The interfaces of a package: the contract's, or without one those that checks name."""
     contract = assignment.contract
     if contract is not None:
         said = [f"{package.name}/{name}" for name in contract.packages[package.name].interfaces]
     else:
         said = [str(one.with_["interface"]) for one in _visible(assignment, "interface.")]
-    for name in dict.fromkeys(said):
-        owner, kind, short = name.split("/")
-        if owner == package.name:
-            yield Interface(kind, short)
+    found = map(InterfaceName.of, dict.fromkeys(said))
+    return tuple(one for one in found if one.package == package.name)
 
 
 def rendered(name: str, **values: object) -> str:

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 from grader.assignment.contract.model import (
     Connection,
@@ -30,6 +30,7 @@ from grader.findings.words import Words, listing
 from grader.spec.document import Place
 
 ANY = "any"
+_P = TypeVar("_P", bound=Part)
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,11 @@ class Spot:
     package: str
     executable: str = ""
     around: tuple[Spot, ...] = field(default=(), repr=False)
+
+    def part_as(self, kind: type[_P]) -> _P:
+        """The part, which is of this kind."""
+        assert isinstance(self.part, kind)
+        return self.part
 
     @property
     def of_package(self) -> ContractPackage:
@@ -164,24 +170,14 @@ def _node(spot: Spot) -> dict[str, Any] | None:
 
 
 def _qos(spot: Spot) -> dict[str, Any] | None:
-    asked = _connection(spot).qos
+    asked = spot.part_as(Connection).qos
     return {"topic": spot.name, **asked} if asked else None
 
 
 def _depth(spot: Spot) -> dict[str, Any] | None:
-    part = _connection(spot)
+    part = spot.part_as(Connection)
     kind = "subscription" if isinstance(part, Subscription) else "publisher"
     return {"topic": spot.name, "depth": part.depth, "kind": kind} if part.depth else None
-
-
-def _connection(spot: Spot) -> Connection:
-    assert isinstance(spot.part, Connection)
-    return spot.part
-
-
-def _publication(spot: Spot) -> Publication:
-    assert isinstance(spot.part, Publication)
-    return spot.part
 
 
 def _name_hint(end: str) -> Words:
@@ -192,7 +188,7 @@ def _name_hint(end: str) -> Words:
 
 
 def _sent(spot: Spot) -> dict[str, Any] | None:
-    part = _publication(spot)
+    part = spot.part_as(Publication)
     counts = part.value or part.period or part.rate or part.count
     return {"topic": spot.name, "at_least": 1} if counts else None
 
@@ -322,7 +318,7 @@ PUBLICATION = (
     Fact(
         "type",
         "topic.type",
-        lambda it: {"topic": it.name, "type": _connection(it).type},
+        lambda it: {"topic": it.name, "type": it.part_as(Connection).type},
         "The topic {name} carries {type}",
         Words(
             "The first argument of create_publisher is the class of the messages.",
@@ -374,7 +370,9 @@ PUBLICATION = (
         "once",
         "messages.count",
         lambda it: (
-            {"topic": it.name, "exactly": count} if (count := _publication(it).count) else None
+            {"topic": it.name, "exactly": count}
+            if (count := it.part_as(Publication).count)
+            else None
         ),
         "Exactly {count} {are} published{on}",
         "Publish neither in a loop nor in a timer that goes on.",
@@ -385,7 +383,7 @@ PUBLICATION = (
         "values",
         "messages.equal",
         lambda it: (
-            {"topic": it.name, "value": value} if (value := _publication(it).value) else None
+            {"topic": it.name, "value": value} if (value := it.part_as(Publication).value) else None
         ),
         "Every message{on} has {value}",
         "Set the fields before you publish; all others keep their default of 0.",
@@ -396,8 +394,8 @@ PUBLICATION = (
         "period",
         "timing.period",
         lambda it: (
-            {"topic": it.name, **period_of(_publication(it))}
-            if period_of(_publication(it))
+            {"topic": it.name, **period_of(it.part_as(Publication))}
+            if period_of(it.part_as(Publication))
             else None
         ),
         "A message comes every {period}{on}",
@@ -408,7 +406,7 @@ PUBLICATION = (
     Fact(
         "rate",
         "timing.rate",
-        lambda it: {"topic": it.name, **rate} if (rate := _publication(it).rate) else None,
+        lambda it: {"topic": it.name, **rate} if (rate := it.part_as(Publication).rate) else None,
         "Messages come with {rate}{on}",
         "`ros2 topic hz {name}` shows the rate.",
         ("sent", "alive"),
@@ -417,7 +415,7 @@ PUBLICATION = (
     Fact(
         "timer",
         "executor.timer",
-        lambda it: {"topic": it.name} if _publication(it).timer else None,
+        lambda it: {"topic": it.name} if it.part_as(Publication).timer else None,
         "A timer calls the callback{on}, not a thread or a loop",
         Words(
             "Create a timer with self.create_timer(period_in_seconds, self.timer_callback), and "
@@ -443,7 +441,7 @@ SUBSCRIPTION = (
     Fact(
         "subscribed_type",
         "topic.type",
-        lambda it: {"topic": it.name, "type": _connection(it).type, "kind": "subscription"},
+        lambda it: {"topic": it.name, "type": it.part_as(Connection).type, "kind": "subscription"},
         "The subscription to {name} is of {type}",
         Words(
             "The first argument of create_subscription is the class of the messages.",
@@ -508,7 +506,7 @@ SERVICE = (
     Fact(
         "service",
         "service.exists",
-        lambda it: {"service": it.name, "type": _server(it).type, "remap": True},
+        lambda it: {"service": it.name, "type": it.part_as(Server).type, "remap": True},
         "{subject} offers the service {name}",
         Words(
             "self.create_service({short}, '{name}', self.callback); `ros2 service list -t` shows "
@@ -524,7 +522,7 @@ ACTION = (
     Fact(
         "action",
         "action.exists",
-        lambda it: {"action": it.name, "type": _server(it).type, "remap": True},
+        lambda it: {"action": it.name, "type": it.part_as(Server).type, "remap": True},
         "{subject} offers the action {name}",
         Words(
             "ActionServer(self, {short}, '{name}', self.execute); `ros2 action list -t` shows it.",
@@ -634,11 +632,6 @@ INTERFACE = (
         ("generated",),
     ),
 )
-
-
-def _server(spot: Spot) -> Server:
-    assert isinstance(spot.part, Server)
-    return spot.part
 
 
 def spots(contract: Contract) -> Iterator[tuple[Spot, Sequence[Fact]]]:
