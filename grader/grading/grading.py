@@ -102,7 +102,7 @@ class Grading:
             self._type_support.prefixes(say)
         sandbox = self.runner.sandbox
 
-        def tested(record: SubmissionRecord) -> frozenset[str]:
+        def choose_tested(record: SubmissionRecord) -> frozenset[str]:
             self.told.recorded(record, {})
             named = with_chosen_names(self.loaded, replace(record, given=given))
             found = map(named.submission.package, _tested(named.loaded))
@@ -116,7 +116,7 @@ class Grading:
             sandbox=sandbox.allowing(self._libraries) if sandbox is not None else None,
             stop=self._stop,
             on_output=self.told.output,
-            choose_tested=tested,
+            choose_tested=choose_tested,
             source_folder=source,
             with_bags=self._with_bags,
             place=self._build_place,
