@@ -77,9 +77,7 @@ def judge_all(
             findings = (_skipped([results[one] for one in blockers]),)
         results[name] = known.result(item, findings, blockers, hints)
     ordered = tuple(results[name] for name in bound)
-    return Grade(
-        loaded.assignment, loaded.sha256, submission, ordered, loaded.withheld, loaded.location
-    )
+    return Grade(loaded, submission, ordered)
 
 
 def _parameters_first(bound: Mapping[str, BoundCheck]) -> dict[str, list[str]]:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
 from typing import Any
 
-from grader.assignment.model import NOTHING_WITHHELD, Assignment, Visibility, Withheld
+from grader.assignment.load import LoadedAssignment
+from grader.assignment.model import Assignment, Visibility
 from grader.findings.finding import Finding, Status
 from grader.recording.submission import SubmissionRecord
 from grader.spec.names import Names, Thing
@@ -75,16 +76,17 @@ class Grade:
     """The grade of one submission.
 
     Attributes:
-        withheld: Checks that were not judged because a student does not get to see them yet.
-        assignment_location: Where the assignment lies; None for one of rosgrade's own.
+        loaded: The assignment, with the names that the submission chose.
     """
 
-    assignment: Assignment
-    assignment_sha256: str
+    loaded: LoadedAssignment
     submission: SubmissionRecord
     results: tuple[CheckResult, ...]
-    withheld: Withheld = NOTHING_WITHHELD
-    assignment_location: str | None = None
+
+    @property
+    def assignment(self) -> Assignment:
+        """What the assignment says."""
+        return self.loaded.assignment
 
     @property
     def graded(self) -> bool:

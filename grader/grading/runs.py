@@ -57,10 +57,8 @@ class Runs:
         grade = self._grade = judge_all(
             self._grading.loaded, self._record, self._recordings, self._faults
         )
-        if grade.assignment != self._loaded.assignment:
-            # Some names that students choose, such as that of a service, show only in a run.
-            named = with_chosen_names(self._grading.loaded, self._record, self._recordings)
-            self._loaded = named.loaded
+        # Some names that students choose, such as that of a service, show only in a run.
+        self._loaded = grade.loaded
         disturbed = grade.disturbed_scenarios(Status.ERROR)
         faulty = [name for name, recording in self._recordings.items() if recording.faults]
         return Round(

@@ -41,6 +41,13 @@ def html_of(make):
     return make().html(reference(), source={PLACE.file: NODE})
 
 
+def with_assignment(sample, **changes):
+    """A sample of which the assignment says something else."""
+    loaded = sample.grade.loaded
+    loaded = replace(loaded, assignment=loaded.assignment.model_copy(update=changes))
+    return replace(sample, grade=replace(sample.grade, loaded=loaded))
+
+
 def violations(page, *, colours=True):
     """What axe-core has against a page, with the elements."""
     rules = {"rules": {"color-contrast": {"enabled": colours}}}
@@ -142,13 +149,11 @@ class TestReplay:
     def test_the_goal_is_drawn_and_named(self, look):
         sample = gallery()
         goal = {"goal": ["0.4", "-0.2", "90 deg"], "position": "8 cm"}
-        assignment = sample.grade.assignment
         checks = tuple(
             spec.model_copy(update={"with_": goal}) if spec.id == "stops" else spec
-            for spec in assignment.checks
+            for spec in sample.grade.assignment.checks
         )
-        grade = replace(sample.grade, assignment=assignment.model_copy(update={"checks": checks}))
-        found = look(replace(sample, grade=grade).html(reference()))
+        found = look(with_assignment(sample, checks=checks).html(reference()))
         replay = found.page.locator(".replay")
         plan, circle = replay.locator("svg.plan"), replay.locator("svg.plan circle.target")
         place = [circle.get_attribute(name) for name in ("cx", "cy", "r")]
@@ -295,12 +300,11 @@ def test_the_contents_name_the_section_that_is_read(look, width):
         "A wall is ahead of the robot on its way",
         "It publishes what to do, again and again, until the end",
     )
-    scenarios = [
+    scenarios = tuple(
         one.model_copy(update={"title": name})
         for one, name in zip(sample.grade.assignment.scenarios, reversed(names), strict=True)
-    ]
-    assignment = sample.grade.assignment.model_copy(update={"scenarios": tuple(scenarios)})
-    page = look(replace(sample, grade=replace(sample.grade, assignment=assignment)).html(), width)
+    )
+    page = look(with_assignment(sample, scenarios=scenarios).html(), width)
     page = page.page
     for name in names:
         page.get_by_role("heading", name=name, exact=True).evaluate("(one) => one.scrollIntoView()")

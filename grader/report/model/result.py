@@ -38,14 +38,14 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
         recordings: By scenario id; may lack scenarios that were not run.
     """
     checks = tuple(map(_check, grade.results))
-    submission = grade.submission
+    submission, withheld = grade.submission, grade.loaded.withheld
     return Result(
         schema_=SCHEMA,
         rosgrade_version=facts.rosgrade_version,
         assignment=model.AssignmentPart(
             id=grade.assignment.id,
-            sha256=grade.assignment_sha256,
-            location=grade.assignment_location,
+            sha256=grade.loaded.sha256,
+            location=grade.loaded.location,
         ),
         submission=model.SubmissionPart(
             id=submission.id, sha256=submission.sha256, problem=submission.problem
@@ -55,7 +55,7 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
         graded=grade.graded,
         first_to_fix=first_to_fix(checks),
         checks=checks,
-        withheld=model.WithheldPart(checks=grade.withheld.checks, points=grade.withheld.points),
+        withheld=model.WithheldPart(checks=withheld.checks, points=withheld.points),
         scenarios=tuple(
             _scenario(recordings[scenario.id], facts)
             for scenario in grade.assignment.scenarios
