@@ -175,7 +175,7 @@ def _rows(
     return rows
 
 
-def _graded(work: Batch, finished: Iterator[Done], most: int, progress: Progress) -> list[Done]:
+def _graded(work: Batch, finished: Iterator[Done], count: int, progress: Progress) -> list[Done]:
     """The rows of a class as they are finished; what is there at an interrupt is written."""
     done: list[Done] = []
     try:
@@ -188,7 +188,7 @@ def _graded(work: Batch, finished: Iterator[Done], most: int, progress: Progress
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         ledger = work.ledger
         progress.note(
-            f"interrupted; {len(done)} of {most} are in {ledger.out}. "
+            f"interrupted; {len(done)} of {count} are in {ledger.out}. "
             f"`rosgrade batch {ledger.out}` grades the others"
         )
         write_class(bring_up_to_date(all_standing(ledger), ledger), ledger)

@@ -30,6 +30,7 @@ from grader.grading.regrading import find_recordings, regrade
 from grader.grading.spine import run_and_judge
 from grader.machine import ros
 from grader.machine.load import cpu_count
+from grader.machine.resources import BUILDS
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import NS
 from grader.report.files import write_whole
@@ -39,7 +40,6 @@ from grader.run.cell.domain import lock_domain
 from grader.run.runner import Runner, RunRequest
 from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose
-from grader.submission.build.build_cache import BUILDS
 from grader.submission.prepare import Preparation, Prepared, prepare
 
 CLASSES = {"timed_publisher": 100, "bot_controller": 40, "p_controller": 40}

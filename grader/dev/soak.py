@@ -28,7 +28,7 @@ from grader.authoring.mutants.selftest import Role, Setup, Trial, TrialResult, r
 from grader.grading.grading import Grading
 from grader.machine import ros
 from grader.machine.load import cpu_count
-from grader.machine.resources import cache_folder
+from grader.machine.resources import UNDERLAYS, cache_folder
 from grader.machine.scratch import Scratch
 from grader.report.model.result import differences
 from grader.run.admission import Admission
@@ -36,7 +36,7 @@ from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose
 from grader.submission.underlay.definition import find_underlay
-from grader.submission.underlay.store import UNDERLAYS, UnderlayStore
+from grader.submission.underlay.store import UnderlayStore
 
 ASSIGNMENTS = ("simple_publisher", "timed_publisher", "bot_controller", "p_controller")
 _BURST_S = _PAUSE_S = (0.3, 3.0)

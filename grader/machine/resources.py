@@ -45,10 +45,19 @@ def carried_interfaces() -> Path:
     return PACKAGE / "submission" / "interfaces"
 
 
+UNDERLAYS, BUILDS, INSTALL = "underlays", "builds", "install"
+"""Folders in the cache: of what ``rosgrade underlay add`` built, of builds, and in each build."""
+
+
 def cache_folder() -> Path:
     """Folder for builds that may be deleted at any time (XDG Base Directory)."""
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "rosgrade"
+
+
+def kept_underlays(cache: Path) -> list[Path]:
+    """Install spaces of the underlays that were added on this machine."""
+    return sorted(cache.glob(f"{UNDERLAYS}/{BUILDS}/*/{INSTALL}"))
 
 
 def check_executable(folder: Path) -> None:

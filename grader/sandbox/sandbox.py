@@ -16,6 +16,7 @@ from pathlib import Path
 import grader
 import sim
 from grader.errors import GraderFault
+from grader.machine.resources import kept_underlays
 from grader.machine.ros import RosInstallation
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
@@ -38,8 +39,6 @@ TREES = Path("/run/python")
 """Path of the students' Python environments in a cell."""
 ENVIRONMENT = Path("/run/environment")
 """Path of rosgrade's own Python environment in a cell."""
-UNDERLAYS = Path("/run/underlays")
-"""Folder of the underlays in a cell."""
 CODE = (Path(grader.__file__).resolve().parent, Path(sim.__file__).resolve().parent)
 
 _CELL_UID, _BUILD_UID = 2000, 1000
@@ -48,6 +47,7 @@ _NEARLY_ALL = 0.95
 _OPEN_FILES = 4096
 """Of all processes of a build: a compiler and all that drives it have some each."""
 _DATA = CODE[0] / "_data"
+_UNDERLAYS = Path("/run/underlays")
 _USR = Path("/usr")
 _SITE = "lib/python3*/site-packages"
 
@@ -100,11 +100,11 @@ class Sandbox:
 
     def underlays(self) -> list[Bind]:
         """The underlays that are kept on this machine, as cells see them."""
-        found = sorted(self.cache.glob("underlays/builds/*/install"))
+        found = kept_underlays(self.cache)
         # A sandbox runs as another user, where rosgrade runs as root; built with a umask such as
         # 077, an underlay is copied for it.
         shown = [path for path in found if path.stat().st_mode & 0o555 == 0o555]
-        return [Bind(path, UNDERLAYS / path.parent.name) for path in shown]
+        return [Bind(path, _UNDERLAYS / path.parent.name) for path in shown]
 
     def watched(self) -> Callable[[], None]:
         """A function that raises :class:`GraderFault` if the students' Python was damaged."""

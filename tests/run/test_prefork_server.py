@@ -16,6 +16,7 @@ import pytest
 
 from grader.errors import GraderFault
 from grader.machine import ros
+from grader.machine.resources import BUILDS, INSTALL, UNDERLAYS
 from grader.recording.mcap_reader import read_recording
 from grader.run.cell.cell_process import CellProcess
 from grader.run.cell.prefork_server import PreforkServer
@@ -25,8 +26,6 @@ from grader.sandbox import bubblewrap
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
 from grader.sandbox.usage import usage_of
-from grader.submission.build.build_cache import BUILDS, INSTALL
-from grader.submission.underlay.store import UNDERLAYS
 from tests.run import nodes
 from tests.run.conftest import SUBMISSION, RunNode, assignment, install
 

@@ -53,7 +53,8 @@ class Overlap(Parameters):
     )
 
     def _asked(self) -> str:
-        asked = f"{codes(self.callbacks)} {'never ' * self.never}running at the same time"
+        callbacks = listing(map(_words, self.callbacks))
+        asked = f"{callbacks} {'never ' * self.never}running at the same time"
         runs = f"in {counted(self.at_least, 'run')} of each"
         return f"{asked}, {runs if self.never else f'{self.at_least} times or more'}"
 
@@ -81,6 +82,11 @@ def _named(recording: Recording, names: Sequence[str]) -> list[Run]:
     return [replace(run, callback=name) for run in runs for name in names if _is(run, name)]
 
 
+def _words(name: str) -> str:
+    """A callback as the assignment names it: what only has a period is a timer."""
+    return f"the timer of {code(name)}" if re.match(r"[0-9.]", name) else code(name)
+
+
 def _is(run: Run, name: str) -> bool:
     try:
         period_s, named_s = (parse_quantity(one, Dimension.TIME) for one in (run.serves, name))
@@ -104,7 +110,7 @@ def overlap(recording: Recording, parameters: Overlap) -> Finding:
     if not never and len(names) > 1:
         found = [(one, other) for one, other in found if one.callback != other.callback]
     numbers = {name: sum(name in (a.callback, b.callback) for a, b in found) for name in names}
-    parts = [f"{code(name)} overlaps {counted(numbers[name], 'time')}" for name in names]
+    parts = [f"{_words(name)} overlaps {counted(numbers[name], 'time')}" for name in names]
     observed = f"{counted(len(runs), 'run')}: {listing(parts)}"
     wrong = [run for both in found for run in both] if never else []
     first = moment(recording, "one runs", (wrong or runs)[0].begin_ns)
@@ -142,7 +148,7 @@ def _why_missing(
     """Why a callback has not run as often as it must to be judged, or None if each has."""
     numbers = [(sum(run.callback == name for run in runs), name) for name in names]
     number, name = min(numbers, default=(least, ""))
-    seen = f"{code(name)} ran {counted(number, 'time')}, of {least} that are needed"
+    seen = f"{_words(name)} ran {counted(number, 'time')}, of {least} that are needed"
     return _why_not_seen(recording, seen, declared=declared) if number < least else None
 
 
@@ -173,7 +179,7 @@ class ExecutorKind(Parameters):
 
     def _asked(self) -> str:
         asked = f"a {self.executor} that spins, with {counted(self.threads, 'thread')} or more"
-        groups = f", and {codes(self.callbacks)} in groups: {self.groups}"
+        groups = f", and {listing(map(_words, self.callbacks))} in groups: {self.groups}"
         return asked + groups * bool(self.callbacks)
 
 
@@ -198,7 +204,7 @@ def kind(recording: Recording, parameters: ExecutorKind) -> Finding:
     exclusive = [group.startswith(GROUP) for group in groups]
     parts = [f"a {name} with {counted(threads, 'thread')} spins" for name, threads in spun]
     parts += [
-        f"{code(name)} is in {group_class(groups[of].split()[0])} {of + 1}" for name, of in pairs
+        f"{_words(name)} is in {group_class(groups[of].split()[0])} {of + 1}" for name, of in pairs
     ]
     right = [name == wanted and threads >= least for name, threads in spun]
     grouped = {

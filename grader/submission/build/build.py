@@ -20,11 +20,12 @@ from typing import TYPE_CHECKING, TypeVar
 
 from grader.errors import GraderFault, machine_fault
 from grader.machine.out_of_memory import oom_kills
+from grader.machine.resources import INSTALL
 from grader.machine.ros import RosInstallation
 from grader.recording.submission import BuildRecord
 from grader.submission.build import build_log, own_tests, standalone_build
 from grader.submission.build.bounded import Outcome, Starved
-from grader.submission.build.build_cache import INSTALL, BuildCache, CachedBuild
+from grader.submission.build.build_cache import BuildCache, CachedBuild
 from grader.submission.build.build_error_location import Sources, find_build_error, last_started
 from grader.submission.build.colcon import COMPILE_S, BuildLimits, BuildSetting, Colcon
 from grader.submission.build.installed import tidy

@@ -23,11 +23,9 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from grader.errors import GraderFault, machine_fault
-from grader.machine.resources import check_executable
+from grader.machine.resources import BUILDS, INSTALL, check_executable
 from grader.machine.tree import remove_tree
 from grader.recording.submission import BuildRecord
-
-INSTALL = "install"
 
 _RECORD = "build.json"
 _SITE_PACKAGES, _COMPILED = "site-packages", "__pycache__"
@@ -67,10 +65,6 @@ class CachedBuild:
 
     build: BuildRecord
     install: Path | None
-
-
-BUILDS = "builds"
-"""Name of the folder of builds in a cache folder."""
 
 
 class BuildCache:

@@ -21,13 +21,13 @@ from typing import TYPE_CHECKING
 from pydantic import TypeAdapter, ValidationError
 
 from grader.errors import GraderFault, SubmissionError, UsageError
-from grader.machine.resources import carried_interfaces
+from grader.machine.resources import BUILDS, INSTALL, UNDERLAYS, carried_interfaces
 from grader.machine.ros import RosInstallation
 from grader.machine.scratch import Scratch
 from grader.sandbox.limits import BUILD
 from grader.sandbox.python_tree import not_installed
 from grader.submission.build.build import Builder, once_more
-from grader.submission.build.build_cache import BUILDS, INSTALL, BuildCache, CachedBuild
+from grader.submission.build.build_cache import BuildCache, CachedBuild
 from grader.submission.build.build_error_location import Sources
 from grader.submission.build.colcon import BuildLimits, BuildSetting
 from grader.submission.build.toolchain import check_toolchain, missing_tools
@@ -45,7 +45,7 @@ CARRIED = carried_interfaces()
 
 # Raise it when the same sources would now be built differently, as by another wheels.cmake.
 _RECIPE = 1
-UNDERLAYS, _NOTE = "underlays", "underlay.json"
+_NOTE = "underlay.json"
 _INDEX = "share/ament_index/resource_index/packages"
 # Thirty interfaces take 95 s of CPU, and rclcpp more.
 _LIMITS = BuildLimits(
