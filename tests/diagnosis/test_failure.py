@@ -82,6 +82,24 @@ def test_raise_from_leads_to_the_first_cause():
     assert fatal_failure(recording(log=log), BOT).type == "ZeroDivisionError"
 
 
+def test_what_rclpy_says_in_better_words_of_its_own_exception_is_the_cause():
+    # As it prints it for Node('bot-publisher'); the first one never was in the student's file.
+    first = """\
+Traceback (most recent call last):
+  File "/opt/ros/jazzy/lib/python3.12/site-packages/rclpy/node.py", line 202, in __init__
+    self.__node = _rclpy.Node(
+ValueError: invalid node name: node name must not contain characters other than alphanumerics
+
+During handling of the above exception, another exception occurred:
+
+"""
+    second = PLAIN.replace(
+        "ZeroDivisionError: division by zero", "InvalidNodeNameException: Invalid"
+    )
+    log = output(first + second.partition("\n")[2])
+    assert fatal_failure(recording(log=log), BOT).type == "InvalidNodeNameException"
+
+
 def test_the_last_of_two_unrelated_tracebacks_is_fatal():
     second = PLAIN.replace("ZeroDivisionError: division by zero", "KeyError: 'x'")
     log = output(PLAIN) + output(second)

@@ -82,16 +82,18 @@ def failures(recording: Recording, process: str) -> tuple[Failure, ...]:
 
 
 def fatal_failure(recording: Recording, process: str) -> Failure | None:
-    """The exception that ended a process: the deepest of the last chain.
+    """The exception that ended a process: of the last chain, the first that is the student's.
 
     Of ``ValueError``, then another error while that one was handled, the ``ValueError`` is
-    the one to correct.
+    the one to correct; but not if rclpy handled it itself, to say it in better words.
     """
     found = [failure for failure in failures(recording, process) if not failure.ignored]
     first = len(found) - 1
     while first > 0 and found[first].linked:
         first -= 1
-    return found[first] if found else None
+    chain = found[max(first, 0) :]
+    own = (one for one in chain if _student_frame(one, recording.submission) is not None)
+    return next(own, chain[0] if chain else None)
 
 
 @dataclass(frozen=True)
