@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from yaml.composer import Composer
+from yaml.resolver import Resolver
 
 from grader.errors import AssignmentError, Problem
 
@@ -21,16 +23,35 @@ Place = tuple[str | int, ...]
 _TAG = "tag:yaml.org,2002:"
 
 
-class _Loader(yaml.SafeLoader):
-    """PyYAML's parser with the implicit types of YAML 1.2."""
+class _Types(Resolver):
+    """The implicit types of YAML 1.2."""
 
     yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 - a class variable of PyYAML
+
+
+class _Loader(Composer, yaml.CSafeLoader):
+    """libyaml's parser, which takes a tenth of the time of PyYAML's own, with PyYAML's composer.
+
+    libyaml's composer would end the process where a text is nested too deeply.
+    """
+
+    yaml_implicit_resolvers = _Types.yaml_implicit_resolvers
+
+    def __init__(self, text: str) -> None:
+        yaml.CSafeLoader.__init__(self, text)
+        Composer.__init__(self)
+
+
+class _Explainer(yaml.SafeLoader):
+    """PyYAML's own parser, which says better what is wrong with a text."""
+
+    yaml_implicit_resolvers = _Types.yaml_implicit_resolvers
 
 
 class _Dumper(yaml.SafeDumper):
     """PyYAML's writer with the same types, so that it quotes what they would read otherwise."""
 
-    yaml_implicit_resolvers = _Loader.yaml_implicit_resolvers
+    yaml_implicit_resolvers = _Types.yaml_implicit_resolvers
 
 
 def _written(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
@@ -53,7 +74,7 @@ for _name, _pattern, _first in (
         list("-+.0123456789"),
     ),
 ):
-    _Loader.add_implicit_resolver(_TAG + _name, re.compile(rf"(?:{_pattern})\Z"), _first)
+    _Types.add_implicit_resolver(_TAG + _name, re.compile(rf"(?:{_pattern})\Z"), _first)
 
 
 def parse_yaml(text: str, file: Path) -> tuple[Any, dict[Place, int]]:
@@ -68,7 +89,7 @@ def parse_yaml(text: str, file: Path) -> tuple[Any, dict[Place, int]]:
     """
     reader = _Reader()
     try:
-        node = yaml.compose(text, Loader=_Loader)
+        node = _composed(text)
         data = reader.value(node, ()) if node is not None else None
     except yaml.YAMLError as error:
         raise AssignmentError(file, [_syntax(error, text)]) from error
@@ -80,6 +101,13 @@ def parse_yaml(text: str, file: Path) -> tuple[Any, dict[Place, int]]:
     if reader.problems:
         raise AssignmentError(file, reader.problems)
     return data, reader.lines
+
+
+def _composed(text: str) -> yaml.Node | None:
+    try:
+        return yaml.compose(text, Loader=_Loader)
+    except yaml.YAMLError:
+        return yaml.compose(text, Loader=_Explainer)
 
 
 def write_yaml(data: Any) -> str:
