@@ -1,5 +1,8 @@
 .PHONY: help setup demo test lint lock bench soak docs wheels clean
 
+# Images for containers often set it; then each of the many processes compiles all modules anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 PYTHON ?= python3
 run := .venv/bin/python
 
