@@ -13,6 +13,7 @@ from typing import Any
 from grader.assignment import rules, simulation
 from grader.assignment.binding import BoundCheck, bind
 from grader.assignment.contract.expand import expanded
+from grader.assignment.group import ungrouped
 from grader.assignment.interfaces import Interfaces, field_problems, interface_problems
 from grader.assignment.model import NOTHING_WITHHELD, Assignment, Scenario, Withheld
 from grader.assignment.own_check import lesson_checks
@@ -37,7 +38,7 @@ class LoadedAssignment:
         sha256: Hash over the paths and contents of the files in its folder, as hex.
         checks: One per entry of ``checks``, in the author's order.
         values: What stands in it for each variable: the author's examples at first.
-        source: The YAML as it is written, with the variables in it.
+        source: The YAML as it is written, with the variables in it, and without groups.
         given: Values from outside for every submission.
     """
 
@@ -110,7 +111,7 @@ def load_assignment(
     Mistakes in its form are reported first; without any, what does not fit together.
     """
     file = find_assignment(name)
-    written = read_source(file)
+    written = ungrouped(read_source(file))
     values = {name: str(one.example) for name, one in read_variables(written).items()}
     # A place that takes no variable is found here, and not when a submission is judged.
     expanded(written)

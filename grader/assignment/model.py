@@ -6,10 +6,11 @@ renders them.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
 
 from grader.assignment.contract.model import Contract
 from grader.assignment.limits import BuildLimitOptions, LimitOptions
@@ -29,7 +30,7 @@ from grader.spec.name import (
     Reliability,
     TopicName,
 )
-from grader.spec.quantity import Duration, DurationOrZero, PositiveLength, Ratio
+from grader.spec.quantity import Duration, DurationOrZero, PositiveLength, Ratio, refusal
 from grader.spec.source import Model
 from grader.spec.unit import parse_any
 from sim.description import LidarOptions, OdometryOptions, RobotOptions, SimulatorOptions, Topics
@@ -56,13 +57,40 @@ class RandomRange(Model):
         if isinstance(value, RandomRange):
             return value
         if not isinstance(value, list | tuple) or len(value) != 2:
-            raise ValueError("a random value is written as [lowest, highest]")
+            raise ValueError(
+                "a random value is written as [lowest, highest]; one that is the same in every run "
+                "stands under 'values'"
+            )
         (low, unit), (high, other) = parse_any(value[0]), parse_any(value[1])
         if unit != other:
             raise ValueError(f"the bounds {value[0]!r} and {value[1]!r} have different units")
         if low > high:
             raise ValueError(f"the lowest value {value[0]!r} is above the highest, {value[1]!r}")
         return {"low": low, "high": high, "unit": unit}
+
+
+@dataclass(frozen=True)
+class FixedValue:
+    """A number with any unit, in SI units, or without one."""
+
+    number: float
+    unit: str
+
+
+def _fixed(value: Any) -> FixedValue:
+    if isinstance(value, FixedValue):
+        return value
+    try:
+        number, unit = parse_any(value)
+    except ValueError as error:
+        raise refusal(str(error)) from None
+    # A parameter of the type integer takes no 3.0.
+    return FixedValue(value if isinstance(value, int) else number, unit)
+
+
+Fixed = Annotated[
+    FixedValue, PlainValidator(_fixed), WithJsonSchema({"type": ["number", "string"]})
+]
 
 
 ODOMETRY = "nav_msgs/msg/Odometry"
@@ -262,6 +290,11 @@ class Scenario(Model):
         description="Random values: name -> [lowest, highest], evenly distributed, from the "
         "scenario's seed. `$name` stands for the value in the world file and in the parameters "
         "of `launch`; checks name it without the dollar sign.",
+    )
+    values: dict[Id, Fixed] = Field(
+        default_factory=dict,
+        description="Values that are the same in every run, such as `{goal_x: 0.5}` or `{wall: "
+        "60 cm}`, to say them once. They are named like those of `random`.",
     )
     until: Until = Field(default_factory=Until, description="When to end early.")
     timeout: Duration = Field(description="End of the observation, counted from the first match.")
@@ -478,8 +511,10 @@ class Assignment(Model):
         "that grades, by `rosgrade underlay add`. Packages in a folder `packages` beside "
         "assignment.yaml need no entry.",
     )
-    scenarios: tuple[Scenario, ...] = Field((), description="The runs.")
-    checks: tuple[CheckSpec, ...] = Field(min_length=1, description="What is judged.")
+    scenarios: tuple[Scenario, ...] = Field((), description="The runs, or groups of them.")
+    checks: tuple[CheckSpec, ...] = Field(
+        min_length=1, description="What is judged, by single checks or groups of them."
+    )
     manual: tuple[ManualItem, ...] = Field(
         (), description="What a person judges, in addition to the checks."
     )

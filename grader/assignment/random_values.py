@@ -1,4 +1,4 @@
-"""Random values of a scenario: drawn from its seed, and put in the place of ``$name``."""
+"""Values of a scenario, fixed or drawn from its seed, put in the place of ``$name``."""
 
 from __future__ import annotations
 
@@ -15,19 +15,25 @@ if TYPE_CHECKING:
 _DECIMALS = 3
 
 
+def fixed_values(scenario: Scenario) -> dict[str, float]:
+    """The values of a scenario that are the same in every run, in SI units."""
+    return {name: fixed.number for name, fixed in scenario.values.items()}
+
+
 def draw_values(scenario: Scenario, seed: int) -> dict[str, float]:
-    """Draw the random values of a scenario."""
-    return {
+    """The values of a run of a scenario, in SI units: the fixed ones, and the random ones drawn."""
+    drawn = {
         name: round(random.Random(f"{seed}/{name}").uniform(bounds.low, bounds.high), _DECIMALS)
         for name, bounds in scenario.random.items()
     }
+    return {**fixed_values(scenario), **drawn}
 
 
 def world_values(scenario: Scenario, values: dict[str, float]) -> dict[str, str]:
     """The values as a world file wants them: with their unit."""
-    return {
-        name: f"{value!r} {scenario.random[name].unit}".strip() for name, value in values.items()
-    }
+    units = {name: bounds.unit for name, bounds in scenario.random.items()}
+    units |= {name: fixed.unit for name, fixed in scenario.values.items()}
+    return {name: f"{value!r} {units[name]}".strip() for name, value in values.items()}
 
 
 def fill_in(value: Any, values: dict[str, float]) -> Any:
@@ -39,7 +45,7 @@ def fill_in(value: Any, values: dict[str, float]) -> Any:
     if value.startswith("$"):
         name = value[1:]
         if name not in values:
-            raise UsageError(f"there is no random value {name!r}." + did_you_mean(name, values))
+            raise UsageError(f"there is no value {name!r}." + did_you_mean(name, values))
         return values[name]
     try:
         number, unit = parse_any(value)

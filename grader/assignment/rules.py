@@ -20,6 +20,7 @@ from grader.assignment.stimuli.stimulus_model import StimulusModel
 from grader.checks import need as needs
 from grader.checks.check import Subject
 from grader.errors import GraderFault, Problem
+from grader.findings.reference import Goal
 from grader.findings.value import same_value
 from grader.spec.document import Place
 from grader.spec.name import package_name
@@ -70,6 +71,8 @@ def _scenario(assignment: Assignment, scenario: Scenario) -> Iterator[tuple[Plac
     for number, topic in enumerate(topics):
         if topic in topics[:number]:
             yield ("record", number, "topic"), f"{topic!r} is recorded twice"
+    for name in sorted(scenario.random.keys() & scenario.values.keys()):
+        yield ("values", name), f"{name!r} is a random value too: leave one of them out"
     until = scenario.until
     for key in ("messages", "quiet"):
         if not topics and getattr(until, key) is not None:
@@ -154,12 +157,23 @@ def _check(assignment: Assignment, bound: BoundCheck) -> Iterator[tuple[Place, s
     for key, phase in spec.window.phases.items() if spec.window else ():
         for place, text in need_problems(assignment, replace(bound, parameters=phase), judged):
             yield (key, *place[1:]), text
+    yield from _unknown_values(bound, judged)
     for one in judged:
         if spec.from_ >= one.timeout:
             text = (
                 f"the scenario {one.id!r} ends after {format_duration(one.timeout)} at the latest"
             )
             yield ("from",), text
+
+
+def _unknown_values(bound: BoundCheck, judged: Sequence[Scenario]) -> Iterator[tuple[Place, str]]:
+    """Names in parameters for which a scenario that the check judges has no value."""
+    for key, goal in bound.parameters:
+        for one in judged if isinstance(goal, Goal) else ():
+            known = {**one.values, **one.random}
+            for name in (name for name in goal.names if name not in known):
+                advice = nearest_or_all(name, known, "It has")
+                yield ("with", key), f"the scenario {one.id!r} has no value {name!r}.{advice}"
 
 
 def _other_programs(scenarios: Sequence[Scenario]) -> Iterator[tuple[Place, str]]:

@@ -7,11 +7,12 @@ An editor finds a schema by a comment at the top of the file::
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
+from grader.assignment.group import MODELS, OF_EACH
 from grader.assignment.model import Assignment, CheckSpec
 from grader.assignment.mutant import MutantFile
 from grader.checks.catalogue import CATALOGUE
@@ -22,7 +23,7 @@ from grader.spec.source import Model
 def assignment_schema(catalogue: Mapping[str, Check] = CATALOGUE) -> dict[str, Any]:
     """The schema of ``assignment.yaml``, with the parameters of every check."""
     parameters = [check.parameters for check in catalogue.values()]
-    references, schema = _schemas(Assignment, CheckSpec, *parameters)
+    references, schema = _schemas(Assignment, *MODELS.values(), *parameters)
     entry = schema["$defs"][references[CheckSpec]["$ref"].rpartition("/")[2]]
     families = "|".join(sorted({check.family for check in catalogue.values()}))
     of_the_lesson = {
@@ -52,7 +53,45 @@ def assignment_schema(catalogue: Mapping[str, Check] = CATALOGUE) -> dict[str, A
     whole["required"] = [name for name in whole["required"] if name not in made]
     whole["anyOf"] = [{"required": sorted(made)}, {"required": ["contract"]}]
     schema["$defs"]["Scenario"]["required"].remove("launch")
+    for key, model in MODELS.items():
+        whole["properties"][key]["items"] = _with_groups(key, references[model], schema)
     return {**references[Assignment], **schema}
+
+
+def _with_groups(key: str, reference: Mapping[str, Any], schema: Any) -> dict[str, Any]:
+    """An entry of a list, or a group; what its members need may stand in the group."""
+    name = reference["$ref"].rpartition("/")[2]
+    entry = schema["$defs"][name]
+    shared = {one: value for one, value in entry["properties"].items() if one not in OF_EACH}
+    if "points" in shared:
+        each = {"type": "object", "additionalProperties": shared["points"]}
+        shared["points"] = {**each, "description": "Points of the checks, by their ids."}
+    own = {one: value for one, value in entry["properties"].items() if one in OF_EACH}
+    schema["$defs"][f"{name}InGroup"] = {
+        "type": "object",
+        "description": entry["description"],
+        "properties": {**own, **_or_null(entry["properties"], besides=own)},
+        "additionalProperties": False,
+        "required": ["id"],
+    }
+    members = {"type": "array", "minItems": 1, "items": {"$ref": f"#/$defs/{name}InGroup"}}
+    schema["$defs"][f"{name}Group"] = {
+        "type": "object",
+        "description": f"What several {key} have in common, and these {key}.",
+        "properties": {**shared, key: {**members, "description": f"The {key} of the group."}},
+        "additionalProperties": False,
+        "required": [key],
+    }
+    group = {"$ref": f"#/$defs/{name}Group"}
+    return {"if": {"required": [key]}, "then": group, "else": dict(reference)}
+
+
+def _or_null(properties: Mapping[str, Any], besides: Container[str]) -> dict[str, Any]:
+    """The same keys; `null` takes away what a group says."""
+    null = {"type": "null"}
+    return {
+        name: {"anyOf": [value, null]} for name, value in properties.items() if name not in besides
+    }
 
 
 def mutants_schema() -> dict[str, Any]:

@@ -48,7 +48,8 @@ def validate(
     whole: Annotated[
         bool,
         typer.Option(
-            "--expanded", help="Print the YAML with all that the contract stands for, and stop."
+            "--expanded",
+            help="Print the YAML with all that contract and groups stand for, and stop.",
         ),
     ] = False,
 ) -> None:

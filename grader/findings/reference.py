@@ -1,4 +1,4 @@
-"""Parameters that are a number with its unit, or the name of a scenario's random value."""
+"""Parameters that are a number with its unit, or the name of a scenario's value."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from sim.motion import Pose, wrap_angle
 
 
 class UnknownValue(ValueError):
-    """A check names a random value that its scenario does not have."""
+    """A check names a value that its scenario does not have."""
 
     def __init__(self, name: str, values: Mapping[str, float]) -> None:
         listed = f" There are: {', '.join(sorted(values))}." if values else " It has none."
         super().__init__(
-            f"the scenario has no random value {name!r}." + (did_you_mean(name, values) or listed)
+            f"the scenario has no value {name!r}." + (did_you_mean(name, values) or listed)
         )
 
 
@@ -32,13 +32,18 @@ class Goal:
     """Where the robot shall end, as the YAML gives it.
 
     Attributes:
-        x: Metres, or the name of a random value; so is ``y``.
-        theta: Radians, or the name of a random value.
+        x: Metres, or the name of a value of the scenario; so is ``y``.
+        theta: Radians, or the name of such a value.
     """
 
     x: float | str
     y: float | str
     theta: float | str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The values that it names."""
+        return tuple(one for one in astuple(self) if isinstance(one, str))
 
     def pose(self, values: Mapping[str, float]) -> Pose:
         """The same in numbers, in the world's frame.
@@ -46,8 +51,8 @@ class Goal:
         Raises:
             UnknownValue: It names a value that is not among them.
         """
-        for name in astuple(self):
-            if isinstance(name, str) and name not in values:
+        for name in self.names:
+            if name not in values:
                 raise UnknownValue(name, values)
         x_m, y_m, theta_rad = (
             values[item] if isinstance(item, str) else item for item in astuple(self)
@@ -67,12 +72,12 @@ def _entry(name: str, value: Any) -> float | str:
     if isinstance(value, str) and re.fullmatch(ID, value):
         return value
     if isinstance(value, str) and value.startswith("$"):
-        text = f"checks take the bare name of a random value: write {value[1:]!r}"
+        text = f"checks take the bare name of a value: write {value[1:]!r}"
         raise refusal(f"{name}: {text}")
     try:
         return parse_quantity(value, Dimension.ANGLE) if name == "theta" else metres(value)
     except ValueError as error:
-        raise refusal(f"{name}: {error}, or name a random value") from None
+        raise refusal(f"{name}: {error}, or name a value of the scenario") from None
 
 
 def _write(goal: Goal) -> list[float | str]:
@@ -94,8 +99,8 @@ GoalPose = Annotated[
             "items": {"type": ["number", "string"]},
             "minItems": 3,
             "maxItems": 3,
-            "x-words": "[x, y, theta]: metres, and an angle with its unit; or names of random "
-            "values",
+            "x-words": "[x, y, theta]: metres, and an angle with its unit; or names of "
+            "values of the scenario",
         }
     ),
 ]

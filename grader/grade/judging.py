@@ -15,6 +15,7 @@ from grader.assignment.binding import BoundCheck
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Counts
 from grader.assignment.mutant import required_by
+from grader.assignment.random_values import fixed_values
 from grader.checks.check import Subject
 from grader.checks.parameter.parameter import PARAMETERS_GIVEN
 from grader.diagnosis.not_built import why_not_built
@@ -55,6 +56,7 @@ def judge_all(
     with speaking(submission.spoken(())):
         named = with_chosen_names(loaded, submission, recordings)
     loaded, submission = named.loaded, named.submission
+    recordings = _with_fixed_values(loaded, recordings)
     imported = with_runtime_imports(submission, recordings.values())
     known = _Known(loaded, imported, recordings, faults, named.unnamed)
     bound = {item.spec.id: item for item in loaded.checks}
@@ -247,6 +249,18 @@ def why_not_run(submission: SubmissionRecord, packages: Iterable[str]) -> Findin
                 expected=f"the package {package} to build, so that its nodes can be launched",
             )
     return None
+
+
+def _with_fixed_values(
+    loaded: LoadedAssignment, recordings: Mapping[str, Recording]
+) -> Mapping[str, Recording]:
+    """The recordings, also those from before a number got its name under ``values``."""
+    found = dict(recordings)
+    for scenario in loaded.assignment.scenarios:
+        fixed, recording = fixed_values(scenario), found.get(scenario.id)
+        if recording is not None and not fixed.keys() <= recording.values.keys():
+            found[scenario.id] = replace(recording, values={**fixed, **recording.values})
+    return found
 
 
 def _why_unusable(recording: Recording, scenario: str, submission: SubmissionRecord) -> str | None:

@@ -315,7 +315,7 @@ class Recording:
         truth: The simulated robot, step by step; empty in a scenario without a world.
         incidents: What the simulator noted.
         scene: World and robot, or None in a scenario without a world.
-        values: Random values of the scenario by name, in SI units.
+        values: Values of the scenario by name, fixed and random ones, in SI units.
         environment: ``ros_distro``, ``rmw``, ``python``, ``domain_id``, ``sandbox``, ...; the
             ``ros_imports`` that are installed; the ``parameters`` of the launch, by name;
             ``other_domains`` that the student joined;

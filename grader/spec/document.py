@@ -8,7 +8,7 @@ true, 750, text and eight.)
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -122,6 +122,16 @@ def path(place: Place) -> str:
     for step in place:
         text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else str(step)
     return text
+
+
+def places(value: Any, place: Place = ()) -> Iterator[Place]:
+    """The place of a value, and the places of all that is in it."""
+    yield place
+    steps = (
+        value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    )
+    for step in steps:
+        yield from places(value[step], (*place, step))
 
 
 class _Reader:

@@ -55,9 +55,9 @@ class Source:
 
     def problem(self, place: Place, message: str) -> Problem:
         """A problem at a place of this document."""
-        return Problem(message=message, line=self.line(place), where=path(self._written(place)))
+        return Problem(message=message, line=self.line(place), where=path(self.written(place)))
 
-    def _written(self, place: Place) -> Place:
+    def written(self, place: Place) -> Place:
         """Where the author wrote a part: of one that was made, what it was made from."""
         for end in range(len(place), 0, -1):
             origin = self.origins.get(place[:end])

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
 
 from grader.assignment.load import load_assignment
 from grader.assignment.model import Scenario
-from grader.assignment.random_values import draw_values, fill_in
+from grader.assignment.random_values import draw_values, fill_in, world_values
 from grader.errors import AssignmentError, UsageError
+from grader.report.drawing.path import targets
 
 YAML = """\
 rosgrade: 1
@@ -126,7 +128,7 @@ def test_a_robot_that_may_start_inside_a_wall_is_refused(tmp_path: Path) -> None
 def test_a_parameter_with_an_unknown_value_names_the_nearest(tmp_path: Path) -> None:
     told = refused(tmp_path, YAML.replace("goal: $x", "goal: $xx").replace("{x: [", "{xxx: ["))
     assert "assignment.yaml:9: " in told
-    assert "there is no random value 'xx'. Did you mean 'xxx'?" in told
+    assert "there is no value 'xx'. Did you mean 'xxx'?" in told
 
 
 def a_scenario(**changes: object) -> Scenario:
@@ -162,7 +164,7 @@ def test_parameters_are_filled_in(written: object, value: object) -> None:
 
 
 def test_a_value_that_was_not_drawn_is_refused() -> None:
-    with pytest.raises(UsageError, match="there is no random value 'y'"):
+    with pytest.raises(UsageError, match="there is no value 'y'"):
         fill_in("$y", {"x": 1.0})
 
 
@@ -178,3 +180,59 @@ def test_a_value_that_was_not_drawn_is_refused() -> None:
 def test_bounds_that_make_no_sense_are_refused(bounds: list[str], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         a_scenario(random={"x": bounds})
+
+
+def test_fixed_values_are_the_same_numbers_in_every_run() -> None:
+    values = {"turn": "90 deg", "wall": "60 cm", "legs": 3}
+    scenario = a_scenario(values=values, random={"x": ["1 m", "2 m"]})
+    first, second = (draw_values(scenario, seed) for seed in (1, 2))
+    assert first.pop("x") != second.pop("x")
+    assert first == second == {"turn": math.pi / 2, "wall": 0.6, "legs": 3}
+    assert world_values(scenario, first)["wall"] == "0.6 m"
+    assert repr(fill_in("$legs", first)) == "3"
+
+
+FIXED = YAML.replace("random: {x: [1 m, 2 m]}", "values: {x: 1.5 m}")
+REACHES = "  - {id: there, uses: motion.reaches, with: {goal: %s, position: 5 cm}, points: 1}\n"
+
+
+def test_a_fixed_value_stands_in_world_launch_and_checks(tmp_path: Path) -> None:
+    loaded = load_assignment(lesson(tmp_path, FIXED + REACHES % "[x, 0, 0 deg]"))
+    [scenario] = loaded.assignment.scenarios
+    assert fill_in(scenario.launch[0].parameters["goal"], draw_values(scenario, 1)) == 1.5
+    [there] = targets(loaded.assignment, "run", {})
+    assert there.pose.x_m == 1.5
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "values: {x: 1.5 m}",
+            "values: {x: 1.5 furlong}",
+            "8: scenarios[0].values.x: unknown unit 'furlong' in '1.5 furlong'",
+        ),
+        (
+            "values: {x: 1.5 m}",
+            "random: {x: 1.5 m}",
+            "8: scenarios[0].random.x: a random value is written as [lowest, highest]; one that is "
+            "the same in every run stands under 'values'",
+        ),
+        (
+            "values: {x: 1.5 m}",
+            "values: {x: 1.5 m}\n    random: {x: [1 m, 2 m]}",
+            "8: scenarios[0].values.x: 'x' is a random value too: leave one of them out",
+        ),
+        (
+            "goal: [x, 0",
+            "goal: [y, 0",
+            "14: checks[2].with.goal: the scenario 'run' has no value 'y'. It has: x.",
+        ),
+    ],
+)
+def test_values_that_make_no_sense_are_refused(
+    old: str, new: str, said: str, tmp_path: Path
+) -> None:
+    yaml = FIXED + REACHES % "[x, 0, 0 deg]"
+    assert yaml.count(old) == 1
+    assert f"assignment.yaml:{said}" in refused(tmp_path, yaml.replace(old, new))

@@ -142,7 +142,7 @@ VALUES = [
     (
         "message: {data: $gaol}",
         "std_msgs/msg/UInt8",
-        r"no random value 'gaol'. Did you mean 'goal'",
+        r"no value 'gaol'. Did you mean 'goal'",
     ),
     ("message: {linear: {w: 1}}", "geometry_msgs/msg/Twist", r"no field 'w'. It has: x, y, z"),
     ("message: {data: 1}", "std_msgs/msg/Float64MultiArray", "data: expected a list, not 1"),

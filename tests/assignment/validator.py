@@ -83,6 +83,7 @@ _KEYWORDS: dict[str, Any] = {
     "anyOf": lambda v, a, s, r: any(valid(v, one, r) for one in a),
     "oneOf": lambda v, a, s, r: sum(valid(v, one, r) for one in a) == 1,
     "allOf": lambda v, a, s, r: all(valid(v, one, r) for one in a),
-    "if": lambda v, a, s, r: not valid(v, a, r) or valid(v, s.get("then", True), r),
+    "if": lambda v, a, s, r: valid(v, s.get("then" if valid(v, a, r) else "else", True), r),
     "then": lambda v, a, s, r: True,
+    "else": lambda v, a, s, r: True,
 }

@@ -310,7 +310,7 @@ def test_a_goal_by_names_of_random_values():
         "motion.reaches", simulated(run.truth, run.scene, values={"goal_a": 1}), **named
     )
     assert finding.status is Status.ERROR
-    assert "no random value 'goal_x'. Did you mean 'goal_a'?" in finding.observed
+    assert "no value 'goal_x'. Did you mean 'goal_a'?" in finding.observed
 
 
 def test_to_turn_on_the_spot_towards_the_goal_is_the_first_phase():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from grader.assignment.model import Launch
+from grader.assignment.model import Launch, Scenario
 from grader.checks.check import Subject
 from grader.checks.motion.robot_check import RobotParameters
 from grader.findings.finding import Evidence, Finding, Moment, Status, Verdict
@@ -482,3 +482,16 @@ def test_a_launch_file_names_its_nodes_itself():
     )
     result = judge_all(loaded, make_submission(), {"listen": make_recording()})
     assert result.names == {"listen": Names()}
+
+
+def test_a_number_that_gets_a_name_is_known_of_recordings_from_before():
+    asked = Told("arrives")
+    loaded = make_loaded([asked])
+    [scenario] = loaded.assignment.scenarios
+    named = Scenario.model_validate(
+        {"id": scenario.id, "launch": scenario.launch, "timeout": "5 s", "values": {"x": 1, "y": 2}}
+    )
+    assignment = loaded.assignment.model_copy(update={"scenarios": (named,)})
+    loaded = replace(loaded, assignment=assignment)
+    judge_all(loaded, make_submission(), {"listen": make_recording(values={"y": 3.0})})
+    assert asked.asked[0].values == {"x": 1, "y": 3.0}

@@ -49,7 +49,7 @@ class TestReferences:
         assert math.isclose(pose.yaw_rad, 4.0 - math.tau)
 
     def test_an_unknown_name_is_refused(self):
-        with pytest.raises(UnknownValue, match=r"no random value 'goal_z'\. Did you mean 'goal_x'"):
+        with pytest.raises(UnknownValue, match=r"no value 'goal_z'\. Did you mean 'goal_x'"):
             Goal("goal_z", 0.0, 0.0).pose({"goal_x": 1.0})
         with pytest.raises(UnknownValue, match="It has none"):
             Goal("goal_z", 0.0, 0.0).pose({})

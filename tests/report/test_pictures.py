@@ -82,7 +82,9 @@ class TestPath:
                 "with": {"places": [[0.3, 0.0], [0.2, 0.1, 0.4, 0.3]], "position": "5 cm"},
             }
         ]
-        lesson = SimpleNamespace(checks=[CheckSpec.model_validate(one) for one in checks])
+        lesson = SimpleNamespace(
+            checks=[CheckSpec.model_validate(one) for one in checks], scenarios=()
+        )
         point, zone = targets(lesson, "run", {})
         assert (point.radius_m, zone.corners[0], zone.corners[2]) == (0.05, (0.2, 0.1), (0.4, 0.3))
         figure = draw_path(stopped, (point, zone), "p")

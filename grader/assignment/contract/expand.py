@@ -9,7 +9,7 @@ from typing import Any
 from grader.assignment.contract.derive import Derivation
 from grader.assignment.contract.model import Contract
 from grader.errors import AssignmentError
-from grader.spec.document import Place
+from grader.spec.document import Place, places
 from grader.spec.source import Source, in_order
 from sim.description import Topics
 
@@ -86,12 +86,12 @@ class _Written:
     def __init__(self, source: Source) -> None:
         self.source = source
         self.lines = dict(source.lines)
-        self.origins: dict[Place, Place] = {}
+        self.origins = dict(source.origins)
 
     def stand_for(self, place: Place, value: Any, origin: Place) -> None:
         """Give a part that is made the line of the part of the contract that it comes from."""
         self.origins[place] = origin
-        self.lines.update(dict.fromkeys(_places(place, value), self.source.line(origin) or 1))
+        self.lines.update(dict.fromkeys(places(value, place), self.source.line(origin) or 1))
 
     def differs(self, place: Place, made: dict[str, Any], origin: Place) -> None:
         """Note what of an entry the author wrote under its id."""
@@ -106,10 +106,11 @@ class _Written:
         entries = {place: line for place, line in self.lines.items() if place[:1] == (key,)}
         self.lines = {place: line for place, line in self.lines.items() if place not in entries}
         self.lines[key,] = entries.pop((key,), self.source.line((KEY,)) or 1)
+        self.origins = {to: written for to, written in self.origins.items() if to[0] != key}
         for place, line in entries.items():
-            moved = (key, int(place[1]) + by)
-            self.lines[(*moved, *place[2:])] = line
-            self.origins[moved] = place[:2]
+            moved = (key, int(place[1]) + by, *place[2:])
+            self.lines[moved] = line
+            self.origins[moved] = self.source.written(place)
 
     def package(self, contract: Contract, name: str) -> dict[str, Any]:
         """The entry of ``packages``."""
@@ -182,12 +183,3 @@ def _command_topic(scenario: dict[str, Any]) -> str:
     for key in ("command", "topic"):
         command = command.get(key) if isinstance(command, dict) else None
     return command if isinstance(command, str) else Topics().command.topic
-
-
-def _places(place: Place, value: Any) -> Iterator[Place]:
-    yield place
-    steps = (
-        value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
-    )
-    for step in steps:
-        yield from _places((*place, step), value[step])

@@ -55,7 +55,7 @@ def read_message(
 
     Args:
         value: Fields by name, nested or by path (``linear.x``, ``data[0]``).
-        drawn: Random values by name, which ``$name`` stands for.
+        drawn: Values of the scenario by name, which ``$name`` stands for.
         place: Of the value, for errors.
     """
     found = _Reader(find, drawn, place).message(value, interface, ())
@@ -163,7 +163,7 @@ class _Reader:
         if text.startswith("$"):
             if text[1:] not in self.drawn:
                 advice = did_you_mean(text[1:], self.drawn)
-                message = f"{path(place)}: there is no random value {text[1:]!r}.{advice}"
+                message = f"{path(place)}: there is no value {text[1:]!r}.{advice}"
                 raise StimulusError(message, (*self.base, *place))
             return self.drawn[text[1:]]
         # A whole number of 64 bits does not survive as a float.

@@ -40,7 +40,7 @@ class Making:
     Attributes:
         folder: Of the assignment.
         find: Finds the definitions of messages.
-        drawn: Random values by name.
+        drawn: Values of the scenario by name.
         processes: What is launched, each as ``package/executable``.
     """
 

@@ -29,7 +29,7 @@ class GoalParameters(RobotParameters):
 
     goal: GoalPose = Field(
         description="Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or "
-        "random values."
+        "names of the scenario's values."
     )
     position: PositiveLength = Field(0.1, description="How near the goal counts as reached.")
 

@@ -13,6 +13,7 @@ from markupsafe import Markup
 from pydantic import TypeAdapter, ValidationError
 
 from grader.assignment.model import Assignment, Visibility
+from grader.assignment.random_values import fixed_values
 from grader.checks.motion.route import Place
 from grader.findings.reference import Goal, GoalPose, UnknownValue
 from grader.findings.words import counted, listing, metres
@@ -37,6 +38,8 @@ def targets(
 ) -> tuple[Target, ...]:
     """The goals and places that visible checks name for a scenario, each once."""
     found: dict[tuple[Pose, str], Target] = {}
+    fixed = next((fixed_values(one) for one in assignment.scenarios if one.id == scenario), {})
+    values = {**fixed, **values}
     # A check that says how near goes before one that leaves it to the default.
     for check in sorted(assignment.checks, key=lambda check: "position" not in check.with_):
         judged = not check.scenarios or scenario in check.scenarios
