@@ -6,11 +6,10 @@ renders them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from grader.assignment.contract.model import Contract
 from grader.assignment.limits import BuildLimitOptions, LimitOptions
@@ -30,7 +29,7 @@ from grader.spec.name import (
     Reliability,
     TopicName,
 )
-from grader.spec.quantity import Duration, DurationOrZero, PositiveLength, Ratio, refusal
+from grader.spec.quantity import Duration, DurationOrZero, PositiveLength, Ratio
 from grader.spec.source import Model
 from grader.spec.unit import parse_any
 from sim.description import LidarOptions, OdometryOptions, RobotOptions, SimulatorOptions, Topics
@@ -69,28 +68,25 @@ class RandomRange(Model):
         return {"low": low, "high": high, "unit": unit}
 
 
-@dataclass(frozen=True)
-class FixedValue:
-    """A number with any unit, in SI units, or without one."""
+class FixedValue(Model):
+    """A number, in SI units where it has a unit."""
 
-    number: float
-    unit: str
+    number: int | float
+    unit: str = ""
 
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> dict[str, Any]:
+        """Describe it to an editor as it is written."""
+        return {"type": ["number", "string"]}
 
-def _fixed(value: Any) -> FixedValue:
-    if isinstance(value, FixedValue):
-        return value
-    try:
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, value: Any) -> Any:
+        if isinstance(value, FixedValue):
+            return value
         number, unit = parse_any(value)
-    except ValueError as error:
-        raise refusal(str(error)) from None
-    # A parameter of the type integer takes no 3.0.
-    return FixedValue(value if isinstance(value, int) else number, unit)
-
-
-Fixed = Annotated[
-    FixedValue, PlainValidator(_fixed), WithJsonSchema({"type": ["number", "string"]})
-]
+        # A parameter of the type integer takes no 3.0.
+        return {"number": value if isinstance(value, int) else number, "unit": unit}
 
 
 ODOMETRY = "nav_msgs/msg/Odometry"
@@ -291,7 +287,7 @@ class Scenario(Model):
         "scenario's seed. `$name` stands for the value in the world file and in the parameters "
         "of `launch`; checks name it without the dollar sign.",
     )
-    values: dict[Id, Fixed] = Field(
+    values: dict[Id, FixedValue] = Field(
         default_factory=dict,
         description="Values that are the same in every run, such as `{goal_x: 0.5}` or `{wall: "
         "60 cm}`, to say them once. They are named like those of `random`.",
