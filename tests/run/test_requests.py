@@ -116,22 +116,21 @@ def test_a_service_that_is_not_there_does_not_hold_the_run_up(run_node: RunNode)
 @pytest.mark.ros
 @pytest.mark.skipif("lifecycle_msgs" not in ros.find().packages, reason="no lifecycle_msgs here")
 def test_a_lifecycle_node_goes_through_its_states(run_node: RunNode) -> None:
-    state = {"call": "/bot/get_state", "type": "lifecycle_msgs/srv/GetState"}
-    change = {"call": "/bot/change_state", "type": "lifecycle_msgs/srv/ChangeState"}
     recording = run_node(
         LIFECYCLE,
         record=[],
         stimuli=[
-            state,
-            {**change, "request": {"transition.id": 1}, "after": "500 ms"},
-            {**state, "after": "1 s"},
-            {**change, "request": {"transition.id": 3}, "after": "1500 ms"},
-            {**state, "after": "2 s"},
+            {"lifecycle": "bot", "do": ["configure", "activate"], "every": "300 ms"},
+            {"lifecycle": "bot", "do": ["activate", "shutdown"], "after": "1 s"},
         ],
         until={"stimuli": "done"},
         timeout="20 s",
     )
-    wanted = {"node": "bot", "states": ["unconfigured", "inactive", "active"]}
+    stays_ns = [call.requested_ns for call in recording.calls if call.service == "/bot/get_state"]
+    assert min(later - one for one, later in zip(stays_ns[:2], stays_ns[1:3])) >= 300 * 10**6
+    # It cannot be activated twice.
+    states = ["unconfigured", "inactive", "active", "active", "active", "finalized"]
+    wanted = {"node": "bot", "states": states}
     finding = judge("lifecycle.state", recording, **wanted)
     assert finding.status is Status.PASSED, finding
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from grader.assignment.stimuli.kinds.request import CallService
+from grader.assignment.stimuli.kinds.request import CallService, Lifecycle
 from grader.recording.interaction import NO_SERVER
 from grader.recording.model import NS
 from grader.run.host.disturbance import Stopwatch
@@ -134,12 +134,15 @@ class Requesting(Playing):
             self._ready.look()
 
 
-@plays(CallService)
+@plays(CallService, Lifecycle)
 class Calling(Requesting):
-    """Requests to one service, one after another or several at once."""
+    """Requests to services of one node, one after another or several at once."""
 
-    def __init__(self, order: CallService, context: StimulusContext) -> None:
-        super().__init__(order, f"a service {order.call}", order.call, context)
+    def __init__(self, order: CallService | Lifecycle, context: StimulusContext) -> None:
+        self._asked = order.asked
+        self._services = {one.service: one.type for one in self._asked}
+        service = self._asked[0].service
+        super().__init__(order, f"a service {service}", service, context)
         self._started = False
         self._sent = 0
         self._sent_s = 0.0
@@ -148,23 +151,21 @@ class Calling(Requesting):
 
     @property
     def is_through(self) -> bool:
-        """Whether later requests need not wait; a sequence with its own pace holds up none."""
-        return self.is_done or (self._order.every is not None and self._sent > 0)
+        """Whether later requests need not wait."""
+        return self.is_done or (self._sent > 0 and not self._order.in_turn)
 
     @property
     def is_done(self) -> bool:
         """Whether everything was sent, and answered or waited for; or there is no server."""
         if self._failed is not None or self._ready.given_up:
             return True
-        return self._sent >= len(self._order.given) and self._is_over
+        return self._sent >= len(self._asked) and self._is_over
 
     @property
     def due_s(self) -> float | None:
         """When to look next."""
-        every_s = self._order.every
-        if every_s is not None and 0 < self._sent < len(self._order.given):
-            return float(self._sent_s + every_s)
-        return super().due_s
+        pause_s = self._asked[self._sent].pause_s if 0 < self._sent < len(self._asked) else None
+        return super().due_s if pause_s is None else self._sent_s + pause_s
 
     def play(self, elapsed_s: float) -> None:
         """Call when it is due."""
@@ -174,35 +175,38 @@ class Calling(Requesting):
         super().play(elapsed_s)
         if not self._started:
             try:
-                there = calls.is_ready(order.call, order.type)
+                there = all(calls.is_ready(*one) for one in self._services.items())
             except ImportError as error:
-                self._failed = f"the interface {order.type} is not installed ({error})"
+                types = " and ".join(self._services.values())
+                self._failed = f"the interface {types} is not installed ({error})"
                 return
             self._started = self._ready.met(there) and self._is_turn
-        if not self._started or self._sent >= len(order.given):
+        if not self._started or self._sent >= len(self._asked):
             return
         if self._sent and not self._is_next_due:
             return
-        request = order.given[self._sent]
-        self._round = [calls.send(order.call, order.type, request) for _ in range(order.at_once)]
+        one = self._asked[self._sent]
+        at_once = range(order.at_once)
+        self._round = [calls.send(one.service, one.type, one.fields) for _ in at_once]
         self._sent += 1
         self._sent_s = elapsed_s
         self._wait_for_answer()
 
     def finish(self) -> None:
         """Note what could not be sent, unless it was not due yet."""
-        order, note = self._order, self._context.calls.note_unsent
         if self._failed is not None or self._ready.is_in_vain:
-            error = self._failed or NO_SERVER
-            note(order.call, order.type, order.given[self._sent], error)
+            self._note_unsent(self._failed or NO_SERVER)
         elif self._ready.never_answered and not self._started:
-            note(order.call, order.type, order.given[0], "", self._ready.there_ns)
+            self._note_unsent("", self._ready.there_ns)
+
+    def _note_unsent(self, error: str, since_ns: int = 0) -> None:
+        one = self._asked[self._sent]
+        self._context.calls.note_unsent(one.service, one.type, one.fields, error, since_ns)
 
     @property
     def _is_next_due(self) -> bool:
-        if self._order.every is not None:
-            return bool(self._now_s - self._sent_s >= self._order.every)
-        return self._is_over
+        pause_s = self._asked[self._sent].pause_s
+        return self._is_over if pause_s is None else self._now_s - self._sent_s >= pause_s
 
     @property
     def _is_over(self) -> bool:

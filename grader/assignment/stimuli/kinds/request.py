@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -55,6 +56,20 @@ class ListParameters(StimulusModel):
         return False
 
 
+@dataclass(frozen=True)
+class Request:
+    """One request to a service.
+
+    Attributes:
+        pause_s: Time after the request before it; None to wait for the answer to that one.
+    """
+
+    service: str
+    type: str
+    fields: Mapping[str, Any]
+    pause_s: float | None = None
+
+
 @kind
 class CallService(StimulusModel):
     """Call a service.
@@ -100,8 +115,18 @@ class CallService(StimulusModel):
 
     @property
     def given(self) -> tuple[dict[str, Any], ...]:
-        """Every request, in order."""
+        """The fields of every request, in order."""
         return self.requests or ((self.request or {},) * (self.count or 1))
+
+    @property
+    def asked(self) -> tuple[Request, ...]:
+        """Every request, in order."""
+        return tuple(Request(self.call, self.type, one, self.every) for one in self.given)
+
+    @property
+    def in_turn(self) -> bool:
+        """Whether later requests wait for all of its answers; one at its own pace runs beside."""
+        return self.every is None
 
     def prepared(self, making: Making) -> CallService:
         """The same with its requests read."""
@@ -110,6 +135,52 @@ class CallService(StimulusModel):
             for index, value in enumerate(self.given)
         )
         return self.model_copy(update={"requests": requests})
+
+
+@kind
+class Lifecycle(StimulusModel):
+    """Lead a lifecycle node through transitions, as `ros2 lifecycle set` does.
+
+    The probe calls `get_state` first and again after each transition (`change_state`).
+    """
+
+    key = "lifecycle"
+    provides = (Act.CALL,)
+
+    lifecycle: QualifiedNodeName = Field(
+        description="Name of the node: `bot` is `/bot`; with a namespace `/robot/bot`."
+    )
+    do: tuple[Literal["configure", "activate", "deactivate", "cleanup", "shutdown"], ...] = Field(
+        min_length=1, description="The transitions, one after another."
+    )
+    after: _After = 0.0
+    every: Duration | None = Field(
+        None,
+        description="How long the node stays in each state; by default the next transition "
+        "follows after the answer.",
+    )
+    within: _Within = 4.0
+
+    at_once: ClassVar[int] = 1
+    in_turn: ClassVar[bool] = True
+
+    @property
+    def subject(self) -> str:
+        """The service that it calls for the state."""
+        return f"{self.lifecycle}/get_state"
+
+    @property
+    def exchanged(self) -> tuple[str, str]:
+        """That service, and its type."""
+        return self.subject, "lifecycle_msgs/srv/GetState"
+
+    @property
+    def asked(self) -> tuple[Request, ...]:
+        """Every request, in order."""
+        change = f"{self.lifecycle}/change_state", "lifecycle_msgs/srv/ChangeState"
+        state = Request(*self.exchanged, {})
+        steps = (Request(*change, {"transition": {"label": one}}, self.every) for one in self.do)
+        return (state, *(request for step in steps for request in (step, state)))
 
 
 @kind
