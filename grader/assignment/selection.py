@@ -34,24 +34,18 @@ def select(
     _refuse_unknown("check", checks, requires, loaded)
     _refuse_unknown("scenario", scenarios, named, loaded)
     wanted = set(checks or requires).union(*(required_by(name, requires) for name in checks))
-    judged = {
-        bound.spec.id: tuple(
-            one.id for one in loaded.scenarios_of(bound) if one.id in (scenarios or named)
-        )
-        for bound in loaded.checks
-        if bound.spec.id in wanted
-    }
-    kept = [
-        bound
-        for bound in loaded.checks
-        if judged.get(bound.spec.id)
-        or (bound.spec.id in wanted and bound.check.subject is Subject.SUBMISSION)
-    ]
-    ids = {bound.spec.id for bound in kept}
+    kept = {}
+    for bound in loaded.checks:
+        of_it = loaded.scenarios_of(bound)
+        judged_in = tuple(one.id for one in of_it if one.id in (scenarios or named))
+        # What is handed in is judged without any run.
+        needs_none = bound.check.subject is Subject.SUBMISSION
+        if bound.spec.id in wanted and (judged_in or needs_none):
+            kept[bound.spec.id] = bound, judged_in
     parts = []
-    for bound in kept:
-        required = tuple(one for one in bound.spec.requires if one in ids)
-        changes = {"scenarios": judged[bound.spec.id], "requires": required}
+    for bound, judged_in in kept.values():
+        required = tuple(one for one in bound.spec.requires if one in kept)
+        changes = {"scenarios": judged_in, "requires": required}
         parts.append(dataclasses.replace(bound, spec=bound.spec.model_copy(update=changes)))
     needed = {scenario for bound in parts for scenario in bound.spec.scenarios}
     assignment = loaded.assignment.model_copy(

@@ -36,10 +36,12 @@ class NotCanceled(Symptom[Finding], concept="executors"):
 
     @property
     def is_untaken(self) -> bool:
-        """Whether the server took in that it should cancel only when the goal ended, or never."""
+        """Whether the server did not handle the request to cancel, or only when the goal ended."""
         answered_ns, asked_ns = self.goal.cancel_answered_ns, self.goal.canceled_ns or 0
-        if answered_ns is None or self.goal.result_ns is None:
-            return answered_ns is None
+        if answered_ns is None:
+            return True
+        if self.goal.result_ns is None:
+            return False
         # An executor that was busy until then answers right before it tells the result.
         waited = (answered_ns - asked_ns) / max(self.goal.result_ns - asked_ns, 1)
         return waited >= _AT_THE_END

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
@@ -12,17 +9,13 @@ from grader.checks.need import Act, Doubt, Stimulated
 from grader.checks.requests import timeline
 from grader.checks.service.service import judged_calls, why_slow
 from grader.diagnosis.explanation import mistaken
-from grader.diagnosis.no_endpoint import SERVICE, offered
-from grader.diagnosis.no_node import why_not_node
+from grader.diagnosis.never_so import transition, why_not_managed
 from grader.diagnosis.process.not_called import ANSWER_S
 from grader.diagnosis.process.process_exit import why_ended
-from grader.findings.finding import Evidence, Finding, nodes_seen
+from grader.findings.finding import Evidence, Finding
 from grader.findings.words import code, counted, listing
 from grader.recording.model import Call, Recording
 from grader.spec.name import QualifiedNodeName
-
-# By their ids in lifecycle_msgs/msg/Transition.
-_TRANSITIONS = ("create", "configure", "cleanup", "activate", "deactivate", *("shutdown",) * 3)
 
 
 class State(Parameters):
@@ -87,20 +80,3 @@ def _state(call: Call) -> str:
     """The label, or else the number, of the state in an answer."""
     found = (call.response or {}).get("current_state", {})
     return str(found.get("label") or found.get("id", ""))
-
-
-def transition(call: Call) -> str:
-    """The label of the transition that a call of ``change_state`` asks for."""
-    asked: Mapping[str, Any] = (call.request or {}).get("transition", {})
-    number = asked.get("id", 0)
-    return asked.get("label") or dict(enumerate(_TRANSITIONS)).get(number, str(number))
-
-
-def why_not_managed(recording: Recording, node: str) -> Finding | None:
-    """Why a lifecycle node is not there, or not one; None if it is."""
-    service = f"{node}/get_state"
-    missing = why_not_node(recording, node)
-    if missing is not None or offered(recording, SERVICE, service):
-        return missing
-    seen = f"{code(node)} is no lifecycle node: it has no service {code(service)}"
-    return mistaken("unmanaged", seen, Evidence(moments=nodes_seen(recording)))

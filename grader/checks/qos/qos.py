@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
@@ -128,21 +128,13 @@ def _judge(recording: Recording, parameters: Profile) -> Finding:
         source = ", declared by the process"
     for node, qos in profiles:
         wrong = _wrong(qos, parameters)
-        if not wrong:
-            continue
-        differences = ", ".join(
-            f"{name} {_words(actual)} instead of {_words(item)}"
-            for name, (item, actual) in wrong.items()
-        )
-        matches = not refusals(*sides(kind, qos, parameters.qos))
-        still = "; a {} would still match it" if matches else ": a {} does not match it"
-        own = [item for item in endpoints if item.qos is qos]
-        seen = endpoints_seen(recording, own) or first_seen(
-            recording, recording.on(parameters.topic)
-        )
-        differing = f"the {kind.value} of {code(node)} {has} {differences}{source}"
-        still = still.format(f"{other_end} the expected profile")
-        return _mistaken(parameters, wrong, f"{differing}{still}", Evidence(moments=seen))
+        if wrong:
+            own = [item for item in endpoints if item.qos is qos]
+            messages = recording.on(parameters.topic)
+            moments = endpoints_seen(recording, own) or first_seen(recording, messages)
+            seen = f"the {kind.value} of {code(node)} {has} {_differences(wrong)}{source}"
+            seen += _consequence(qos, parameters, other_end)
+            return _mistaken(parameters, wrong, seen, Evidence(moments=moments))
     hidden = [
         name
         for name in parameters.policies
@@ -153,6 +145,20 @@ def _judge(recording: Recording, parameters: Profile) -> Finding:
         return Finding.ours(f"{names} of the {kind.value} was not discovered")
     observed = f"{did} by {counted(len(profiles), kind.value)}{source}"
     return Finding.as_asked(observed)
+
+
+def _differences(wrong: Mapping[str, tuple[Any, Any]]) -> str:
+    return ", ".join(
+        f"{name} {_words(actual)} instead of {_words(wanted)}"
+        for name, (wanted, actual) in wrong.items()
+    )
+
+
+def _consequence(qos: Qos, parameters: Profile, other_end: str) -> str:
+    """Whether a profile still matches those that the expected one is made for."""
+    peer = f"a {other_end} the expected profile"
+    refused = refusals(*sides(parameters.kind, qos, parameters.qos))
+    return f": {peer} does not match it" if refused else f"; {peer} would still match it"
 
 
 def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
@@ -226,8 +232,8 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
         own = recording.student_endpoints(kind, parameters.topic)
         messages = recording.on(parameters.topic)
         seen = endpoints_seen(recording, own) or first_seen(recording, messages)
-        third = "third" if kind is Kind.PUBLISHER else "fourth"
-        texts = {"third": str(third), "kind": kind.value, "depth": str(parameters.depth)}
+        argument = "third" if kind is Kind.PUBLISHER else "fourth"
+        texts = {"argument": argument, "kind": kind.value, "depth": parameters.depth}
         return mistaken("other_depth", observed, Evidence(moments=seen), **texts)
     if any(queue.depth is None for queue in declared):
         return Finding.ours("the depth cannot be seen: the process declared no number")
