@@ -193,7 +193,9 @@ def checks_markdown() -> dict[str, str]:
 
 def explanations_markdown() -> dict[str, str]:
     """What rosgrade can tell a student: causes by symptom, and what is seen at once."""
-    symptoms = [(_sentence(symptom), entries) for symptom, entries in explanations().items()]
+    # What others are derived from is seen by no check.
+    found = {one: entries for one, entries in explanations().items() if not one.__subclasses__()}
+    symptoms = [(_sentence(symptom), entries) for symptom, entries in found.items()]
     symptoms.sort(key=lambda item: item[0])
     errors = [item for item in symptoms if len(item[1]) > _MOST_ENTRIES]
     others = [item for item in symptoms if item not in errors]

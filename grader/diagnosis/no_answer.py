@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
-from grader.diagnosis.explanation import cause_of, explanation, mistaken, remedy
+from grader.diagnosis.explanation import cause_of, explanation, mistaken
 from grader.diagnosis.no_endpoint import Word, offered
 from grader.diagnosis.process.not_called import (
     NotCalled,
@@ -13,21 +13,14 @@ from grader.diagnosis.process.not_called import (
     blocked_executor,
     never_spun,
 )
-from grader.diagnosis.process.process_exit import ended_early, exited, why_it_exited
-from grader.diagnosis.process.raised import (
-    in_brackets,
-    own_frames,
-    parse_failures,
-    raised_at,
-)
+from grader.diagnosis.process.process_exit import exited
 from grader.diagnosis.process.standing import where_it_stands
-from grader.findings.finding import Evidence, Finding, evidence_at, moment
+from grader.findings.finding import Evidence, Finding, evidence_at
 from grader.measure import declarations
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
 from grader.spec.unit import format_duration
 
-_LOG_LINES = 10
 _ROUNDING_S = 1e-6
 
 
@@ -76,9 +69,20 @@ class NoAnswer(NotCalled, concept="executors"):
         return () if process is None else (process,)
 
     @property
+    def ended(self) -> Sequence[Process]:
+        """The process of the node, if it did; any where that is not known."""
+        return [one for one in exited(self.recording) if one in (self.processes or [one])]
+
+    @property
     def since_ns(self) -> int:
         """When it was asked."""
         return self.asked_ns
+
+    @property
+    def excuse(self) -> Finding | None:
+        """The machine's doing, if it took as much as the answer was too late."""
+        end_ns = self.recording.stop_ns
+        return why_taken(self.recording, self.what, self.asked_ns, end_ns, self.within_s)
 
     @property
     def spins(self) -> bool | None:
@@ -118,25 +122,6 @@ def why_late(
     return taken or mistaken(mistake, seen, evidence)
 
 
-@explanation(NoAnswer)
-def process_gone(symptom: NoAnswer) -> Finding | None:
-    """The process ended."""
-    return why_gone(symptom.recording, symptom.what, symptom.node)
-
-
-@explanation(NoAnswer)
-def no_cpu_time(symptom: NoAnswer) -> Finding | None:
-    """The machine gave the process too little CPU time; this is an error and costs no points."""
-    recording = symptom.recording
-    return why_taken(recording, symptom.what, symptom.asked_ns, recording.stop_ns, symptom.within_s)
-
-
-@explanation(NoAnswer, before=(never_spun,))
-def callback_raised(symptom: NoAnswer) -> Finding | None:
-    """A callback raised an exception."""
-    return why_raised(symptom.recording, symptom.what, symptom.asked_ns, symptom.processes)
-
-
 @explanation(NoAnswer, after=(never_spun,), before=(blocked_executor,))
 def busy_with_something_else(symptom: NoAnswer) -> Finding | None:
     """The executor is busy with what was asked before, such as a goal."""
@@ -148,15 +133,6 @@ def callback_does_not_answer(symptom: NoAnswer) -> Finding:
     """The callback does not finish, or waits for another callback of its group."""
     spins = ", although the node's executor spins" if symptom.spins else ""
     return symptom.placed(mistaken("callback_does_not_answer", f"{symptom.what}{spins}"))
-
-
-def why_gone(recording: Recording, what: str, node: str) -> Finding | None:
-    """Why the process of a node ended early, or None if it did not."""
-    process = declarations.process_of(recording, node)
-    ended = exited(recording) if process is None else (process,)
-    if ended and ended_early(recording, ended[0]):
-        return why_it_exited(recording, ended[0]).after(what)
-    return None
 
 
 def why_taken(
@@ -174,38 +150,3 @@ def why_taken(
     if stolen_s <= 0.0 or stolen_s < excess_s:
         return None
     return Finding.held_up(what, stolen_s)
-
-
-def why_raised(
-    recording: Recording, what: str, begin_ns: int, processes: Iterable[Process] | None = None
-) -> Finding | None:
-    """An exception that a process printed and survived from a time on; None if there is none.
-
-    Args:
-        processes: Whose; by default all.
-    """
-    for process in recording.processes if processes is None else processes:
-        lines = [
-            line
-            for line in recording.log
-            if line.process == process.name
-            and line.stream == "stderr"
-            and begin_ns <= line.time_ns <= recording.stop_ns
-        ]
-        failures = parse_failures([line.text for line in lines])
-        raised = next((item for item in reversed(failures) if not item.ignored), None)
-        if raised is None:
-            continue
-        place = raised_at(raised, recording)
-        return Finding(
-            f"{what}: an exception was raised meanwhile, {raised}{in_brackets(place)}",
-            remedy("named_line" if place else "read_message"),
-            Evidence(
-                moments=(moment(recording, "the exception", lines[-1].time_ns),),
-                places=(place,) if place else (),
-                log=tuple(
-                    own_frames([line.text for line in lines], recording.submission)[-_LOG_LINES:]
-                ),
-            ),
-        )
-    return None

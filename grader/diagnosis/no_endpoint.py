@@ -6,9 +6,9 @@ import re
 from dataclasses import dataclass
 
 from grader.diagnosis.destroyed_endpoint import why_dropped
-from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken
+from grader.diagnosis.explanation import cause_of, explanation, mistaken
 from grader.diagnosis.no_node import why_no_node
-from grader.diagnosis.process.process_exit import crashed, why_crashed
+from grader.diagnosis.process.process_exit import NotDone, process_ended
 from grader.diagnosis.undeclared import why_never_appeared
 from grader.findings.finding import Evidence, Finding, Table, evidence_at, nodes_seen
 from grader.findings.words import code, codes, type_in_code, worded
@@ -89,27 +89,22 @@ ENDPOINTS = {Kind.PUBLISHER: PUBLISHER, Kind.SUBSCRIPTION: SUBSCRIPTION}
 
 
 @dataclass(frozen=True)
-class NoEndpoint(Symptom[Finding], concept="names"):
+class NoEndpoint(NotDone, concept="names"):
     """A publisher, a subscription, a service, an action, or a client of one is missing.
 
     Attributes:
         types: Any of which it may have; empty where any will do.
     """
 
-    recording: Recording
     word: Word
     name: str
     types: tuple[str, ...] = ()
+    only_failures = True
 
     @property
     def there(self) -> tuple[Service, ...]:
         """What the student's nodes have of this kind, without what every node has."""
         return _of_students(self.recording, self.word)
-
-    @property
-    def seen(self) -> str:
-        """The symptom in words."""
-        return f"there is no {self.word.noun} {code(self.name)}"
 
     @property
     def evidence(self) -> Evidence:
@@ -215,10 +210,10 @@ def other_interface(symptom: NoEndpoint) -> Finding | None:
     )
 
 
-@explanation(NoEndpoint)
+@explanation(NoEndpoint, before=(process_ended,))
 def misspelt_name(symptom: NoEndpoint) -> Finding | None:
     """Its name is misspelt, private, in a namespace, or in wrong upper or lower case."""
-    ended, wanted = crashed(symptom.recording), symptom.name
+    ended, wanted = symptom.ended, symptom.name
     # What a process that lives has is no misspelling of what another never came to create.
     suspects = [
         item
@@ -240,13 +235,7 @@ def misspelt_name(symptom: NoEndpoint) -> Finding | None:
     return mistaken(mistake, found, symptom.evidence, base=base, create=create) if match else None
 
 
-@explanation(NoEndpoint)
-def process_crashed(symptom: NoEndpoint) -> Finding | None:
-    """The process ended with a failure before it created it."""
-    return why_crashed(symptom.recording)
-
-
-@explanation(NoEndpoint)
+@explanation(NoEndpoint, after=(process_ended,))
 def dropped(symptom: NoEndpoint) -> Finding | None:
     """It ended with the constructor or the callback that created it."""
     kind = next((kind for kind, word in ENDPOINTS.items() if word is symptom.word), None)

@@ -13,10 +13,11 @@ from grader.diagnosis.no_messages import why_few, why_not_delivered
 from grader.diagnosis.process.not_called import (
     CalledLate,
     blocked_executor,
-    never_spun,
+    callback_raised,
+    no_cpu_time,
     slow_callbacks,
 )
-from grader.diagnosis.process.process_exit import why_ended
+from grader.diagnosis.process.process_exit import process_ended
 from grader.diagnosis.process.raised import defined_at
 from grader.diagnosis.wrong_value import factor_words
 from grader.findings.finding import Evidence, Finding, Moment, endpoints_seen, first_seen, moment
@@ -41,8 +42,6 @@ from grader.spec.unit import format_duration
 _LOG_LINES = 5
 # Messages that show the same: a single number may be like another by chance.
 _ALIKE = 2
-# Share of the time that the host may take before a missing line proves nothing.
-_STARVED = 0.5
 # What a subscription must request for the messages from before it was there.
 _KEEPS = ("transient_local", "unknown")
 _RESENDS = ("reliable", "unknown")
@@ -105,6 +104,16 @@ class NotLogged(CalledLate):
         return self.seen if self.found else f"{self.seen} within {limit} of it"
 
     @property
+    def excuse(self) -> Finding | None:
+        """The machine's doing, if enough lines came but for that, or nothing is proven."""
+        begin_ns, end_ns = self.wanted[0].message.stamp_ns, self.wanted[-1].due_ns + self.within_ns
+        recording = self.recording
+        found = echoes(recording, self.wanted, self.decimals, self.within_ns, forgive=True)
+        if len(found) < self.needed:
+            return self.starved(begin_ns, end_ns)
+        return Finding.held_up(self.late, recording.stolen_s(begin_ns, end_ns))
+
+    @property
     def near(self) -> list[LogLine]:
         """Lines that could have been an answer to a message."""
         begin_ns, end_ns = self.wanted[0].begin_ns, self.wanted[-1].due_ns + self.within_ns
@@ -129,19 +138,13 @@ class NotLogged(CalledLate):
         return Evidence(moments, self.places, (*log, line.text))
 
 
-@explanation(NotLogged)
+@explanation(NotLogged, before=(process_ended,))
 def not_delivered(symptom: NotLogged) -> Finding | None:
     """The messages do not reach the node."""
     return None if symptom.own else why_not_delivered(symptom.recording, symptom.topic)
 
 
-@explanation(NotLogged)
-def process_ended(symptom: NotLogged) -> Finding | None:
-    """The process ended."""
-    return why_ended(symptom.recording, symptom.seen)
-
-
-@explanation(NotLogged, concept="qos")
+@explanation(NotLogged, after=(process_ended,), before=(no_cpu_time,), concept="qos")
 def no_history(symptom: NotLogged) -> Finding | None:
     """A late joiner does not request earlier messages (transient_local)."""
     wanted, recording = symptom.wanted, symptom.recording
@@ -161,7 +164,7 @@ def no_history(symptom: NotLogged) -> Finding | None:
     return None
 
 
-@explanation(NotLogged)
+@explanation(NotLogged, before=(no_cpu_time,))
 def too_few_sent(symptom: NotLogged) -> Finding | None:
     """Too few messages were sent: the program destroyed its subscription, or a fault occurred."""
     number = len(symptom.wanted)
@@ -173,26 +176,7 @@ def too_few_sent(symptom: NotLogged) -> Finding | None:
     return why_unsubscribed(symptom.recording, symptom.topic, sent) or Finding.undecided(sent)
 
 
-@explanation(NotLogged)
-def no_cpu_time(symptom: NotLogged) -> Finding | None:
-    """The machine gave the process too little CPU time; this is an error and costs no points."""
-    recording, wanted = symptom.recording, symptom.wanted
-    begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].due_ns + symptom.within_ns
-    stolen_s = recording.stolen_s(begin_ns, end_ns)
-    forgiven = echoes(recording, wanted, symptom.decimals, symptom.within_ns, forgive=True)
-    if len(forgiven) < symptom.needed:
-        if stolen_s < _STARVED * (end_ns - begin_ns) / NS:
-            return None
-        blocked = blocked_executor(symptom)
-        if blocked is not None:
-            return blocked.doubted()
-    return Finding.undecided(
-        f"log lines for {code(symptom.topic)} are late or missing, but the machine took "
-        f"{format_duration(stolen_s)} from the process meanwhile"
-    )
-
-
-@explanation(NotLogged, before=(never_spun,))
+@explanation(NotLogged, after=(no_cpu_time,), before=(callback_raised,))
 def subscription_destroyed(symptom: NotLogged) -> Finding | None:
     """The program destroyed its subscription."""
     if symptom.own:

@@ -8,9 +8,22 @@ from dataclasses import dataclass
 from grader.diagnosis.destroyed_endpoint import why_unpublished, why_unsubscribed
 from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation, mistaken, remedy
 from grader.diagnosis.no_endpoint import why_no_endpoint
-from grader.diagnosis.process.not_called import NotCalled, never_spun
-from grader.diagnosis.process.process_exit import why_ended
-from grader.findings.finding import Evidence, Finding, Moment, endpoints_seen, first_seen
+from grader.diagnosis.process.not_called import (
+    NotCalled,
+    blocked_executor,
+    callback_raised,
+    left_s,
+    no_cpu_time,
+)
+from grader.diagnosis.process.process_exit import process_ended, why_ended
+from grader.findings.finding import (
+    Evidence,
+    Finding,
+    Moment,
+    endpoints_seen,
+    evidence_at,
+    first_seen,
+)
 from grader.findings.words import code, codes, counted, type_in_code
 from grader.measure.compatibility import compatibility_table, refusals, sides
 from grader.measure.declarations import timers, was_held_up
@@ -18,6 +31,8 @@ from grader.recording.model import NS, Endpoint, Kind, Owner, Qos, Recording
 from grader.recording.submission import CPP
 from grader.spec.unit import format_duration
 
+# Without what the host took: in so long a node answers what it was asked.
+_OWN_S = 2.0
 # As rclcpp_lifecycle logs it, with the topic in quotes.
 _INACTIVE = "but the publisher is not activated"
 
@@ -75,11 +90,6 @@ class OnTopic(Symptom[Finding]):
         return self.recording.matched_ns or self.recording.launched_ns
 
     @property
-    def stolen_s(self) -> float:
-        """What the machine took from the process meanwhile."""
-        return self.recording.stolen_s(self.begin_ns, self.recording.stop_ns)
-
-    @property
     def asked(self) -> tuple[str, ...]:
         """Topics that the probe publishes on and that this one answers, as the assignment says."""
         answers = self.recording.answers
@@ -104,6 +114,18 @@ class OnTopic(Symptom[Finding]):
 class NoMessages(OnTopic, NotCalled):
     """No message came on a topic."""
 
+    @property
+    def excuse(self) -> Finding | None:
+        """The machine's doing, if it took so much that nothing is proven."""
+        return self.starved(self.begin_ns, self.recording.stop_ns)
+
+    def guilty(self) -> Finding | None:
+        """The same, or no answer in a time of its own in which a node answers."""
+        is_asked = self.since_ns > self.recording.launched_ns
+        had_time = left_s(self.recording, self.since_ns, self.recording.stop_ns) >= _OWN_S
+        late = callback_raised(self) or no_answer(self) if is_asked and had_time else None
+        return super().guilty() or late
+
 
 @dataclass(frozen=True)
 class FewMessages(OnTopic, NotCalled):
@@ -126,6 +148,16 @@ class FewMessages(OnTopic, NotCalled):
     def moments(self) -> tuple[Moment, ...]:
         """When the first message came."""
         return first_seen(self.recording, self.recording.on(self.topic))
+
+    @property
+    def excuse(self) -> Finding | None:
+        """The machine's doing, if without its delays the process may have published enough."""
+        number = len(self.recording.on(self.topic))
+        stolen_s = self.recording.stolen_s(self.begin_ns, self.recording.stop_ns)
+        left_to_it_s = self.watched_s - stolen_s
+        if stolen_s <= 0.0 or number * self.watched_s < self.needed * left_to_it_s:
+            return None
+        return Finding.held_up(self.seen, stolen_s)
 
 
 @dataclass(frozen=True)
@@ -222,7 +254,7 @@ def other_type(symptom: OnTopic) -> Finding | None:
     )
 
 
-@explanation(NoMessages, FewMessages)
+@explanation(NoMessages, FewMessages, before=(process_ended,))
 def unreadable(symptom: OnTopic) -> Finding | None:
     """The program publishes bytes that are not a message of this type."""
     return why_unreadable(symptom.recording, symptom.topic)
@@ -267,7 +299,7 @@ def nothing_sent(symptom: NotDelivered) -> Finding | None:
     )
 
 
-@explanation(NoMessages)
+@explanation(NoMessages, before=(process_ended,))
 def never_matched(symptom: NoMessages) -> Finding | None:
     """Because the machine was busy, the publisher and the probe did not discover each other."""
     if not was_held_up(symptom.recording) or not any(
@@ -281,26 +313,8 @@ def never_matched(symptom: NoMessages) -> Finding | None:
     )
 
 
-@explanation(NoMessages, FewMessages)
-def process_ended(symptom: OnTopic) -> Finding | None:
-    """The process ended before it published, or before it published enough."""
-    return why_ended(symptom.recording, symptom.seen)
-
-
-@explanation(FewMessages)
-def too_little_cpu_time(symptom: FewMessages) -> Finding | None:
-    """Without the delays of the machine, the process may have published enough."""
-    number = len(symptom.recording.on(symptom.topic))
-    left_to_it_s = symptom.watched_s - symptom.stolen_s
-    if symptom.stolen_s <= 0.0 or number * symptom.watched_s < symptom.needed * left_to_it_s:
-        return None
-    return Finding.undecided(
-        f"{symptom.seen}, but the machine took {format_duration(symptom.stolen_s)} of them from "
-        "the process"
-    )
-
-
-@explanation(NoMessages, FewMessages, before=(never_spun,))
+@explanation(NoMessages, after=(process_ended,))
+@explanation(FewMessages, after=(no_cpu_time,), before=(callback_raised,))
 def publisher_destroyed(symptom: OnTopic) -> Finding | None:
     """The program destroyed its publisher."""
     return why_unpublished(symptom.recording, symptom.topic, symptom.seen)
@@ -315,3 +329,18 @@ def nothing_to_answer(symptom: NoMessages) -> Finding | None:
         f"{symptom.seen}, because the messages that the node should answer, on "
         f"{code(symptom.asked[0])}, never reached it"
     )
+
+
+@explanation(NoMessages, after=(blocked_executor,))
+def no_answer(symptom: NoMessages) -> Finding | None:
+    """The subscription's callback gets a message, but does not publish."""
+    recording = symptom.recording
+    name = next((name for name in symptom.asked if recording.sent[name]), None)
+    if name is None:
+        return None
+    sent = recording.sent[name]
+    seen = (
+        f"{symptom.seen}, although {counted(len(sent), 'message')} on {code(name)} reached the node"
+    )
+    evidence = evidence_at(recording, f"sent on {name}", sent[0].stamp_ns)
+    return symptom.placed(mistaken("no_answer", seen, evidence))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken
+from grader.diagnosis.explanation import cause_of, explanation, mistaken
 from grader.diagnosis.not_built import why_not_built
 from grader.diagnosis.process.not_called import at_its_place
-from grader.diagnosis.process.process_exit import ended_early, why_crashed, why_ended
+from grader.diagnosis.process.process_exit import NotDone, ended_early, process_ended
 from grader.diagnosis.process.standing import where_it_stands
 from grader.diagnosis.undeclared import why_never_appeared
 from grader.findings.finding import Evidence, Finding, nodes_seen, until_the_end
@@ -29,10 +30,8 @@ _START = "start of "
 
 
 @dataclass(frozen=True)
-class NoNode(Symptom[Finding], concept="nodes"):
+class NoNode(NotDone, concept="nodes"):
     """No node of the student appeared."""
-
-    recording: Recording
 
     @property
     def is_launched(self) -> bool:
@@ -57,11 +56,18 @@ class NoNode(Symptom[Finding], concept="nodes"):
 
 
 @dataclass(frozen=True)
-class OtherNode(Symptom[Finding], concept="names"):
+class OtherNode(NotDone, concept="names"):
     """A node does not have the expected name."""
 
-    recording: Recording
     wanted: str
+    only_failures = True
+
+    @property
+    def ended(self) -> Sequence[Process]:
+        """None where a node has a like name: that is the one that is meant."""
+        # Without the namespaces, which make any two names alike.
+        bases = [name.rpartition("/")[2].lower() for name in self.names]
+        return super().ended if nearest(self.base.lower(), bases) is None else ()
 
     @property
     def names(self) -> list[str]:
@@ -144,7 +150,7 @@ _NOT_STARTED = {
 """What the system says of a program that it cannot start -> the mistake."""
 
 
-@explanation(NoNode)
+@explanation(NoNode, before=(process_ended,))
 def no_executable(symptom: NoNode) -> Finding | None:
     """The executable does not exist, or cannot be started."""
     if symptom.is_launched:
@@ -161,13 +167,7 @@ def no_executable(symptom: NoNode) -> Finding | None:
     )
 
 
-@explanation(NoNode)
-def process_ended(symptom: NoNode) -> Finding | None:
-    """The process ended before it created a node."""
-    return why_ended(symptom.recording)
-
-
-@explanation(NoNode)
+@explanation(NoNode, after=(process_ended,))
 def never_appeared(symptom: NoNode) -> Finding | None:
     """The node never appeared in the ROS graph, as after a change of ROS_DOMAIN_ID."""
     if not symptom.declares("node") and not symptom.recording.environment.get("other_domains"):
@@ -197,17 +197,7 @@ def main_does_not_come_to_it(symptom: NoNode) -> Finding:
     return at_its_place(cause, cause.observed, stand)
 
 
-@explanation(OtherNode)
-def process_crashed(symptom: OtherNode) -> Finding | None:
-    """The process of the node ended with a failure before it created the node."""
-    # Without the namespaces, which make any two names alike.
-    bases = [name.rpartition("/")[2].lower() for name in symptom.names]
-    if nearest(symptom.base.lower(), bases) is not None:
-        return None
-    return why_crashed(symptom.recording)
-
-
-@explanation(OtherNode)
+@explanation(OtherNode, after=(process_ended,))
 def node_never_appeared(symptom: OtherNode) -> Finding | None:
     """The process created the node, but it never appeared in the ROS graph."""
     # A process may declare anything, also what is no text.

@@ -5,10 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from grader.diagnosis.explanation import cause_of, explanation, mistaken, remedy
-from grader.diagnosis.no_answer import why_raised, why_taken
+from grader.diagnosis.no_answer import why_taken
 from grader.diagnosis.no_endpoint import ACTION_CLIENT, CLIENT, why_not_offered
-from grader.diagnosis.process.not_called import NotCalled, blocked_executor, never_spun
-from grader.diagnosis.process.process_exit import why_crashed
+from grader.diagnosis.process.not_called import (
+    NotCalled,
+    blocked_executor,
+    callback_raised,
+    never_spun,
+)
+from grader.diagnosis.process.process_exit import process_ended
 from grader.findings.fields import brief, words
 from grader.findings.finding import Evidence, Finding, Moment, Table, until_the_end
 from grader.findings.words import code
@@ -31,6 +36,7 @@ class NotAsked(NotCalled):
 
     server: str
     needed: int
+    only_failures = True
 
     @property
     def asked(self) -> tuple[Asked, ...]:
@@ -61,13 +67,19 @@ class NotAsked(NotCalled):
         """When the last one came, or the launch."""
         return self.asked[-1].asked_ns if self.asked else self.recording.launched_ns
 
+    @property
+    def excuse(self) -> Finding | None:
+        """The machine's doing, if it took all of the time since then."""
+        end_ns = self.recording.stop_ns
+        return why_taken(self.recording, self.seen, self.since_ns, end_ns, 0.0)
+
 
 def why_not_asked(recording: Recording, server: str, needed: int) -> Finding:
     """Why fewer requests or goals came than needed."""
     return cause_of(NotAsked(recording, server, needed))
 
 
-@explanation(NotAsked)
+@explanation(NotAsked, before=(process_ended,))
 def no_client(symptom: NotAsked) -> Finding | None:
     """There is no client: it is missing, or its name is misspelt."""
     word = ACTION_CLIENT if symptom.is_action else CLIENT
@@ -75,15 +87,7 @@ def no_client(symptom: NotAsked) -> Finding | None:
     return None if there else why_not_offered(symptom.recording, word, symptom.server)
 
 
-@explanation(NotAsked)
-def process_failed(symptom: NotAsked) -> Finding | None:
-    """The process ended with a failure, or a callback raised an exception."""
-    crashed = why_crashed(symptom.recording)
-    raised = why_raised(symptom.recording, symptom.seen, symptom.since_ns)
-    return crashed.after(symptom.seen) if crashed is not None else raised
-
-
-@explanation(NotAsked, before=(never_spun,), concept="executors")
+@explanation(NotAsked, after=(callback_raised,), before=(never_spun,), concept="executors")
 def waits_in_a_callback(symptom: NotAsked) -> Finding | None:
     """call() or spin_until_future_complete() in a callback waits for an answer, and blocks it."""
     blocked = blocked_executor(symptom) if symptom.asked else None
@@ -105,8 +109,7 @@ def too_few(symptom: NotAsked) -> Finding:
     """The request was sent before the server was found, or never."""
     recording, seen = symptom.recording, symptom.seen
     if symptom.asked:
-        taken = why_taken(recording, seen, symptom.since_ns, recording.stop_ns, 0.0)
-        return taken or mistaken("too_few_asked", seen, evidence(recording, symptom.asked))
+        return mistaken("too_few_asked", seen, evidence(recording, symptom.asked))
     moment = until_the_end(recording, "still nothing was asked")
     return mistaken(
         "never_sent", f"{seen}, although the client was there", Evidence(moments=(moment,))

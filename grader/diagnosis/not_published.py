@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 from grader.diagnosis.explanation import explanation, mistaken, remedy
-from grader.diagnosis.no_answer import why_raised
 from grader.diagnosis.no_messages import (
     FewMessages,
     NoMessages,
+    no_answer,
     nothing_to_answer,
     seconds_hint,
     why_not_delivered,
 )
-from grader.diagnosis.process.not_called import (
-    at_its_place,
-    blocked_executor,
-    left_s,
-    never_spun,
-)
+from grader.diagnosis.process.not_called import callback_raised, no_cpu_time
 from grader.diagnosis.process.raised import defined_at
-from grader.diagnosis.process.standing import where_it_stands
-from grader.findings.finding import Evidence, Finding, evidence_at, moment, until_the_end
+from grader.findings.finding import Evidence, Finding, moment, until_the_end
 from grader.findings.words import code, counted, listing
 from grader.measure import declarations
 from grader.measure.declarations import is_compiled
@@ -27,13 +21,9 @@ from grader.recording.model import NS, Kind, Recording
 from grader.spec.unit import format_duration
 
 _LOG_LINES = 5
-# Share of the observation that the host may take before a missing message proves nothing.
-_STARVED = 0.5
-# Without what the host took: in so long a node answers what it was asked.
-_OWN_S = 2.0
 
 
-@explanation(NoMessages, after=(nothing_to_answer,), concept="timers")
+@explanation(NoMessages, after=(nothing_to_answer,), before=(no_cpu_time,), concept="timers")
 def slow_timer(symptom: NoMessages) -> Finding | None:
     """The timer's period is longer than the observation: milliseconds were given as seconds."""
     recording, timers = symptom.recording, declarations.timers(symptom.recording)
@@ -50,23 +40,7 @@ def slow_timer(symptom: NoMessages) -> Finding | None:
     )
 
 
-@explanation(NoMessages)
-def no_cpu_time(symptom: NoMessages) -> Finding | None:
-    """The machine gave the process too little CPU time; this is an error and costs no points."""
-    recording = symptom.recording
-    if symptom.stolen_s < _STARVED * symptom.watched_s:
-        return None
-    # A callback that never returns burns what CPU the machine leaves it.
-    guilty = blocked_executor(symptom)
-    is_asked = symptom.since_ns > recording.launched_ns
-    if not guilty and is_asked and left_s(recording, symptom.since_ns, recording.stop_ns) >= _OWN_S:
-        guilty = no_answer(symptom)
-    if guilty:
-        return guilty.doubted()
-    return Finding.held_up(symptom.seen, symptom.stolen_s)
-
-
-@explanation(NoMessages, before=(never_spun,))
+@explanation(NoMessages, after=(no_cpu_time,), before=(callback_raised,))
 def publish_never_called(symptom: NoMessages) -> Finding | None:
     """No line of the program calls publish()."""
     sources = [file for one in symptom.recording.submission.packages for file in one.sources]
@@ -88,32 +62,14 @@ def publish_never_called(symptom: NoMessages) -> Finding | None:
     )
 
 
-@explanation(NoMessages, after=(blocked_executor,))
-def no_answer(symptom: NoMessages) -> Finding | None:
-    """The subscription's callback gets a message, but raises an exception or does not publish."""
-    recording = symptom.recording
-    name = next((name for name in symptom.asked if recording.sent[name]), None)
-    if name is None:
-        return None
-    sent = recording.sent[name]
-    seen = (
-        f"{symptom.seen}, although {counted(len(sent), 'message')} on {code(name)} reached the node"
-    )
-    return why_raised(recording, seen, sent[0].stamp_ns) or _where_it_stands(
-        recording,
-        mistaken("no_answer", seen, evidence_at(recording, f"sent on {name}", sent[0].stamp_ns)),
-    )
-
-
-@explanation(NoMessages, concept="timers")
+@explanation(NoMessages, after=(no_answer,), concept="timers")
 def no_timer(symptom: NoMessages) -> Finding | None:
     """No timer was created, so nothing calls the callback that publishes."""
     recording = symptom.recording
     traced, timer = declarations.traced(recording), declarations.declares(recording, "timer")
     if not traced or timer or _heard(recording, symptom.topic):
         return None
-    return _where_it_stands(
-        recording,
+    return symptom.placed(
         mistaken(
             "nothing_calls",
             f"{_idle(symptom)}, and the process declared no timer that would call publish()",
@@ -133,8 +89,7 @@ def publish_not_reached(symptom: NoMessages) -> Finding:
         although = f", although {heard} reached the node"
     elif periods and declarations.declares(recording, "spin"):
         although = f", although the process declared a timer of {listing(periods)}"
-    return _where_it_stands(
-        recording,
+    return symptom.placed(
         mistaken("publish_not_reached", _idle(symptom) + although, _idle_evidence(symptom)),
     )
 
@@ -195,9 +150,3 @@ def _heard(recording: Recording, topic: str) -> str:
         and recording.carried(name)
         and why_not_delivered(recording, name) is None
     )
-
-
-def _where_it_stands(recording: Recording, cause: Finding) -> Finding:
-    """A cause with the line at which a process did not go on, if one did not."""
-    stands = (where_it_stands(recording, process.name) for process in recording.processes)
-    return at_its_place(cause, cause.observed, next(filter(None, stands), None))

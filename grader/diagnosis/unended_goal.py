@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken
-from grader.diagnosis.no_answer import NoAnswer, why_late, why_raised, why_taken
+from grader.diagnosis.no_answer import NoAnswer, why_late, why_taken
 from grader.diagnosis.no_endpoint import ACTION
+from grader.diagnosis.process.not_called import why_raised
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.fields import the_goal
 from grader.findings.finding import Evidence, Finding

@@ -10,7 +10,12 @@ from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.explanation import Symptom, explanation, mistaken, remedy
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.no_messages import NoMessages, never_matched, why_silent
-from grader.diagnosis.process.process_exit import ended_early, why_crashed, why_ended
+from grader.diagnosis.process.process_exit import (
+    NotDone,
+    ended_early,
+    process_ended,
+    why_ended,
+)
 from grader.findings.finding import Evidence, Finding, endpoints_seen, evidence_at
 from grader.findings.words import code, codes, counted
 from grader.measure import declarations
@@ -25,13 +30,13 @@ _STAMP_S = 1.0
 
 
 @dataclass(frozen=True)
-class NoTransform(Symptom[Finding], concept="frames"):
+class NoTransform(NotDone, concept="frames"):
     """A transform between two frames is not on its topic."""
 
-    recording: Recording
     topic: str
     parent: str
     child: str
+    only_failures = True
 
     @cached_property
     def there(self) -> list[Sent]:
@@ -86,13 +91,7 @@ def when_sent(recording: Recording, one: Sent, what: str) -> Evidence:
     return evidence_at(recording, f"{one.parent} → {one.child} {what}", one.message.stamp_ns)
 
 
-@explanation(NoTransform)
-def process_crashed(symptom: NoTransform) -> Finding | None:
-    """The process ended with a failure, perhaps of a lookup before the first transform."""
-    return why_crashed(symptom.recording)
-
-
-@explanation(NoTransform)
+@explanation(NoTransform, after=(process_ended,))
 def refused_by_tf2(symptom: NoTransform) -> Finding | None:
     """The publisher's QoS is not what tf2 requests: on /tf_static transient_local."""
     own = symptom.recording.student_endpoints(Kind.PUBLISHER, symptom.topic)

@@ -100,7 +100,7 @@ CASES: list[Group] = [
         "motion.drives",
         SPEED,
         {
-            "NotMoved.ended_before_it_moved": lambda: still(processes=(died(1),)),
+            "NotMoved.process_ended": lambda: still(processes=(died(1),)),
             "NotMoved.nothing_published": still,
             "NotMoved.not_finite": lambda: ahead(math.nan),
             "NotMoved.robot_not_matched": asks_weakly,

@@ -144,6 +144,7 @@ def crashing(raised: str, **changes: Any) -> Recording:
 
 
 CRASH = {"processes": (died(1),), **EXITED, "log": output(traceback("KeyError: 'x'"))}
+SURVIVED = output(traceback("ValueError: no"), time_s=1.5)
 BAD_PARAMETERS = (
     "rclpy._rclpy_pybind11.RCLError: failed to initialize rcl: Couldn't parse params file: "
     "'--params-file /install/share/bot/config/bot.yaml'. Error: Cannot have a value before "
@@ -212,7 +213,7 @@ CASES: list[Group] = [
                 declarations=(declared("started"), declared("node", node=NODE))
             ),
             "NoNode.main_does_not_come_to_it": nodeless(),
-            "OtherNode.process_crashed": recording(
+            "OtherNode.process_ended": recording(
                 nodes=(node("/logger"),), **{**CRASH, "processes": (process("b/o"), died(1))}
             ),
             "OtherNode.node_never_appeared": recording(
@@ -240,7 +241,7 @@ CASES: list[Group] = [
         {
             "NoEndpoint.no_node": nodeless(),
             "NoEndpoint.misspelt_name": silent(endpoints=(endpoint("/cmdvel"), reader())),
-            "NoEndpoint.process_crashed": silent(endpoints=(reader(),), **CRASH),
+            "NoEndpoint.process_ended": silent(endpoints=(reader(),), **CRASH),
             "NoEndpoint.never_appeared": silent(endpoints=(reader(),)),
         },
     ),
@@ -277,6 +278,7 @@ CASES: list[Group] = [
             "NoMessages.nothing_to_answer NotDelivered.no_endpoint": answering(),
             "NoMessages.slow_timer": silent(declarations=declarations(timer_s=300.0)),
             "NoMessages.no_cpu_time": silent(calls=(), disturbance=BUSY),
+            "NoMessages.callback_raised": silent(log=SURVIVED),
             "NoMessages.never_spun": silent(declarations=declarations(spin=False)),
             "NoMessages.blocked_executor": silent(calls=HANGS),
             "NoMessages.no_answer": answering(LISTENER, times_s=every(0.3, 5)),
@@ -289,12 +291,11 @@ CASES: list[Group] = [
                 messages=messages([1.0]), unreadable={"/cmd_vel": 3}
             ),
             "FewMessages.process_ended": recording(messages=messages([1.0]), processes=(died(1),)),
-            "FewMessages.too_little_cpu_time": recording(
-                messages=messages([1.0]), disturbance=BUSY
-            ),
+            "FewMessages.no_cpu_time": recording(messages=messages([1.0]), disturbance=BUSY),
             "FewMessages.publisher_destroyed": recording(
                 messages=messages([0.7]), endpoints=(gone(endpoint()), reader())
             ),
+            "FewMessages.callback_raised": recording(messages=messages([1.0]), log=SURVIVED),
             "FewMessages.never_spun": recording(
                 messages=messages([1.0]), declarations=declarations(spin=False)
             ),
@@ -305,11 +306,9 @@ CASES: list[Group] = [
         "service.responds",
         ENABLE,
         {
-            "NoAnswer.process_gone": serving(asked(1.0, None), processes=(died(1),)),
+            "NoAnswer.process_ended": serving(asked(1.0, None), processes=(died(1),)),
             "NoAnswer.no_cpu_time": serving(asked(1.0, None), disturbance=BUSY),
-            "NoAnswer.callback_raised": serving(
-                asked(1.0, None), log=output(traceback("ValueError: no"), time_s=1.5)
-            ),
+            "NoAnswer.callback_raised": serving(asked(1.0, None), log=SURVIVED),
             "NoAnswer.never_spun": serving(asked(1.0, None), declarations=declarations(spin=False)),
             "NoAnswer.blocked_executor": serving(asked(1.0, None), *HANGS),
             "NoAnswer.callback_does_not_answer": serving(asked(1.0, None)),
@@ -320,7 +319,8 @@ CASES: list[Group] = [
         {"server": "/enable", "sequence": [{}, {}]},
         {
             "NotAsked.no_client NoEndpoint.misspelt_name": asking(clients=(service("/enabel"),)),
-            "NotAsked.process_failed ProcessExit.raised": asking(to_service(), **CRASH),
+            "NotAsked.process_ended ProcessExit.raised": asking(to_service(), **CRASH),
+            "NotAsked.callback_raised": asking(to_service(), log=SURVIVED),
             "NotAsked.waits_in_a_callback": asking(to_service(0.7), calls=HANGS),
             "NotAsked.stops_after_a_failure": asking(to_service(1.0, None, status="unanswered")),
             "NotAsked.too_few": asking(to_service()),
@@ -363,6 +363,7 @@ CASES: list[Group] = [
             "NotLogged.subscription_destroyed": logging(
                 endpoints=(gone(LISTENER, 3.0), stimulus())
             ),
+            "NotLogged.callback_raised": logging(log=SURVIVED),
             "NotLogged.never_spun": logging(declarations=declarations(spin=False)),
             "NotLogged.blocked_executor": logging(calls=HANGS),
             "NotLogged.output_dropped": logging(processes=(process(dropped_bytes=9),)),
@@ -473,8 +474,7 @@ CASES: list[Group] = [
                 canceled(cancel_accepted=False, status="succeeded")
             ),
             "NotCanceled.execute_callback_raised": acting(
-                canceled(status="succeeded", end_s=0.9),
-                log=output(traceback("ValueError: no"), time_s=1.5),
+                canceled(status="succeeded", end_s=0.9), log=SURVIVED
             ),
             "NotCanceled.executor_busy_with_the_goal": acting(
                 canceled(cancel_answered_ns=None, cancel_accepted=None, status="succeeded")

@@ -40,9 +40,9 @@ def test_every_explanation_is_one_plain_sentence(symptom: type, entry: Explanati
     assert not re.search(r"\b(whoever|nobody|slip|of ours)\b", entry.sentence)
 
 
-def test_every_explanation_stands_once_below_its_symptom() -> None:
+def test_every_explanation_stands_once_below_each_symptom_that_a_check_sees() -> None:
     page = "\n".join(explanations_markdown().values())
-    for symptom, entry in ALL:
+    for symptom, entry in [one for one in ALL if not one[0].__subclasses__()]:
         heading = (symptom.__doc__ or "").partition("\n")[0].rstrip(".")
         section = page.split(f"## {heading}\n")[1].split("\n## ")[0]
         assert (

@@ -31,7 +31,7 @@ BROADCAST = {**ODOM, "rate": "20 Hz"}
 @pytest.mark.parametrize(
     ("name", "subject"),
     [
-        ("process_crashed", run(**CRASH)),
+        ("process_ended", run(**CRASH)),
         ("refused_by_tf2", run(qos=RELIABLE)),
         ("other_topic", run(moving=on(TF, (0.7, [transform(*LASER)])))),
         ("exchanged_frames", static_run(transform("laser", "base_link"))),

@@ -20,7 +20,7 @@ from grader.diagnosis.explanation import remedy
 from grader.diagnosis.wrong_value import misread_words, was_integer
 from grader.diagnosis.no_messages import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
-from grader.diagnosis.no_answer import why_raised
+from grader.diagnosis.process.not_called import why_raised
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.words import MATH, SLEEP, worded

@@ -28,9 +28,9 @@ from grader.checks.requests import (
     why_other_fields,
 )
 from grader.diagnosis.explanation import cause_of, mistaken, remedy
-from grader.diagnosis.no_answer import NoAnswer, why_late, why_raised
+from grader.diagnosis.no_answer import NoAnswer, why_late
 from grader.diagnosis.no_endpoint import ACTION
-from grader.diagnosis.process.not_called import ANSWER_S
+from grader.diagnosis.process.not_called import ANSWER_S, why_raised
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.unended_goal import ended_alone, why_no_end, why_not_canceled
 from grader.findings.fields import FieldTolerance, the_goal, unlike, words

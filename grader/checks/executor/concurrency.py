@@ -14,7 +14,6 @@ from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.log.log_content import logged, printed
 from grader.diagnosis.explanation import cause_of, explain, mistaken
 from grader.diagnosis.process.not_called import Uncalled
-from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.undeclared import why_undeclared
 from grader.diagnosis.wrong_executor import GROUP, MULTI, SINGLE, OtherExecution
 from grader.findings.finding import Evidence, Finding, Moment, moment
@@ -158,7 +157,7 @@ def _why_not_seen(recording: Recording, seen: str, *, declared: bool = True) -> 
     if declared and not traced(recording):
         return why_undeclared(recording, "its executor and callbacks")
     others = sorted({f"{run.callback} ({run.serves})" for run in timed(recording)})
-    cause = why_ended(recording, seen) or explain(Uncalled(recording, seen))
+    cause = explain(Uncalled(recording, seen))
     shown = Evidence((Moment("launched", 0.0),), spans=spans(recording, timed(recording)))
     lacking = mistaken("not_run", seen + (f"; {codes(others)} ran" if others else ""), shown)
     return cause or lacking.doubted(was_held_up(recording))

@@ -14,9 +14,10 @@ from grader.checks.check import NamedFields, Subject, check, stop_if, toleranced
 from grader.checks.need import ParameterSet, Recorded
 from grader.checks.parameter.parameter import OfSetting, refusal, settings_to
 from grader.diagnosis.explanation import mistaken
-from grader.diagnosis.no_answer import why_raised, why_taken
+from grader.diagnosis.no_answer import why_taken
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_parameter import get_parameter
+from grader.diagnosis.process.not_called import why_raised
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.fields import FieldTolerance, difference_table, difference_words, unlike, words
 from grader.findings.finding import Evidence, Finding, evidence_at

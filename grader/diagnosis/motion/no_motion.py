@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken, remedy
+from grader.diagnosis.explanation import cause_of, explanation, mistaken, remedy
 from grader.diagnosis.no_messages import NoMessages, why_refused, why_silent
 from grader.diagnosis.no_node import why_no_node
-from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
+from grader.diagnosis.process.process_exit import NotDone, exited, process_ended, why_it_exited
 from grader.diagnosis.wrong_value import misread_words, was_integer
 from grader.findings.finding import Evidence, Finding, evidence_at
 from grader.findings.reference import Goal, UnknownValue
@@ -45,10 +45,10 @@ def why_not_judged(recording: Recording) -> Finding | None:
 
 
 @dataclass(frozen=True)
-class NotMoved(Symptom[Finding]):
+class NotMoved(NotDone):
     """The robot never moved."""
 
-    recording: Recording
+    seen = _STILL
 
     @cached_property
     def sent(self) -> tuple[VelocityCommand, ...]:
@@ -115,13 +115,7 @@ def why_rejected(recording: Recording) -> Finding | None:
     )
 
 
-@explanation(NotMoved)
-def ended_before_it_moved(symptom: NotMoved) -> Finding | None:
-    """The process ended."""
-    return why_ended(symptom.recording, _STILL)
-
-
-@explanation(NotMoved)
+@explanation(NotMoved, after=(process_ended,))
 def nothing_published(symptom: NotMoved) -> Finding | None:
     """Nothing was published on the topic of velocity commands."""
     recording, topic = symptom.recording, command_topic(symptom.recording)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from grader.diagnosis.explanation import Symptom, explanation, remedy
+from grader.diagnosis.explanation import explanation, remedy
+from grader.diagnosis.process.process_exit import NotDone, process_ended
+from grader.diagnosis.process.raised import in_brackets, own_frames, parse_failures, raised_at
 from grader.diagnosis.process.standing import Stand, slow_callback, unkept_future, where_it_stands
-from grader.findings.finding import Evidence, Finding, evidence_at, until_the_end
+from grader.findings.finding import Evidence, Finding, evidence_at, moment, until_the_end
 from grader.findings.words import SPIN, codes
 from grader.measure import declarations
 from grader.recording.interaction import executor_services
@@ -18,6 +20,9 @@ from grader.spec.unit import format_duration
 ANSWER_S = 1.0
 # A node whose callbacks return at once answers a call to its parameter services sooner.
 _SLOW_S = 0.5
+# Share of the time that the host may take before what is missing proves nothing.
+_STARVED = 0.5
+_LOG_LINES = 10
 
 
 def left_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
@@ -26,15 +31,8 @@ def left_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
 
 
 @dataclass(frozen=True)
-class NotCalled(Symptom[Finding], concept="executors"):
+class NotCalled(NotDone, concept="executors"):
     """No callback is called, whatever was waited for: messages, answers, requests, log lines."""
-
-    recording: Recording
-
-    @property
-    def seen(self) -> str:
-        """What is missing, in words."""
-        raise NotImplementedError
 
     @property
     def needs_spin(self) -> bool:
@@ -60,6 +58,29 @@ class NotCalled(Symptom[Finding], concept="executors"):
     def since_ns(self) -> int:
         """From when on the executor must not have answered anything."""
         return self.recording.launched_ns
+
+    @property
+    def excuse(self) -> Finding | None:
+        """The machine's doing, if it may explain what is missing; by default it never does."""
+        return None
+
+    def starved(self, begin_ns: int, end_ns: int) -> Finding | None:
+        """The machine's doing, if it took so much of a time that nothing is proven by it."""
+        stolen_s = self.recording.stolen_s(begin_ns, end_ns)
+        if stolen_s < _STARVED * (end_ns - begin_ns) / NS:
+            return None
+        guilty = self.guilty()
+        return guilty.doubted() if guilty else Finding.held_up(self.seen, stolen_s)
+
+    def guilty(self) -> Finding | None:
+        """What is wrong although the machine took time, if that shows."""
+        # A callback that never returns burns what CPU the machine leaves it.
+        return blocked_executor(self)
+
+    def placed(self, cause: Finding) -> Finding:
+        """A cause with the line at which a process did not go on, if one did not."""
+        stands = (where_it_stands(self.recording, one.name) for one in self.processes)
+        return at_its_place(cause, cause.observed, next(filter(None, stands), None))
 
 
 class CalledLate(NotCalled, concept="executors"):
@@ -93,6 +114,18 @@ class Uncalled(CalledLate):
     def processes(self) -> Sequence[Process]:
         """Those that may never have spun; by default all."""
         return self.recording.processes if self.of_processes is None else self.of_processes
+
+
+@explanation(NotCalled, after=(process_ended,))
+def no_cpu_time(symptom: NotCalled) -> Finding | None:
+    """The machine gave the process too little CPU time; this is an error and costs no points."""
+    return symptom.excuse
+
+
+@explanation(NotCalled)
+def callback_raised(symptom: NotCalled) -> Finding | None:
+    """A callback raised an exception, and the process went on."""
+    return why_raised(symptom.recording, symptom.seen, symptom.since_ns, symptom.processes)
 
 
 @explanation(NotCalled)
@@ -170,6 +203,41 @@ def slow_callbacks(symptom: CalledLate) -> Finding | None:
         concept="executors",
     )
     return at_its_place(cause, symptom.late, slow_callback(recording))
+
+
+def why_raised(
+    recording: Recording, what: str, begin_ns: int, processes: Iterable[Process] | None = None
+) -> Finding | None:
+    """An exception that a process printed and survived from a time on; None if there is none.
+
+    Args:
+        processes: Whose; by default all.
+    """
+    for process in recording.processes if processes is None else processes:
+        lines = [
+            line
+            for line in recording.log
+            if line.process == process.name
+            and line.stream == "stderr"
+            and begin_ns <= line.time_ns <= recording.stop_ns
+        ]
+        failures = parse_failures([line.text for line in lines])
+        raised = next((item for item in reversed(failures) if not item.ignored), None)
+        if raised is None:
+            continue
+        place = raised_at(raised, recording)
+        return Finding(
+            f"{what}: an exception was raised meanwhile, {raised}{in_brackets(place)}",
+            remedy("named_line" if place else "read_message"),
+            Evidence(
+                moments=(moment(recording, "the exception", lines[-1].time_ns),),
+                places=(place,) if place else (),
+                log=tuple(
+                    own_frames([line.text for line in lines], recording.submission)[-_LOG_LINES:]
+                ),
+            ),
+        )
+    return None
 
 
 def at_its_place(cause: Finding, seen: str, stand: Stand | None) -> Finding:

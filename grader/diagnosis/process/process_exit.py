@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
@@ -181,6 +182,33 @@ class ProcessExit(Symptom[Finding], concept="nodes"):
 def why_it_exited(recording: Recording, process: Process) -> Finding:
     """Why a process ended early, with its exception and the student's line if there is one."""
     return cause_of(ProcessExit(recording, process))
+
+
+@dataclass(frozen=True)
+class NotDone(Symptom[Finding]):
+    """A program did not do what was asked for."""
+
+    recording: Recording
+    only_failures = False
+    """Whether a program that returned is no explanation, for it may have done its part."""
+
+    @property
+    def seen(self) -> str:
+        """The symptom in words; empty where the end of the process says enough."""
+        return ""
+
+    @property
+    def ended(self) -> Sequence[Process]:
+        """Processes whose early end explains it, the likeliest first."""
+        return crashed(self.recording) if self.only_failures else exited(self.recording)
+
+
+@explanation(NotDone, concept="nodes")
+def process_ended(symptom: NotDone) -> Finding | None:
+    """The process ended."""
+    ended = symptom.ended
+    cause = why_it_exited(symptom.recording, ended[0]) if ended else None
+    return cause.after(symptom.seen) if cause and symptom.seen else cause
 
 
 @explanation(ProcessExit)
