@@ -61,6 +61,10 @@ class Parameters(Model):
         """The text of :attr:`asks` with the values of the parameters."""
         return self._asked()
 
+    def asked_of(self, subject: Any) -> str:
+        """The same, with what only the run or the submission tells, such as a random goal."""
+        return self.asked_for
+
     def _asked(self) -> str:
         return self.asks.format(self=self)
 
@@ -134,7 +138,7 @@ def check(
 ) -> Callable[[Callable[[Any, Any], Finding]], Check]:
     """Make a :class:`Check` of a function; its docstring becomes the catalogue's text.
 
-    A finding that does not say what is expected expects what the parameters ask for.
+    A finding that does not say what is expected expects what the parameters ask of its subject.
     """
 
     def decorate(judge: Callable[[Any, Any], Finding]) -> Check:
@@ -149,7 +153,8 @@ def check(
             if not isinstance(found, Finding):
                 return found  # An instructor's own check is not typed: judging says what it is.
             named = found.concept or (concept if found.status is Status.FAILED else "")
-            return replace(found, expected=found.expected or parameters.asked_for, concept=named)
+            expected = found.expected or parameters.asked_of(subject)
+            return replace(found, expected=expected, concept=named)
 
         return Check(name, subject, parameters, judged, concept)
 

@@ -70,8 +70,7 @@ def is_offered(recording: Recording, parameters: Offered) -> Finding:
         return wrong
     stop_if(why_withdrawn(recording, f"the {word.noun} {code(name)}", servers))
     found = servers[0]
-    return Finding.passed(
-        parameters.asked_for,
+    return Finding.as_asked(
         f"{code(found.node)} offers it, with the type {code(found.type)}, seen {times_s[0]:.2f} s "
         "after launch",
         shown,

@@ -267,11 +267,6 @@ class Finding:
         return replace(cls.ours(observed, hint, disturbed=disturbed), expected=expected)
 
     @classmethod
-    def to_repeat(cls, expected: str, observed: str) -> Finding:
-        """Not judged because of rosgrade or the machine: the run should be repeated."""
-        return cls.error(expected, observed, disturbed=True)
-
-    @classmethod
     def ours(cls, observed: str, hint: str = "", *, disturbed: bool = False) -> Finding:
         """A cause in rosgrade, the assignment or the machine: nothing is judged."""
         return cls(observed, hint, verdict=Verdict.MACHINE if disturbed else Verdict.OURS)

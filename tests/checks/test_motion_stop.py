@@ -466,4 +466,6 @@ def test_a_command_beyond_the_limits():
     run = drive(by_front(0.5), world=WALL, seconds=4)
     said = failing("motion.within_limits", run)
     assert "linear.x = 0.5 m/s" in said
-    assert "commands of at most 0.22 m/s" in judge("motion.within_limits", run).expected
+    # Also where nothing was commanded.
+    for one in (run, replace(run, messages={})):
+        assert "commands of at most 0.22 m/s" in judge("motion.within_limits", one).expected

@@ -189,7 +189,7 @@ class TestScenarios:
     def test_a_run_that_could_not_be_judged_leaves_open_only_what_it_can_change(
         self, counts, says, status
     ):
-        error = Finding.to_repeat("", "the machine took time")
+        error = Finding.undecided("the machine took time")
         findings = dict(zip(("a", "b", "c"), (*says, error), strict=True))
         result = judge(Told("reaches", findings, counts=counts), scenarios=tuple(findings))
         assert result.result("reaches").status is status

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -12,7 +11,7 @@ from statistics import median
 from pydantic import Field, model_validator
 
 from grader.measure import declarations
-from grader.checks.check import Subject, check
+from grader.checks.check import Subject, check, stop_if
 from grader.findings.finding import Evidence, Finding
 from grader.checks.need import PUBLISHED, Recorded
 from grader.measure.period import Interval, PeriodLimits, forgiven, judge
@@ -63,6 +62,16 @@ class Runs(Reported):
             raise ValueError("say what calls them: give either 'period' or 'stimulus', or neither")
         return self
 
+    def _asked(self) -> str:
+        names, reports = codes(self.callbacks), f"report start and end on {code(self.topic)}"
+        each = "each " if len(self.callbacks) > 1 else ""
+        if self.period is not None:
+            within = f"(median within {self.tolerance})"
+            return f"{names} {each}start every {format_duration(self.period)} {within}, and {reports}"
+        if self.stimulus is not None:
+            return f"{names} {each}run once for each message on {code(self.stimulus)}, and {reports}"
+        return f"{names} {each}run {counted(self.at_least, 'time')} or more, and {reports}"
+
 
 @check("callbacks.run", Subject.RECORDING, Runs, concept="executors")
 def run(recording: Recording, parameters: Runs) -> Finding:
@@ -75,51 +84,21 @@ def run(recording: Recording, parameters: Runs) -> Finding:
     ran `at_least` times. A start that is late because other callbacks worked without a pause counts
     as on time: other checks judge overlap. A start before its time is always wrong.
     """
-    expected = _run_words(parameters)
     reports = read_reports(recording.on(parameters.topic))
     free = parameters.period is None and parameters.stimulus is None
-    cause = why_reports_are_missing(
-        recording,
-        parameters.topic,
-        parameters.callbacks,
-        reports,
-        parameters.at_least if free else 1,
-    )
-    if cause is not None:
-        return replace(cause, expected=expected)
-    for callback in () if free else parameters.callbacks:
+    names, least = parameters.callbacks, parameters.at_least if free else 1
+    stop_if(why_reports_are_missing(recording, parameters.topic, names, reports, least))
+    for callback in () if free else names:
         if parameters.period is not None:
-            finding = _judge_period(recording, parameters, reports, callback, parameters.period)
+            stop_if(_judge_period(recording, parameters, reports, callback, parameters.period))
         else:
-            finding = _judge_messages(recording, parameters, reports, callback)
-        if finding is not None:
-            return finding
-    return Finding.passed(
-        expected,
+            stop_if(_judge_messages(recording, parameters, reports, callback))
+    return Finding.as_asked(
         listing(
             f"{code(name)} ran {counted(len(reports.of(name)), 'time')}"
-            for name in parameters.callbacks
+            for name in names
         ),
         Evidence(spans=spans(recording, reports)),
-    )
-
-
-def _run_words(parameters: Runs) -> str:
-    names = codes(parameters.callbacks)
-    each = "each " if len(parameters.callbacks) > 1 else ""
-    if parameters.period is not None:
-        return (
-            f"{names} {each}start every {format_duration(parameters.period)} (median within "
-            f"{parameters.tolerance}), and report start and end on {code(parameters.topic)}"
-        )
-    if parameters.stimulus is None:
-        return (
-            f"{names} {each}run {counted(parameters.at_least, 'time')} or more, and report start "
-            f"and end on {code(parameters.topic)}"
-        )
-    return (
-        f"{names} {each}run once for each message on {code(parameters.stimulus)}, and report "
-        f"start and end on {code(parameters.topic)}"
     )
 
 
@@ -127,7 +106,6 @@ def _judge_period(
     recording: Recording, parameters: Runs, reports: Reports, callback: str, period_s: float
 ) -> Finding | None:
     """The finding of a callback that does not run at its period, or None."""
-    expected = _run_words(parameters)
     begins = _unhindered(recording, reports, callback, period_s)
     measured = [
         Interval(a, b, (b - a) / NS, begins[max(0, index - 1)])
@@ -144,24 +122,19 @@ def _judge_period(
             f"{format_duration((begins[-1] - begins[0]) / NS)}: too often, and held up by others"
         )
         if gained_s - excused_s <= _GAINED * period_s:
-            return Finding.to_repeat(
-                expected, f"{observed}, unless it was the machine that held it up"
-            )
-        return Finding.failed(expected, observed, _period_hint(recording), evidence)
+            return Finding.undecided(f"{observed}, unless it was the machine that held it up")
+        return Finding(observed, _period_hint(recording), evidence)
     if good and len(reports.ended([callback])) >= parameters.at_least:
         return _by_chance(recording, parameters, reports, callback, limits)
     if seconds and not good:
         middle_s = median(seconds)
         observed = f"{code(callback)} starts every {format_duration(middle_s)} (median)"
         if judge(forgiven(recording, measured, limits), limits).good:
-            return Finding.to_repeat(
-                expected, f"{observed}, but the machine took the time from the process"
-            )
-        return Finding.failed(expected, observed, _period_hint(recording), evidence)
-    cause = why_reports_are_missing(
+            return Finding.undecided(f"{observed}, but the machine took the time from the process")
+        return Finding(observed, _period_hint(recording), evidence)
+    return why_reports_are_missing(
         recording, parameters.topic, parameters.callbacks, reports, parameters.at_least
     )
-    return None if cause is None else replace(cause, expected=expected)
 
 
 def _declares(recording: Recording, parameters: Runs, limits: PeriodLimits) -> bool:
@@ -190,8 +163,7 @@ def _by_chance(
     declared_s = {timer.period_s for timer in declarations.timers(recording)}
     if not declared_s or any(judge([period_s], limits).good for period_s in declared_s):
         return None
-    return Finding.to_repeat(
-        _run_words(parameters),
+    return Finding.undecided(
         f"{code(callback)} starts as often as it should, but the executor was never free between "
         f"its starts, and the process declared "
         f"{listing(f'a timer of {format_duration(item)}' for item in sorted(declared_s))}: "
@@ -276,10 +248,9 @@ def _judge_messages(
     recording: Recording, parameters: Runs, reports: Reports, callback: str
 ) -> Finding | None:
     """The finding of a callback that does not run once for each message, or None."""
-    expected = _run_words(parameters)
     sent = recording.sent.get(parameters.stimulus or "", ())
     if not sent:
-        return replace(why_not_sent(recording, parameters.stimulus or ""), expected=expected)
+        return why_not_sent(recording, parameters.stimulus or "")
     begun, ended = len(reports.of(callback)), len(reports.ended([callback]))
     evidence = Evidence(spans=spans(recording, reports, reports.of(callback)))
     observed = (
@@ -287,8 +258,7 @@ def _judge_messages(
         f"{counted(len(sent), 'message')}"
     )
     if begun > len(sent):
-        return Finding.failed(
-            expected,
+        return Finding(
             observed,
             _made_twice(recording)
             or "Create one subscription, and report the start and the end once in its callback.",
@@ -300,15 +270,12 @@ def _judge_messages(
         recording, parameters.stimulus or "", observed, sent[-1].stamp_ns
     )
     if cause is not None:
-        return replace(cause, expected=expected)
+        return cause
     work_s = max((item.seconds or 0.0 for item in reports.ended([callback])), default=0.0)
     missing_s = (len(sent) - ended) * work_s
     if recording.stolen_s(sent[0].stamp_ns, recording.stop_ns) >= missing_s > 0.0:
-        return Finding.to_repeat(
-            expected, f"{observed}, but the machine took the time from the process"
-        )
-    return Finding.failed(
-        expected,
+        return Finding.undecided(f"{observed}, but the machine took the time from the process")
+    return Finding(
         observed,
         "A queue size of 10 keeps the messages that come while the callback works. Look for a "
         "callback that works too long, for one that blocks the executor, and for "
@@ -336,6 +303,12 @@ class Work(Reported):
         description="How far the median may be from it: a share of it or a time.",
     )
 
+    def _asked(self) -> str:
+        return (
+            f"{codes(self.callbacks)} working {format_duration(self.duration)} in each run "
+            f"(median within {self.tolerance})"
+        )
+
 
 @check("callbacks.work", Subject.RECORDING, Work)
 def work(recording: Recording, parameters: Work) -> Finding:
@@ -345,14 +318,8 @@ def work(recording: Recording, parameters: Work) -> Finding:
     of each callback's runs must be the duration within `tolerance`. Delays by the machine cost no
     points.
     """
-    expected = (
-        f"{codes(parameters.callbacks)} working {format_duration(parameters.duration)} in each run "
-        f"(median within {parameters.tolerance})"
-    )
     reports = read_reports(recording.on(parameters.topic))
-    cause = why_reports_are_missing(recording, parameters.topic, parameters.callbacks, reports)
-    if cause is not None:
-        return replace(cause, expected=expected)
+    stop_if(why_reports_are_missing(recording, parameters.topic, parameters.callbacks, reports))
     allowed_s = parameters.tolerance.of(parameters.duration)
     parts = []
     for callback in parameters.callbacks:
@@ -367,11 +334,8 @@ def work(recording: Recording, parameters: Work) -> Finding:
             for value, item in zip(seconds, found, strict=True)
         )
         if middle_s > parameters.duration and excused_s <= parameters.duration + allowed_s:
-            return Finding.to_repeat(
-                expected, f"{parts[-1]}, but the machine took the time from the process"
-            )
-        return Finding.failed(
-            expected,
+            return Finding.undecided(f"{parts[-1]}, but the machine took the time from the process")
+        return Finding(
             f"{parts[-1]} (median of {counted(len(seconds), 'run')})",
             "Report the start, then work with "
             + worded(
@@ -382,4 +346,4 @@ def work(recording: Recording, parameters: Work) -> Finding:
             "between the two reports, such as for a lock.",
             Evidence(spans=spans(recording, reports, found)),
         )
-    return Finding.passed(expected, listing(parts), Evidence(spans=spans(recording, reports)))
+    return Finding.as_asked(listing(parts), Evidence(spans=spans(recording, reports)))

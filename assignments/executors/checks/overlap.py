@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from collections.abc import Sequence
 
 from pydantic import Field
 
-from grader.checks.check import Subject, check
+from grader.checks.check import Subject, check, stop_if
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.words import code, codes, counted, listing
 from grader.findings.words import EXCLUSIVE, REENTRANT, SPIN_NODE, worded
@@ -26,6 +25,11 @@ class NeverOverlap(Reported):
 
     at_least: int = Field(2, ge=1, description="How often each callback must have run.")
 
+    def _asked(self) -> str:
+        if len(self.callbacks) > 1:
+            return f"no two runs of {codes(self.callbacks, 'or')} at the same time"
+        return f"{code(self.callbacks[0])} never running twice at the same time"
+
 
 @check("callbacks.never_overlap", Subject.RECORDING, NeverOverlap, concept="executors")
 def never_overlap(recording: Recording, parameters: NeverOverlap) -> Finding:
@@ -36,28 +40,18 @@ def never_overlap(recording: Recording, parameters: NeverOverlap) -> Finding:
     declared only help to explain.
     """
     names = parameters.callbacks
-    expected = (
-        f"no two runs of {codes(names, 'or')} at the same time"
-        if len(names) > 1
-        else f"{code(names[0])} never running twice at the same time"
-    )
     reports = read_reports(recording.on(parameters.topic))
-    cause = why_reports_are_missing(
-        recording, parameters.topic, parameters.callbacks, reports, parameters.at_least
-    )
-    if cause is not None:
-        return replace(cause, expected=expected)
+    least = parameters.at_least
+    stop_if(why_reports_are_missing(recording, parameters.topic, names, reports, least))
     runs = reports.ended(names)
     found = list(overlaps(runs))
     if not found:
-        return Finding.passed(
-            expected,
+        return Finding.as_asked(
             f"{counted(len(runs), 'run')}, one after the other",
             Evidence(spans=spans(recording, reports)),
         )
     worst = max(found, key=lambda item: item.seconds)
-    return Finding.failed(
-        expected,
+    return Finding(
         f"{_overlap_words(recording, worst)}, and {counted(len(found), 'overlap')} in all"
         + _declared(recording),
         _exclusion_hint(recording, names, worst),
@@ -124,6 +118,12 @@ class Overlapping(Reported):
         validate_default=False,
     )
 
+    def _asked(self) -> str:
+        return (
+            f"{codes(self.callbacks)} running at the same time as {codes(self.others, 'or')}, "
+            f"{counted(self.at_least, 'time')} or more by {format_duration(self.by)}"
+        )
+
 
 @check("callbacks.overlap", Subject.RECORDING, Overlapping, concept="executors")
 def overlap(recording: Recording, parameters: Overlapping) -> Finding:
@@ -137,24 +137,16 @@ def overlap(recording: Recording, parameters: Overlapping) -> Finding:
     A MultiThreadedExecutor takes as many threads as there are CPUs; the grader gives it four at
     least, and os.cpu_count() says so.
     """
-    expected = (
-        f"{codes(parameters.callbacks)} running at the same time as "
-        f"{codes(parameters.others, 'or')}, "
-        f"{counted(parameters.at_least, 'time')} or more by "
-        f"{format_duration(parameters.by)}"
-    )
     reports = read_reports(recording.on(parameters.topic))
     names = (*parameters.callbacks, *parameters.others)
-    cause = why_reports_are_missing(recording, parameters.topic, names, reports)
-    if cause is not None:
-        return replace(cause, expected=expected)
+    stop_if(why_reports_are_missing(recording, parameters.topic, names, reports))
     parts = []
     for callback in parameters.callbacks:
         number = len(_with_others(reports, callback, parameters, parameters.by))
         parts.append(f"{code(callback)} did so {counted(number, 'time')}")
         if number < parameters.at_least:
-            return _serial(recording, parameters, reports, callback, number, expected)
-    return Finding.passed(expected, listing(parts), Evidence(spans=spans(recording, reports)))
+            return _serial(recording, parameters, reports, callback, number)
+    return Finding.as_asked(listing(parts), Evidence(spans=spans(recording, reports)))
 
 
 def _with_others(
@@ -175,7 +167,6 @@ def _serial(
     reports: Reports,
     callback: str,
     number: int,
-    expected: str,
 ) -> Finding:
     """The finding of a callback that does not overlap often enough."""
     seen = f"only {counted(number, 'time')}" if number else "never"
@@ -185,11 +176,8 @@ def _serial(
     most = number + _prevented(recording, parameters, reports, callback)
     # With several threads, those of rclcpp that wait for the group take the CPU from each other.
     prevented = most >= parameters.at_least and not concurrency.kept_apart(recording, ended)
-    excused = concurrency.not_judged(recording, expected, observed, prevented=prevented)
-    if excused is not None:
-        return excused
-    return Finding.failed(
-        expected,
+    stop_if(concurrency.not_judged(recording, observed, prevented=prevented))
+    return Finding(
         observed + _declared(recording),
         _concurrency_hint(recording, len(names)),
         Evidence(

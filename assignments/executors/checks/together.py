@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from collections.abc import Iterable, Sequence
 from functools import reduce
 
 from pydantic import Field
 
-from grader.checks.check import Subject, check
+from grader.checks.check import Subject, check, stop_if
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.words import code, codes, counted
 from grader.measure.callback_runs import Run
@@ -34,6 +33,13 @@ class Together(Reported):
         validate_default=False,
     )
 
+    def _asked(self) -> str:
+        times = counted(self.at_least, "time")
+        return (
+            f"{codes(self.callbacks)} all running at the same time, {times} or more for "
+            f"{format_duration(self.by)}"
+        )
+
 
 @check("callbacks.together", Subject.RECORDING, Together, concept="executors")
 def together(recording: Recording, parameters: Together) -> Finding:
@@ -43,19 +49,11 @@ def together(recording: Recording, parameters: Together) -> Finding:
     reports on the wire; the executor that the process declared only helps to explain.
     """
     names = parameters.callbacks
-    times = counted(parameters.at_least, "time")
-    expected = (
-        f"{codes(names)} all running at the same time, {times} or more for "
-        f"{format_duration(parameters.by)}"
-    )
     reports = read_reports(recording.on(parameters.topic))
-    cause = why_reports_are_missing(recording, parameters.topic, names, reports)
-    if cause is not None:
-        return replace(cause, expected=expected)
+    stop_if(why_reports_are_missing(recording, parameters.topic, names, reports))
     found = [item for item in _all_at_once(reports, names) if _seconds(item) >= parameters.by]
     if len(found) >= parameters.at_least:
-        return Finding.passed(
-            expected,
+        return Finding.as_asked(
             f"they did so {counted(len(found), 'time')}",
             Evidence(
                 moments=(Moment("all of them run", recording.since_launch_s(found[0][0])),),
@@ -65,18 +63,12 @@ def together(recording: Recording, parameters: Together) -> Finding:
     seen = f"only {counted(len(found), 'time')}" if found else "never"
     observed = f"{codes(names)} {seen} ran all at the same time"
     most = len(found) + _prevented(recording, reports, parameters)
-    excused = concurrency.not_judged(
-        recording,
-        expected,
-        observed,
-        prevented=most >= parameters.at_least,
-        at_once=len(parameters.callbacks),
+    prevented = most >= parameters.at_least
+    stop_if(
+        concurrency.not_judged(recording, observed, prevented=prevented, at_once=len(names))
     )
-    if excused is not None:
-        return excused
     declared = concurrency.declared_words(recording)
-    return Finding.failed(
-        expected,
+    return Finding(
         observed + (f"; {declared}" if declared else ""),
         f"{len(names)} callbacks can run at once only if the executor has {len(names)} threads or "
         f"more, {code(concurrency.executor_with(len(names) + 1))}, and if no group, "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 import math
 from collections.abc import Sequence
 from typing import Literal
@@ -13,7 +12,6 @@ from grader.checks.check import Subject, check
 from grader.findings.finding import Evidence, Finding, Moment, Plot
 from grader.measure.motion.steering import MOST_BEHIND, Sample, answers, fit, LEAST_FIT
 from grader.measure.motion.approach import NO_SPEED_M_S, Approach
-from grader.diagnosis.motion.no_motion import approach
 from grader.measure.motion.command import command_topic
 from grader.findings.words import metres, speed
 from grader.checks.motion.robot_check import GoalParameters
@@ -60,6 +58,14 @@ class Proportional(GoalParameters):
     )
     gain_max: Frequency | None = Field(None, description="Greatest gain.")
 
+    def _asked(self) -> str:
+        limits = [f"R² at least {self.r2:.2g}"]
+        gains = [f"at least {self.gain_min:.3g} 1/s"] if self.gain_min is not None else []
+        gains += [f"at most {self.gain_max:.3g} 1/s"] if self.gain_max is not None else []
+        limits += [f"gain {' and '.join(gains)}"] if gains else []
+        error = f"the heading error to {_WHAT[self.phase]}"
+        return f"angular.z in proportion to {error} ({', '.join(limits)})"
+
 
 @check("motion.proportional", Subject.RECORDING, Proportional, concept="angles")
 def proportional(recording: Recording, parameters: Proportional) -> Finding:
@@ -71,20 +77,13 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     clamp of your own) and the pause near zero within your tolerance do not count.
     """
     phase = parameters.phase
-    expected = (
-        f"angular.z in proportion to the heading error to {_WHAT[phase]} (R² at least "
-        f"{parameters.r2:.2g}{_range_words(parameters)})"
-    )
-    run = approach(recording, parameters.goal)
-    if isinstance(run, Finding):
-        return replace(run, expected=expected)
+    run = parameters.approach(recording)
     topic = command_topic(recording)
     if not recording.on(topic):
-        return replace(why_silent(recording, topic), expected=expected)
+        return why_silent(recording, topic)
     arrival = run.arrival(parameters.position)
     if phase == "align" and arrival is None:
-        never = why_not_there(run, parameters.position) or Finding("never near the goal")
-        return replace(never, expected=expected)
+        return why_not_there(run, parameters.position) or Finding("never near the goal")
     scene = recording.scene
     limit_rad_s = scene.max_angular_rad_s if scene is not None else math.inf
     tried = [_samples(run, parameters, behind, limit_rad_s) for behind in range(MOST_BEHIND + 1)]
@@ -96,15 +95,14 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     moment = Moment("this phase begins", recording.since_launch_s(begins.time_ns))
     evidence = Evidence(moments=(moment,), plots=(_plot(samples, phase),))
     if good:
-        return _judge_gain(verdict, parameters, expected, evidence)
+        return _judge_gain(verdict, parameters, evidence)
     # One that had hardly an error to correct need not have sent a command for long.
     idle = verdict.law is Law.NOTHING_TO_DO
     deeper = why_cut_short(recording) if idle else why_off_course(recording)
     if deeper is not None and len(samples) < LEAST_SAMPLES:
-        return replace(deeper, expected=expected)
+        return deeper
     if idle:
-        return Finding.passed(
-            expected,
+        return Finding.as_asked(
             f"there was hardly an error to correct, and hardly a turn was commanded "
             f"({counted(len(samples), 'command')})",
             evidence,
@@ -112,10 +110,9 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     observed, hint = _words(verdict, parameters, len(samples))
     misread = misread_yaw(run, parameters.position)
     if misread is not None:
-        return Finding.failed(
-            expected, f"the commands do not follow the error: {misread}", remedy(misread.mistake), evidence
-        )
-    return Finding.failed(expected, observed, hint, evidence)
+        observed = f"the commands do not follow the error: {misread}"
+        return Finding(observed, remedy(misread.mistake), evidence)
+    return Finding(observed, hint, evidence)
 
 
 class ProportionalSpeed(GoalParameters):
@@ -181,13 +178,6 @@ def _speeds(run: Approach, behind: int) -> list[Sample]:
     return found[last:]
 
 
-def _range_words(parameters: Proportional) -> str:
-    low, high = parameters.gain_min, parameters.gain_max
-    limits = [f"at least {low:.3g} 1/s"] if low is not None else []
-    limits += [f"at most {high:.3g} 1/s"] if high is not None else []
-    return f", gain {' and '.join(limits)}" if limits else ""
-
-
 def _is_good(verdict: LawVerdict, parameters: Proportional) -> bool:
     return verdict.law is Law.PROPORTIONAL and verdict.r2 >= parameters.r2 and verdict.gain > 0.0
 
@@ -201,16 +191,14 @@ def _samples(
     return at_the_goal(run, known, parameters.position, limit_rad_s)
 
 
-def _judge_gain(
-    verdict: LawVerdict, parameters: Proportional, expected: str, evidence: Evidence
-) -> Finding:
+def _judge_gain(verdict: LawVerdict, parameters: Proportional, evidence: Evidence) -> Finding:
     low, high = parameters.gain_min or 0.0, parameters.gain_max or math.inf
     seen = f"gain {verdict.gain:.3g} 1/s, R² {verdict.r2:.3f}, {counted(verdict.used, 'command')}"
     if low <= verdict.gain <= high:
-        return Finding.passed(expected, seen, evidence)
+        return Finding.as_asked(seen, evidence)
     size = "small" if verdict.gain < low else "large"
     hint = "The gain is the factor of the error."
-    return Finding.failed(expected, f"{seen}: the gain is too {size}", hint, evidence)
+    return Finding(f"{seen}: the gain is too {size}", hint, evidence)
 
 
 def _words(verdict: LawVerdict, parameters: Proportional, number: int) -> tuple[str, str]:

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.findings.finding import Evidence, Finding, Moment
 from grader.findings.finding import first_seen
 from grader.measure.numbering import published
@@ -93,9 +93,7 @@ class Answers(Parameters):
     )
     at_least: int = Field(1, ge=1, description="How many such cases must have been sent.")
 
-    @property
-    def words(self) -> str:
-        """What is expected, in words."""
+    def _asked(self) -> str:
         which = f" ({listing((group.words for group in self.cases), 'or')})" if self.cases else ""
         unit = (
             "" if self.conversion == "quaternion_to_rpy" else f", length 1 within {self.length:g}"
@@ -127,30 +125,25 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     Each answer is paired with its question, so a missing answer does not shift the others. A node
     that repeats its last answer without a new question is wrong.
     """
-    expected = parameters.words
     sent = recording.sent.get(parameters.stimulus, ())
     received = recording.on(parameters.topic)
     if not sent:
-        return replace(why_not_sent(recording, parameters.stimulus), expected=expected)
+        return why_not_sent(recording, parameters.stimulus)
     if not received:
-        cause = _elsewhere(recording, parameters) or why_silent(recording, parameters.topic)
-        return replace(cause, expected=expected)
+        return _elsewhere(recording, parameters) or why_silent(recording, parameters.topic)
     try:
         found = cases(parameters.conversion, sent, received, parameters.limits)
     except WrongMessage as error:
-        return Finding.error(expected, f"the messages are not what the check converts: {error}")
+        return Finding.ours(f"the messages are not what the check converts: {error}")
     judged = [case for case in found if parameters.judges(case) and _answerable(recording, case)]
     wrong = [case for case in judged if case.answers and not case.good]
     missing = [case for case in judged if not case.answers and not case.optional]
     evidence = evidence_of(
         recording, parameters.conversion, parameters.topic, parameters.tolerance, judged
     )
-    elsewhere = _elsewhere(recording, parameters) if wrong or missing else None
-    if elsewhere is not None:
-        return replace(elsewhere, expected=expected)
+    stop_if(_elsewhere(recording, parameters) if wrong or missing else None)
     if _is_behind(found):
-        return Finding.failed(
-            expected,
+        return Finding(
             "each answer belongs to the message before: that to case 1 came after case 2 had been "
             f"sent, and so on; case {len(found)}, the last, has none",
             "Compute from the message that the callback is called with, then publish. What an "
@@ -168,7 +161,7 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
             f"{counted(unasked, 'message')} on {code(parameters.topic)} before anything was asked "
             f"on {code(parameters.stimulus)}"
         )
-        return Finding.failed(expected, observed, _UNPROMPTED_HINT, evidence)
+        return Finding(observed, _UNPROMPTED_HINT, evidence)
     copies = max((len(case.answers) for case in judged[:-1]), default=1)
     if judged and (times := len(judged[-1].answers)) > max(copies, 1) + _MORE_COPIES:
         when_s = recording.since_launch_s(received[-1].stamp_ns)
@@ -177,10 +170,10 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
             f"case {judged[-1].number} was answered {counted(times, 'time')}: the same answer "
             f"comes on {code(parameters.topic)} again and again when nothing new is asked"
         )
-        return Finding.failed(expected, observed, _UNPROMPTED_HINT, evidence)
+        return Finding(observed, _UNPROMPTED_HINT, evidence)
     if len(judged) < parameters.at_least:
-        return replace(_too_few(recording, parameters, found, judged), expected=expected)
-    return Finding.passed(expected, _summary(judged), evidence)
+        return _too_few(recording, parameters, found, judged)
+    return Finding.as_asked(_summary(judged), evidence)
 
 
 def _elsewhere(recording: Recording, parameters: Answers) -> Finding | None:
@@ -249,7 +242,7 @@ def _wrong(
         f"; case {first.number}, {conversion.shown(first.row)}, gave {shown(answer)}"
         f" instead of {right_words(parameters.conversion, first)}"
     )
-    return Finding.failed(parameters.words, observed, hint, evidence)
+    return Finding(observed, hint, evidence)
 
 
 def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> tuple[str, str]:
@@ -356,7 +349,6 @@ def _missing(
     missing: list[Case],
     evidence: Evidence,
 ) -> Finding:
-    expected = parameters.words
     conversion = CONVERSIONS[parameters.conversion]
     observed = (
         f"{len(missing)} of {counted(len(judged), 'case')} without an answer, the first: case "
@@ -372,13 +364,12 @@ def _missing(
     if cause is None and any(_starved(recording, case) for case in missing):
         cause = Finding.undecided(f"{observed}, but the machine took the time from the process")
     cause = cause or why_raised(recording, observed, missing[0].asked_ns)
-    cause = cause or Finding(
+    return cause or Finding(
         observed,
         "Publish once in every call of the callback. Look for an exception that is caught, and "
         "for a condition that leaves cases out.",
         evidence,
     )
-    return replace(cause, expected=expected)
 
 
 def _starved(recording: Recording, case: Case) -> bool:

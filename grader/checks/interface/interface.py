@@ -208,7 +208,10 @@ def _lines(sections: tuple[Section, ...]) -> Iterator[str]:
 class Manifest(OfInterface):
     """Parameters of interface.manifest."""
 
-    asks = "package.xml of `{self.parts.package}` has what an interface package needs"
+    asks = (
+        "package.xml of `{self.parts.package}` has what an interface package needs, and the "
+        "package is registered where ROS looks for it"
+    )
 
 
 @check("interface.manifest", Subject.SUBMISSION, Manifest, concept="interfaces")
@@ -239,15 +242,13 @@ def manifest(submission: SubmissionRecord, parameters: Manifest) -> Finding:
     if package.registered:
         return Finding.as_asked("every entry is there")
     cmake = package.file("CMakeLists.txt")
-    found = mistaken(
+    return mistaken(
         "unregistered",
         f"{code(package.name)} was installed, but not registered: neither `ros2 interface show` "
         "nor another package finds it",
         Evidence(places=(SourceError(cmake, None, "ends without it"),)),
         cmake=code(cmake),
     )
-    registered = "the package is registered where ROS looks for it"
-    return replace(found, expected=f"{parameters.asked_for}, and {registered}")
 
 
 def _missing(package: PackageRecord, used: Iterable[str]) -> Iterator[tuple[str, str]]:

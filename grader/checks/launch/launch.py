@@ -106,7 +106,6 @@ def arguments(recording: Recording, parameters: Arguments) -> Finding:
     Judged by what `ros2 launch --show-args` prints. It needs a separate scenario with the launch
     `{file: robot.launch.py, arguments: [--show-args]}`.
     """
-    asked = parameters.asked_for
     lines = [line for line in recording.log if line.stream == "stdout"]
     if not any(line.text.startswith("Arguments (pass") for line in lines):
         stop_if(why_crashed(recording))
@@ -131,7 +130,7 @@ def arguments(recording: Recording, parameters: Arguments) -> Finding:
         value = "..." if wanted is None else wanted
         write = f"DeclareLaunchArgument('{name}', default_value='{value}', description='...')"
         return mistaken("other_argument", seen, evidence, argument=code(write))
-    return Finding.passed(asked, there, evidence)
+    return Finding.as_asked(there, evidence)
 
 
 def _is_default(shown: str, wanted: str | float | bool) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 
 from pydantic import Field
 
@@ -46,6 +45,15 @@ class WithinLimits(RobotParameters):
 
     asks = "commands within the limits of the robot"
 
+    def asked_of(self, subject: Recording) -> str:
+        """With the limits of the robot that the run has."""
+        if subject.scene is None:
+            return self.asked_for
+        limits = (
+            f"{speed(subject.scene.max_linear_m_s)} and {turn(subject.scene.max_angular_rad_s)}"
+        )
+        return f"commands of at most {limits}, either way"
+
 
 @check("motion.within_limits", Subject.RECORDING, WithinLimits)
 def within_limits(recording: Recording, parameters: WithinLimits) -> Finding:
@@ -57,10 +65,6 @@ def within_limits(recording: Recording, parameters: WithinLimits) -> Finding:
     stop_if(why_not_judged(recording))
     sent, scene = commands(recording), recording.scene
     assert scene is not None
-    expected = (
-        f"commands of at most {speed(scene.max_linear_m_s)} and {turn(scene.max_angular_rad_s)}, "
-        "either way"
-    )
     if not sent:
         return why_silent(recording, command_topic(recording))
     stop_if(why_rejected(recording))
@@ -71,21 +75,17 @@ def within_limits(recording: Recording, parameters: WithinLimits) -> Finding:
     )
     if not beyond:
         widest = max(sent, key=lambda item: _excess(item, scene)[0])
-        return Finding.passed(
-            expected,
-            f"{counted(len(sent), 'command')}, at most {_excess(widest, scene)[1]}",
-            Evidence(plots=plots),
-        )
+        seen = f"{counted(len(sent), 'command')}, at most {_excess(widest, scene)[1]}"
+        return Finding.as_asked(seen, Evidence(plots=plots))
     first, worst = beyond[0], max(beyond, key=lambda item: _excess(item, scene)[0])
     share = percent(round(len(beyond) / len(sent), 3))
     most = "" if worst is first else f", the largest {_excess(worst, scene)[1]}"
-    found = mistaken(
+    return mistaken(
         "beyond_limits",
         f"{len(beyond)} of {counted(len(sent), 'command')} ({share}): the first is "
         f"{_excess(first, scene)[1]}{most}",
         evidence_at(recording, "first command beyond a limit", first.time_ns, *plots),
     )
-    return replace(found, expected=expected)
 
 
 def _excess(item: VelocityCommand, scene: Scene) -> tuple[float, str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import accumulate
 from operator import sub
 
@@ -13,7 +12,7 @@ from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import GoalParameters, RobotParameters
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.missed_goal import why_not_aligned, why_not_there
-from grader.diagnosis.motion.no_motion import why_not_moved
+from grader.diagnosis.motion.no_motion import approach, why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted, why_off_course, why_unsteered
 from grader.findings.finding import Evidence, Finding, Plot, evidence_at, until_the_end
 from grader.findings.words import degrees, metres, percent, point, speed, turn
@@ -46,6 +45,16 @@ class Reaches(GoalParameters):
     def _asked(self) -> str:
         return f"{'at rest ' if self.at_rest else ''}within {metres(self.position)} of the goal"
 
+    def asked_of(self, subject: Recording) -> str:
+        """With the place of the goal, which may be random."""
+        run = approach(subject, self.goal)
+        if isinstance(run, Finding):
+            return self.asked_for
+        expected = self.asked_for.removesuffix("the goal") + point(run.goal.x_m, run.goal.y_m)
+        if self.heading is None:
+            return expected
+        return f"{expected} and {degrees(self.heading)} of the heading {degrees(run.goal.yaw_rad)}"
+
 
 @check("motion.reaches", Subject.RECORDING, Reaches)
 def reaches(recording: Recording, parameters: Reaches) -> Finding:
@@ -56,21 +65,17 @@ def reaches(recording: Recording, parameters: Reaches) -> Finding:
     same heading).
     """
     run, heading = parameters.approach(recording), parameters.heading
-    expected = parameters.asked_for.removesuffix("the goal") + point(run.goal.x_m, run.goal.y_m)
-    if heading is not None:
-        expected += f" and {degrees(heading)} of the heading {degrees(run.goal.yaw_rad)}"
     last = run.truth[-1]
-    cause = why_not_there(run, parameters.position)
-    if cause is None and heading is not None:
-        cause = why_not_aligned(run, parameters.position, heading)
-    if cause is None and parameters.at_rest and not is_at_rest(last):
-        cause = why_off_course(recording) or _restless(recording, last, "is at the goal, but")
-    if cause is not None:
-        return replace(cause, expected=expected)
+    stop_if(why_not_there(run, parameters.position))
+    if heading is not None:
+        stop_if(why_not_aligned(run, parameters.position, heading))
+    if parameters.at_rest and not is_at_rest(last):
+        stop_if(why_off_course(recording))
+        return _restless(recording, last, "is at the goal, but")
     seen = f"{metres(run.distance_m(last))} from the goal"
     if heading is not None:
         seen += f", {degrees(abs(run.heading_error_rad(last)))} off its heading"
-    return Finding.passed(expected, seen, Evidence(plots=(run.distance_plot, run.heading_plot)))
+    return Finding.as_asked(seen, Evidence(plots=(run.distance_plot, run.heading_plot)))
 
 
 def _restless(recording: Recording, last: Truth, place: str) -> Finding:

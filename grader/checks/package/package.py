@@ -248,11 +248,11 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding:
     Judged by what the build installed in `share/<package>/`.
     """
     stop_if(why_not_built(submission, parameters.package))
-    package, asked = existing_package(submission, parameters.package), parameters.asked_for
+    package = existing_package(submission, parameters.package)
     installed = [path for path, _ in package.shared]
     found = [path for path in installed if fnmatchcase(path, parameters.path)]
     if found:
-        return Finding.passed(asked, f"it installs {codes(found)}")
+        return Finding.as_asked(f"it installs {codes(found)}")
     if not installed:
         # Each package installs its package.xml.
         return Finding.ours("what it installs was not recorded: grade again")

@@ -271,10 +271,10 @@ def given(recording: Recording, parameters: Given) -> Finding:
     starts the nodes, a parameter file that is for none of them fails, too. If it fails, others
     that fail in the same scenario, without partial credit, are skipped, but for those it requires.
     """
-    given, asked = parameters.names or recording.given_parameters, parameters.asked_for
+    given = parameters.names or recording.given_parameters
     finding = why_not_taken(recording, given)
     if finding is None:
-        return Finding.passed(asked, "no other parameter is given")
+        return Finding.as_asked("no other parameter is given")
     likely = misnamed_parameters(recording, given) if parameters.remap else {}
     if not likely:
         return finding
