@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.explanation import Symptom, explanation, mistaken, remedy
+from grader.diagnosis.process.not_called import held_up_below
 from grader.findings.finding import Evidence, Finding, Table, moment
 from grader.findings.words import counted
 from grader.measure import declarations
@@ -227,13 +228,8 @@ def other_depth(symptom: OtherHistory) -> Finding:
 @explanation(UnpublishedBefore)
 def no_cpu_time(symptom: UnpublishedBefore) -> Finding | None:
     """The machine gave the process too little CPU time; this is an error and costs no points."""
-    begin_ns, joined_ns = _watched_ns(symptom)
-    stolen_s = symptom.recording.stolen_s(begin_ns, joined_ns)
-    span_s = (joined_ns - begin_ns) / NS
-    # With the time that was taken from it, the node may have come to as many as are needed.
-    if symptom.number * span_s <= symptom.last * (span_s - stolen_s):
-        return None
-    return Finding.held_up(symptom.seen, stolen_s)
+    recording, number, span_ns = symptom.recording, symptom.number, _watched_ns(symptom)
+    return held_up_below(recording, symptom.seen, number, symptom.last, span_ns)
 
 
 @explanation(UnpublishedBefore, general=True)

@@ -12,6 +12,7 @@ from grader.diagnosis.process.not_called import (
     NotCalled,
     blocked_executor,
     callback_raised,
+    held_up_below,
     left_s,
     no_cpu_time,
 )
@@ -152,12 +153,11 @@ class FewMessages(OnTopic, NotCalled):
     @property
     def excuse(self) -> Finding | None:
         """The machine's doing, if without its delays the process may have published enough."""
-        number = len(self.recording.on(self.topic))
-        stolen_s = self.recording.stolen_s(self.begin_ns, self.recording.stop_ns)
-        left_to_it_s = self.watched_s - stolen_s
-        if stolen_s <= 0.0 or number * self.watched_s < self.needed * left_to_it_s:
-            return None
-        return Finding.held_up(self.seen, stolen_s)
+        number, span_ns = (
+            len(self.recording.on(self.topic)),
+            (self.begin_ns, self.recording.stop_ns),
+        )
+        return held_up_below(self.recording, self.seen, number, self.needed, span_ns)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from grader.findings.finding import Evidence, Moment, Table, Finding
 from grader.checks.need import Need, Recorded
 from grader.findings.words import code, codes, counted, value_text
 from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.process.not_called import held_up_below
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.words import Words, worded
 from grader.recording.model import NS, Recording
@@ -96,13 +97,9 @@ def _incomplete(
     begun, ended = len(reports.of(name)), len(reports.ended([name]))
     begin_ns = recording.matched_ns or recording.launched_ns
     watched_s = (recording.stop_ns - begin_ns) / NS
-    stolen_s = recording.stolen_s(begin_ns, recording.stop_ns)
-    # With the time that was taken from it, the node may have come to as many as are needed.
-    if stolen_s > 0.0 and ended * watched_s >= at_least * (watched_s - stolen_s):
-        return Finding.undecided(
-            f"{code(name)} ran {counted(ended, 'time')}, but the machine took "
-            f"{format_duration(stolen_s)} of {format_duration(watched_s)} from the process"
-        )
+    ran, span_ns = f"{code(name)} ran {counted(ended, 'time')}", (begin_ns, recording.stop_ns)
+    if held_up := held_up_below(recording, ran, ended, at_least, span_ns):
+        return held_up
     if begun > ended:
         return Finding(
             f"{code(name)} reported {counted(begun, 'start')}, but {ended or 'no'} "

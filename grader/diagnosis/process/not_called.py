@@ -30,6 +30,16 @@ def left_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
     return (end_ns - begin_ns) / NS - recording.stolen_s(begin_ns, end_ns)
 
 
+def held_up_below(
+    recording: Recording, seen: str, number: int, needed: int, span_ns: tuple[int, int]
+) -> Finding | None:
+    """The machine's doing, if with the time that it took there may have been as many as needed."""
+    begin_ns, end_ns = span_ns
+    stolen_s, own_s = recording.stolen_s(begin_ns, end_ns), left_s(recording, begin_ns, end_ns)
+    enough = number * (end_ns - begin_ns) / NS >= needed * own_s
+    return Finding.held_up(seen, stolen_s) if stolen_s > 0.0 and enough else None
+
+
 @dataclass(frozen=True)
 class NotCalled(NotDone, concept="executors"):
     """No callback is called, whatever was waited for: messages, answers, requests, log lines."""
