@@ -53,6 +53,10 @@ class _Dumper(yaml.SafeDumper):
 
     yaml_implicit_resolvers = _Types.yaml_implicit_resolvers
 
+    def ignore_aliases(self, data: Any) -> bool:
+        """Write each value out, also where several places share it."""
+        return True
+
 
 def _written(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
     # Unquoted, the other line ends of Unicode would be read as line ends.

@@ -109,6 +109,7 @@ def test_what_is_printed_for_a_group_reads_like_other_checks(write: Write) -> No
     printed = whole(load_assignment(write(GOOD)))
     told = "- id: quick\n  uses: timing.period\n  with:\n    topic: /cmd_vel\n    tolerance: 9 %\n"
     assert told in printed
+    assert "*id" not in printed
     assert load_assignment(write(printed)).checks == load_assignment(write(GOOD)).checks
 
 
