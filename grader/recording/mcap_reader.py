@@ -16,11 +16,10 @@ from mcap.reader import make_reader
 from mcap.records import Attachment, Channel, DataEnd, Metadata, Schema
 from mcap.records import Message as Record
 from mcap.stream_reader import StreamReader
-from mcap_ros2.decoder import DecoderFactory
 from pydantic import TypeAdapter
 
 from grader.errors import UsageError
-from grader.recording.interface import FEEDBACK
+from grader.recording.cdr import decoder
 from grader.recording.mcap_writer import (
     FACTS,
     FACTS_SUFFIX,
@@ -35,8 +34,6 @@ from grader.recording.model import Message, Recording
 from grader.recording.submission import SubmissionRecord, record_of
 from grader.spec.names import old_names
 
-# Types of the primitive fields, and of an array of bytes.
-_PLAIN = frozenset({bool, int, float, str, bytes})
 _LISTS = {name: GenericAlias(list, (kind,)) for name, kind in FACTS.items()}
 
 
@@ -147,14 +144,14 @@ class _Unreadable(Exception):
 
 
 def _message(schema: Schema, channel: Channel, record: Record) -> Message:
-    decode = _decoder(schema.name, schema.encoding, schema.data)
     try:
-        value = _fields(decode(record.data))
-    except NotImplementedError as error:
-        # A type that the library cannot read is not the fault of the publisher.
+        decode = _decoder(schema.name, schema.encoding, schema.data)
+    except ValueError as error:
+        # A type that cannot be read is not the fault of the publisher.
         raise ValueError(f"{channel.topic}: {error}") from error
+    try:
+        value = decode(record.data)
     except Exception as error:
-        # On such bytes the CDR decoder raises errors of any kind.
         raise _Unreadable from error
     return Message(
         topic=channel.metadata.get(TOPIC, channel.topic),
@@ -167,16 +164,11 @@ def _message(schema: Schema, channel: Channel, record: Record) -> Message:
 
 
 @lru_cache(maxsize=64)
-def _decoder(name: str, encoding: str, definition: bytes) -> Callable[[bytes], Any]:
+def _decoder(name: str, encoding: str, definition: bytes) -> Callable[[bytes], dict[str, Any]]:
     """The decoder of a type's messages; each recording of a class has the same types."""
-    if name.endswith(FEEDBACK):
-        # The library allows no underscore in the name of a message.
-        name, definition = name.replace("_F", "F"), definition.replace(b"_Feedback", b"Feedback")
-    schema = Schema(id=0, name=name, encoding=encoding, data=definition)
-    decode = DecoderFactory().decoder_for("cdr", schema)
-    if decode is None:
+    if encoding != "ros2msg":
         raise ValueError(f"{name} is defined as {encoding}, not as ros2msg")
-    return decode
+    return decoder(name, definition.decode())
 
 
 def _in_order(messages: Mapping[str, list[Message]]) -> dict[str, tuple[Message, ...]]:
@@ -227,14 +219,3 @@ def _frame(record: Metadata) -> dict[str, Any]:
     if "names" not in frame:
         frame["names"] = old_names(frame["environment"])
     return frame
-
-
-def _fields(value: Any) -> Any:
-    """Plain mappings and lists from what the CDR decoder made."""
-    kind = type(value)
-    if kind in _PLAIN:
-        return value
-    if kind is list:
-        # All of an array is of one type, and the ranges of a scan are many.
-        return list(map(_fields, value)) if value and type(value[0]) not in _PLAIN else value
-    return {name: _fields(getattr(value, name)) for name in kind.__slots__}
