@@ -15,6 +15,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from grader.sandbox.proc import read_proc
+
 _PAGE = os.sysconf("SC_PAGE_SIZE")
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _PROC = "/proc"
@@ -151,8 +153,7 @@ class IdleCpu:
         if not self._is_known:
             return 0
         try:
-            with open(f"{_PROC}/stat", encoding="ascii") as file:  # noqa: PTH123  often
-                return idle_ticks(file.read(), self._cpus)
+            return idle_ticks(read_proc(f"{_PROC}/stat").decode("ascii"), self._cpus)
         except (OSError, ValueError, IndexError):
             return 0
 
@@ -163,8 +164,9 @@ def idle_ticks(stat: str, cpus: Iterable[int]) -> int:
     Where the kernel counts packets apart, they are no time of the process that floods a port.
     """
     wanted = {f"cpu{number}" for number in cpus}
-    rows = (line.split() for line in stat.splitlines())
-    return sum(int(row[4]) + int(row[5]) + int(row[7]) for row in rows if row and row[0] in wanted)
+    # Another line has a number for each interrupt of the machine.
+    rows = (line.split() for line in stat.splitlines() if line.startswith("cpu"))
+    return sum(int(row[4]) + int(row[5]) + int(row[7]) for row in rows if row[0] in wanted)
 
 
 def memory_bytes(usages: Sequence[Usage], enough: int, hidden: int = 0) -> int:
@@ -239,9 +241,8 @@ def folder_usage(folders: Iterable[Path], most_bytes: int, most_files: int) -> t
 def usage_at(pid: int, folder: str = _PROC) -> Usage | None:
     """What one process takes by itself; None where it has ended."""
     try:
-        with open(f"{folder}/{pid}/stat", "rb") as file:  # noqa: PTH123  often
-            # The command's name may contain anything, but the last ")" ends it.
-            fields = file.read().rpartition(b")")[2].split()
+        # The command's name may contain anything, but the last ")" ends it.
+        fields = read_proc(f"{folder}/{pid}/stat").rpartition(b")")[2].split()
         # The numbers of the fields are those of proc(5), less three.
         return Usage(
             pid=pid,
@@ -260,8 +261,8 @@ def usage_at(pid: int, folder: str = _PROC) -> Usage | None:
 def _shared_bytes() -> int:
     """No less than all shared memory that this machine holds: see proc_meminfo(5)."""
     try:
-        with open(f"{_PROC}/meminfo", "rb") as file:  # noqa: PTH123  often
-            found = dict(re.findall(rb"^(\w+):\s*(\d+) kB$", file.read(), re.MULTILINE))
+        text = read_proc(f"{_PROC}/meminfo")
+        found = dict(re.findall(rb"^(\w+):\s*(\d+) kB$", text, re.MULTILINE))
         # Whose the swapped pages are is not said there.
         swapped = int(found[b"SwapTotal"]) - int(found[b"SwapFree"])
         return 1024 * (int(found[b"Shmem"]) + swapped)
@@ -295,8 +296,9 @@ def _open_files(pid: int) -> int:
         return os.stat(folder).st_size or len(os.listdir(folder))  # noqa: PTH116, PTH208  often
     except PermissionError:
         # For how many it has room, which no process can hide.
-        with contextlib.suppress(OSError), open(f"{_PROC}/{pid}/status", "rb") as file:  # noqa: PTH123
-            found = re.search(rb"^FDSize:\s*(\d+)$", file.read(), re.MULTILINE)
+        with contextlib.suppress(OSError):
+            text = read_proc(f"{_PROC}/{pid}/status")
+            found = re.search(rb"^FDSize:\s*(\d+)$", text, re.MULTILINE)
             return int(found[1]) if found else 0
     except OSError:
         pass
@@ -311,8 +313,8 @@ def _in_flight(pid: int) -> int:
         for name in os.listdir(folder):  # noqa: PTH208  often
             with contextlib.suppress(FileNotFoundError):
                 if os.readlink(f"{folder}/{name}").startswith("socket:"):  # noqa: PTH115  often
-                    with open(f"{folder}info/{name}", "rb") as file:  # noqa: PTH123  often
-                        number = re.search(rb"^scm_fds:\s*(\d+)$", file.read(), re.MULTILINE)
+                    text = read_proc(f"{folder}info/{name}")
+                    number = re.search(rb"^scm_fds:\s*(\d+)$", text, re.MULTILINE)
                     found += int(number[1]) if number else 0
     return found
 

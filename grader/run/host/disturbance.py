@@ -18,13 +18,14 @@ import os
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from itertools import takewhile
 from typing import NamedTuple
 
 from grader.recording.event import LONGEST_STRETCH, Disturbance
 from grader.recording.model import NS
+from grader.sandbox.proc import read_proc
 from grader.sandbox.usage import IdleCpu, OrphanCpu, Process, Taken, usage_at
 
 _TICK_NS = NS // os.sysconf("SC_CLK_TCK")
@@ -44,7 +45,7 @@ class Interval:
     others_ns: int
 
 
-def others_share(waited_ns: int, intervals: Iterable[Interval]) -> int:
+def others_share(waited_ns: int, intervals: Sequence[Interval]) -> int:
     """How much of a wait for a CPU others than the student can explain, at most; nanoseconds.
 
     Every nanosecond that a thread waits on a CPU's queue while another one runs there is one of
@@ -54,11 +55,11 @@ def others_share(waited_ns: int, intervals: Iterable[Interval]) -> int:
         waited_ns: Of a wait that was over within the last interval; it may have begun before it.
         intervals: Without gaps, oldest first; nothing is known without any.
     """
-    known = list(intervals)
-    if not known:
+    if not intervals:
         return waited_ns
-    began_ns = known[-1].begin_ns - waited_ns
-    return min(waited_ns, sum(item.others_ns for item in known if item.end_ns > began_ns))
+    began_ns = intervals[-1].begin_ns - waited_ns
+    within = takewhile(lambda item: item.end_ns > began_ns, reversed(intervals))
+    return min(waited_ns, sum(item.others_ns for item in within))
 
 
 @dataclass(frozen=True)
@@ -154,11 +155,9 @@ def scheduled(pid: int) -> dict[int, Scheduled]:
     # It may end meanwhile.
     with contextlib.suppress(OSError):
         for name in os.listdir(f"/proc/{pid}/task"):  # noqa: PTH208  often
-            with (
-                contextlib.suppress(OSError, IndexError, ValueError),
-                open(f"/proc/{pid}/task/{name}/schedstat", "rb") as file,  # noqa: PTH123
-            ):
-                ran_ns, waited_ns, _ = map(int, file.read().split())
+            with contextlib.suppress(OSError, IndexError, ValueError):
+                text = read_proc(f"/proc/{pid}/task/{name}/schedstat")
+                ran_ns, waited_ns, _ = map(int, text.split())
                 found[int(name)] = Scheduled(ran_ns, waited_ns)
     return found
 
@@ -195,16 +194,17 @@ class Waits:
         return longest_ns
 
 
-def uncounted(waited_ns: int, end_ns: int, samples: Iterable[tuple[int, int, int]]) -> int:
+def uncounted(waited_ns: int, end_ns: int, samples: Sequence[tuple[int, int, int]]) -> int:
     """How much of a wait that ended now no other thread's wait has counted for.
 
     Threads wait at the same time, but the time is lost once.
 
     Args:
-        samples: Begin, end and counted wait of the samples before.
+        samples: Begin, end and counted wait of the samples before, without gaps, oldest first.
     """
     begin_ns = end_ns - waited_ns
-    known = (min(counted, max(0, to - max(at, begin_ns))) for at, to, counted in samples)
+    within = takewhile(lambda sample: sample[1] > begin_ns, reversed(samples))
+    known = (min(counted, to - max(at, begin_ns)) for at, to, counted in within)
     return max(0, waited_ns - sum(known))
 
 
@@ -219,7 +219,7 @@ def beyond(late_ns: int, waited_ns: int, length_ns: int) -> int:
 def is_blocked(pid: int) -> bool:
     """Whether a process waits for the kernel, uninterruptibly: state D in proc_pid_stat(5)."""
     try:
-        status = Path(f"/proc/{pid}/stat").read_bytes()
+        status = read_proc(f"/proc/{pid}/stat")
     except OSError:
         return False
     return status[status.rindex(b")") + 2 :].startswith(b"D")

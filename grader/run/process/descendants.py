@@ -17,6 +17,8 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
+from grader.sandbox.proc import read_proc
+
 _PR_SET_CHILD_SUBREAPER = 36
 _PROC = Path("/proc")
 _LONGEST_COMMAND = 1000
@@ -71,9 +73,8 @@ class Family:
 
 def _parent(pid: str, *, of_zombie: bool = True) -> int | None:
     try:
-        with open(f"/proc/{pid}/stat", "rb") as file:  # noqa: PTH123  often
-            # The command's name may contain anything, but the last ")" ends it.
-            state, parent, *_ = file.read().rpartition(b") ")[2].split()
+        # The command's name may contain anything, but the last ")" ends it.
+        state, parent, *_ = read_proc(f"/proc/{pid}/stat").rpartition(b") ")[2].split()
     except (OSError, ValueError):
         return None
     return int(parent) if of_zombie or state not in (b"Z", b"X") else None
@@ -82,7 +83,7 @@ def _parent(pid: str, *, of_zombie: bool = True) -> int | None:
 def is_stopped(pid: int) -> bool:
     """Whether a signal such as SIGSTOP has stopped a process, so that it waits for SIGCONT."""
     try:
-        return (_PROC / str(pid) / "stat").read_bytes().rpartition(b") ")[2].startswith(b"T")
+        return read_proc(f"/proc/{pid}/stat").rpartition(b") ")[2].startswith(b"T")
     except OSError:
         return False
 
