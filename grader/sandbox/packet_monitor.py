@@ -10,6 +10,8 @@ from pathlib import Path
 
 _UDP_TABLE = Path("/proc/net/udp")
 _ETH_P_IP = 0x0800
+# linux/socket.h, linux/if_packet.h: since Linux 4.20.
+_SOL_PACKET, _PACKET_IGNORE_OUTGOING = 263, 23
 _FRAGMENT_OFFSET = 0x1FFF
 _KEPT_BYTES = 65_535
 _MOST_AT_ONCE = 4096
@@ -37,6 +39,8 @@ class PacketMonitor:
         self._socket = socket.socket(socket.AF_PACKET, socket.SOCK_DGRAM, 0)
         try:
             self._socket.setblocking(False)
+            # On a loopback each packet goes out, and comes in.
+            self._socket.setsockopt(_SOL_PACKET, _PACKET_IGNORE_OUTGOING, 1)
             self._socket.bind(("lo", _ETH_P_IP))
         except OSError:
             self._socket.close()
@@ -46,16 +50,14 @@ class PacketMonitor:
         """How many packets to these UDP ports so far were none of any RTPS."""
         for _ in range(_MOST_AT_ONCE):
             try:
-                packet, address = self._socket.recvfrom(_KEPT_BYTES)
+                packet = self._socket.recv(_KEPT_BYTES)
             except BlockingIOError:
                 break
             header = (packet[0] & 0x0F) * 4
             port = int.from_bytes(packet[header + 2 : header + 4], "big")
             is_first = not int.from_bytes(packet[6:8], "big") & _FRAGMENT_OFFSET
             is_udp = packet[9] == socket.IPPROTO_UDP
-            # Every packet of a loopback comes by twice.
-            comes = address[2] != socket.PACKET_OUTGOING
-            if not (comes and is_first and is_udp and _FIRST_PORT <= port <= _LAST_PORT):
+            if not (is_first and is_udp and _FIRST_PORT <= port <= _LAST_PORT):
                 continue
             data = packet[header + _UDP_HEADER_BYTES :]
             # After the name the major version; every vendor's id so far begins with 1.
