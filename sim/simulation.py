@@ -76,20 +76,22 @@ class Schedule:
 
     def __init__(self, options: LidarOptions | OdometryOptions) -> None:
         """Begin at simulated time 0."""
-        self._rate = Fraction(options.rate).limit_denominator(1_000_000)
+        rate = Fraction(options.rate).limit_denominator(1_000_000)
+        # Whole numbers are computed with several times as fast as fractions.
+        self._times, self._in_ns = rate.numerator, rate.denominator * NS
         self._starts_ns = round(options.starts * NS)
         self._stops_ns = math.inf if options.stops is None else round(options.stops * NS)
         self._plan(1)
 
     def _plan(self, number: int) -> None:
-        self.next_ns = STEP_NS * math.ceil(number * NS / (self._rate * STEP_NS))
+        self.next_ns = -(-number * self._in_ns // (self._times * STEP_NS)) * STEP_NS
         """End of the step at which it will be due."""
 
     def is_due(self, time_ns: int) -> bool:
         """Whether it is due at the end of a step; times must increase."""
         if time_ns < self.next_ns:
             return False
-        self._plan(math.floor(time_ns * self._rate / NS) + 1)
+        self._plan(time_ns * self._times // self._in_ns + 1)
         return self._starts_ns <= time_ns < self._stops_ns
 
 
