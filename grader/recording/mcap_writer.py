@@ -102,7 +102,7 @@ def _write_facts(writer: Writer, recording: Recording) -> None:
     for name in FACTS:
         if facts := getattr(recording, name):
             # Without a time in it, so that the same recording is the same bytes.
-            data = gzip.compress(b"[%b]" % b",".join(map(to_json, facts)), mtime=0)
+            data = gzip.compress(to_json(facts), mtime=0)
             writer.add_attachment(at_ns, at_ns, f"{name}{FACTS_SUFFIX}", "application/gzip", data)
 
 

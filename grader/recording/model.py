@@ -440,6 +440,9 @@ class Recording:
 
 
 def to_json(fact: Any) -> bytes:
-    """A dataclass of the model as compact JSON."""
-    plain = dataclasses.asdict(fact)
-    return json.dumps(plain, separators=(",", ":"), sort_keys=True).encode()
+    """A dataclass of the model, or a list of them, as compact JSON."""
+    return json.dumps(fact, default=_fields, separators=(",", ":"), sort_keys=True).encode()
+
+
+def _fields(fact: Any) -> dict[str, Any]:
+    return {field.name: getattr(fact, field.name) for field in dataclasses.fields(fact)}
