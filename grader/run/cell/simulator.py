@@ -20,6 +20,12 @@ from sim.motion import Pose, Twist
 from sim.node import RosSimulator
 from sim.pacing import Lateness
 from sim.simulation import Simulation, Step, make_simulation
+from sim.world_model import WorldModel
+
+# By itself pydantic makes what validates a model when it is first used: in each cell, instead of
+# once in the process that cells are forked from.
+for _model in (SimulatorOptions, WorldModel):
+    _model.model_rebuild()
 
 _REST_M_S = 1e-3
 _REST_RAD_S = 1e-3
