@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
+from itertools import compress
 from operator import itemgetter
 
 from markupsafe import Markup
@@ -92,13 +93,14 @@ def _series(
     shown = _thinned(points, x) if len(points) > MANY else points
     across, down = x.all_clipped([a for a, _ in shown]), y.all_clipped([b for _, b in shown])
     placed = list(zip(across, down, strict=True))
-    bad = [pixel for pixel, point in zip(placed, shown, strict=True) if is_wrong(point)]
-    good = [pixel for pixel, point in zip(placed, shown, strict=True) if not is_wrong(point)]
+    wrong = list(map(is_wrong, shown))
+    bad = list(compress(placed, wrong))
     dense = len(placed) > DOTS
     drawn = []
     if len(placed) > 1:
         drawn.append(svg.curve(placed, "series dense" if dense else "series"))
-    if good and not dense:
+    if not dense and not all(wrong):
+        good = [pixel for pixel, is_bad in zip(placed, wrong, strict=True) if not is_bad]
         drawn.append(svg.dots(good, "dots"))
     if bad:
         drawn.append(svg.crosses(_apart(bad), "out"))
