@@ -85,24 +85,47 @@ class SourceClass:
     """A class.
 
     Attributes:
-        name: Qualified in its module, such as ``Outer.Inner`` or ``make.<locals>.Bot``.
+        name: Qualified in its module, such as ``Outer.Inner`` or ``make.<locals>.Bot``; in C++ with
+            its namespaces, such as ``robots::Rover``.
         bases: As written: ``Node``, ``rclpy.node.Node``; of a call such as ``mixed(Node)`` the
-            names in it.
+            names in it. In C++ without the arguments of templates.
+        end: Its last line; 0 in older records.
+        metaclass: In Python, as written.
+        fields: Attributes and member variables that it declares or, in Python, that its methods
+            assign to ``self``; each with the line where it is first.
     """
 
     name: str
     line: int
     bases: tuple[str, ...] = ()
     documented: bool = False
+    end: int = 0
+    metaclass: str = ""
+    fields: tuple[tuple[str, int], ...] = ()
+
+    @property
+    def short(self) -> str:
+        """The name alone."""
+        return _last(self.name)
 
 
 @dataclass(frozen=True)
 class SourceFunction:
     """A function or method.
 
+    In C++ this is a method in its class, also where it is only declared there, and the definition
+    of a method or function elsewhere; of other declarations, those with a comment for Doxygen.
+
     Attributes:
-        name: Qualified in its module, such as ``Bot.callback`` or ``main.<locals>.help``.
+        name: Qualified in its module, such as ``Bot.callback`` or ``main.<locals>.help``; in C++
+            with its namespaces, such as ``robots::Rover::drive``.
+        documented: By a docstring; in C++ by a comment for Doxygen.
         unannotated: Parameters without a type hint; ``self`` and ``cls`` are left out.
+        virtual: In C++, whether it is called so, or says that it overrides.
+        pure: It has no body that could be called: ``= 0``, ``@abstractmethod``.
+        overriding: In C++, whether it is marked ``override`` or ``final``.
+        parameters: Number of them, in C++.
+        public: In C++, whether it is neither private or protected nor in a namespace without name.
     """
 
     name: str
@@ -111,19 +134,52 @@ class SourceFunction:
     decorators: tuple[str, ...] = ()
     unannotated: tuple[str, ...] = ()
     returns: bool = False
+    virtual: bool = False
+    pure: bool = False
+    overriding: bool = False
+    parameters: int | None = None
+    public: bool = True
+
+    @property
+    def short(self) -> str:
+        """The name alone."""
+        return _last(self.name)
+
+
+@dataclass(frozen=True)
+class SourceCall:
+    """A call of a function.
+
+    Attributes:
+        name: As written: ``self.create_publisher``, ``std::this_thread::sleep_for``; without the
+            arguments of templates, and with ``.`` for ``->``.
+        literal: The first argument that is a text and could be a name, such as ``/cmd_vel``.
+    """
+
+    name: str
+    line: int
+    literal: str = ""
 
 
 @dataclass(frozen=True)
 class SourceFile:
-    """A Python file that runs; at most 2000 of each kind of thing in it.
+    """A file of Python that runs, or of C++; at most 2000 of each kind of thing in it.
 
     Attributes:
-        module: Dotted name that it is imported by, such as ``bot.node``.
-        names: What imports and plain assignments name: local name -> dotted name.
-        stars: Modules of ``from module import *``.
-        prints: Lines with ``print`` to the console.
-        uses: Attributes that it reads, such as ``publish``, and strings that could name one.
+        module: Dotted name that it is imported by, such as ``bot.node``; empty in C++.
+        names: What imports and plain assignments name: local name -> dotted name. In C++ what
+            ``using``, ``typedef`` and aliases of namespaces do.
+        stars: Modules of ``from module import *``; namespaces of ``using namespace``.
+        prints: Lines with ``print`` to the console; in C++ with ``std::cout``, ``printf``, ...
+        uses: Attributes that it reads, such as ``publish``, and strings that could name one; in C++
+            functions that it calls.
         sets: Attributes that it assigns to, as written: ``msg.linear.x``, each with its line.
+        calls: What it calls.
+        constructs: ``global`` and ``import *`` in Python; ``using namespace std``, ``goto``,
+            ``new``, ``delete`` and ``#define`` (of a value) in C++; each with its line.
+        includes: Headers that C++ includes, each with its line, and whether a condition may leave
+            it out.
+        unread: From where on, and why, it could not be read; of C++ only.
     """
 
     path: str
@@ -136,6 +192,15 @@ class SourceFile:
     prints: tuple[int, ...] = ()
     uses: tuple[str, ...] = ()
     sets: tuple[tuple[str, int], ...] = ()
+    language: str = PYTHON
+    calls: tuple[SourceCall, ...] = ()
+    constructs: tuple[tuple[str, int], ...] = ()
+    includes: tuple[tuple[str, int, bool], ...] = ()
+    unread: SourceError | None = None
+
+
+def _last(name: str) -> str:
+    return name.replace("::", ".").rpartition(".")[2]
 
 
 @dataclass(frozen=True)
@@ -185,7 +250,7 @@ class PackageRecord:
         shared: What it installed in ``share/<package>/``, by paths in there -> path in the
             submission of a Python file such as a launch file, else an empty text; at most 1000.
         registered: Whether ROS finds what was installed, in ament's index of packages.
-        sources: What its Python code says; tests, launch files and setup.py left aside.
+        sources: What its code says; tests, launch files and setup.py left aside.
         lint: What ruff says of the same files, or None where it did not run.
     """
 
@@ -347,11 +412,12 @@ class SubmissionRecord:
     def language(self, package: PackageRecord) -> str:
         """The language of its programs: Python, C++, or nothing if it has none, as interfaces."""
         own = (path for path in self.files if path.startswith(package.file("")))
+        of_python = any(one.language == PYTHON for one in package.sources)
         imported = {item.module for item in package.imports}
         is_compiled = any(path.endswith(_OF_CPP) for path in own)
         if package.build_type == "ament_python" or "rclpy" in imported:
             return PYTHON
-        return CPP if is_compiled else PYTHON if package.sources else ""
+        return CPP if is_compiled else PYTHON if of_python else ""
 
     def spoken(self, names: Iterable[str]) -> str:
         """The language to speak of packages in: C++ if their programs are all in it, or Python.

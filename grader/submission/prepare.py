@@ -25,6 +25,7 @@ from grader.submission.intake.members import MIB
 from grader.submission.intake.paths import shown
 from grader.submission.kept_source import keep_source
 from grader.submission.read.bag import read_bags
+from grader.submission.read.cpp import read_cpp
 from grader.submission.read.document import read_headings
 from grader.submission.read.package import Package, read_package, record_packages
 from grader.submission.read.parameter_file import read_parameter_files
@@ -150,8 +151,10 @@ def _hash(source: Path) -> str:
 
 def _prepare(located: Located, how: Preparation, store: UnderlayStore, is_second: bool) -> Prepared:
     ros, allowance = how.ros, Allowance()
+    outlines = read_cpp(located, ros, how.sandbox)
     packages = [
-        read_package(located, folder, ros, allowance) for folder in located.packages[:_MAX_PACKAGES]
+        read_package(located, folder, ros, allowance, outlines)
+        for folder in located.packages[:_MAX_PACKAGES]
     ]
     record = SubmissionRecord(
         located.id,

@@ -6,6 +6,7 @@ It lies in :mod:`grader.recording.submission` now: what judges needs nothing els
 from grader.recording.submission import (
     BuildRecord,
     PackageRecord,
+    SourceCall,
     SourceClass,
     SourceError,
     SourceFile,
@@ -16,6 +17,7 @@ from grader.recording.submission import (
 __all__ = [
     "BuildRecord",
     "PackageRecord",
+    "SourceCall",
     "SourceClass",
     "SourceError",
     "SourceFile",

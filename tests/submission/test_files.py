@@ -14,7 +14,7 @@ from grader.sandbox.limits import BUILD, MIB
 from grader.sandbox.sandbox import Sandbox
 from grader.submission.intake.locate import opened
 from grader.submission.prepare import Preparation, prepare
-from grader.submission.read import bag as bag_reader
+from grader.submission.read import reader
 from grader.submission.read.bag import read_bags
 from grader.submission.read.document import headings
 from tests.submission.samples import zip_bytes
@@ -96,7 +96,7 @@ def test_a_bag_that_unpacks_to_more_than_a_disk_fills_none(
     elsewhere = tmp_path / "tmp"
     elsewhere.mkdir()
     monkeypatch.setenv("TMPDIR", str(elsewhere))
-    monkeypatch.setattr(bag_reader, "BUILD", replace(BUILD, disk_bytes=8 * MIB, file_bytes=8 * MIB))
+    monkeypatch.setattr(reader, "BUILD", replace(BUILD, disk_bytes=8 * MIB, file_bytes=8 * MIB))
     record = read(packed_bag(tmp_path / "submission", 64 * MIB), isolated=isolated)
     assert "cannot be read" in str(record.problem)
     assert not list(elsewhere.iterdir())

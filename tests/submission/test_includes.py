@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from grader.submission.read.cmake import read_commands
+from grader.submission.read.cpp_contents import outline
 from grader.submission.read.includes import needed_files, read_included
 
 CMAKE = """\
@@ -47,8 +48,14 @@ FILES = {
 PACKAGES = "rclcpp std_msgs geometry_msgs sensor_msgs nav_msgs visualization_msgs tf2 ament_cmake"
 
 
+def includes(files: dict[str, str]) -> dict[str, list[tuple[str, int, bool]]]:
+    return {path: outline(text.encode())["includes"] for path, text in files.items()}
+
+
 def included(cmake: str = CMAKE, files: dict[str, str] = FILES) -> set[str]:
-    found = read_included(files, cmake, "p/CMakeLists.txt", set(PACKAGES.split()).__contains__)
+    found = read_included(
+        includes(files), cmake, "p/CMakeLists.txt", set(PACKAGES.split()).__contains__
+    )
     return {
         f"{item.module}{'?' if item.optional else ''} {item.file}:{item.line}"
         for item in found.packages
@@ -82,7 +89,7 @@ def test_a_header_of_a_package_of_that_name_may_be_its_own() -> None:
 
 def test_an_executable_needs_its_sources_their_libraries_and_headers() -> None:
     commands = read_commands(CMAKE)
-    own = read_included(FILES, CMAKE, "p/CMakeLists.txt", lambda _: False).own
+    own = read_included(includes(FILES), CMAKE, "p/CMakeLists.txt", lambda _: False).own
     files, lines = needed_files("one", commands, "p/", own) or (set(), set())
     assert files >= {"p/src/one.cpp", "p/src/drive.cpp", "p/include/bot/drive.hpp"}
     assert "p/src/two.cpp" not in files and lines == {6}

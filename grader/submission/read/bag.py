@@ -8,11 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import signal
-import sys
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,11 +18,10 @@ from grader.errors import GraderFault
 from grader.machine.out_of_memory import oom_kills
 from grader.machine.ros import RosInstallation
 from grader.recording.submission import BagRecord, BagTopic
-from grader.sandbox.limits import BUILD, size_words
-from grader.sandbox.usage import Usage, folder_usage
-from grader.submission.build.bounded import Command, Outcome, OutputLimits, run_bounded
+from grader.submission.build.bounded import OutputLimits
 from grader.submission.intake.locate import Located
 from grader.submission.intake.paths import join, shown
+from grader.submission.read.reader import Reader
 
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox
@@ -36,9 +31,7 @@ _STORAGE = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
 _MOST_BAGS = 10
 _CPU_S = 30
 _WALL_S = 300.0
-_OUTPUT = OutputLimits(head=256 * 1024, tail=4096)
-_LIBRARY = "rosbags"
-_PROGRAM = Path(__file__).with_name("bag_contents.py")
+_READER = Reader("bag_contents.py", ("rosbags",), _WALL_S, OutputLimits(head=256 * 1024, tail=4096))
 _RECORD = TypeAdapter(BagRecord)
 
 
@@ -67,14 +60,8 @@ def read_bags(
 
 
 def _read(root: Path, folder: str, ros: RosInstallation, sandbox: Sandbox | None) -> BagRecord:
-    path = shown(folder)
-    scratch = root.with_name("bag")
-    scratch.mkdir()
-    kills = oom_kills()
-    try:
-        outcome = _run(root, root / folder, scratch, ros, sandbox)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+    path, kills = shown(folder), oom_kills()
+    outcome = _READER.run(root, (str(root / folder), str(_CPU_S)), ros, sandbox)
     if outcome.ended_by_us == "time":
         raise GraderFault(f"the bag {path} was not read within {_WALL_S:.0f} s")
     if outcome.ended_by_us:
@@ -91,31 +78,3 @@ def _read(root: Path, folder: str, ros: RosInstallation, sandbox: Sandbox | None
     topics = (BagTopic(shown(one.name), shown(one.type), one.messages) for one in found.topics)
     problem = found.problem and shown(found.problem)
     return BagRecord(path, problem, found.duration_s, tuple(topics))
-
-
-def _run(
-    root: Path, bag: Path, scratch: Path, ros: RosInstallation, sandbox: Sandbox | None
-) -> Outcome:
-    program = _PROGRAM.read_text(encoding="utf-8")
-    command = [sys.executable, "-I", "-c", program, str(bag), str(_CPU_S)]
-    environment = {
-        "PATH": os.defpath,
-        "TMPDIR": str(scratch),
-        "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1",
-    }
-
-    def disk(_: object) -> str | None:
-        size, _ = folder_usage((scratch,), BUILD.disk_bytes, BUILD.files)
-        unpacked = f"it unpacks to more than {size_words(BUILD.disk_bytes)}"
-        return unpacked if size > BUILD.disk_bytes else None
-
-    excess: Callable[[Sequence[Usage]], str | None] = disk
-    with ExitStack() as stack:
-        if sandbox is not None:
-            room = stack.enter_context(
-                sandbox.allowing((_LIBRARY,)).build(ros, (scratch, root), BUILD)
-            )
-            command, environment = room.command(command, environment), dict(room.environment)
-            excess = room.excess
-        bounded = Command(command, scratch, environment)
-        return run_bounded(bounded, wall_s=_WALL_S, output=_OUTPUT, excess=excess)

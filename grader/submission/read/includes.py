@@ -1,14 +1,13 @@
 """Which packages the C++ of a package needs, by its headers and its CMakeLists.txt.
 
-Read as text and never compiled, so what conditions leave out is not known: what stands in ``#if``
-or ``#ifdef`` is optional, and what stands in ``#if 0`` or in a comment does not count.
+Read and never compiled, so what conditions leave out is not known: what stands in ``#if`` or
+``#ifdef`` is optional, and what stands in ``#if 0`` does not count.
 """
 
 from __future__ import annotations
 
 import posixpath
-import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -16,13 +15,7 @@ from grader.recording.submission import Import
 from grader.submission.read.cmake import CMakeCommand, read_commands
 
 CODE = (".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp", ".hxx")
-MOST_SOURCE_BYTES = 256 * 1024
-MOST_SOURCES = 200
-"""Larger files, and more of them, are not read."""
 _MOST = 2000
-_COMMENT = re.compile(r'"(?:\\.|[^"\\\n])*"|//[^\n]*|/\*.*?(?:\*/|\Z)', re.DOTALL)
-_DIRECTIVE = re.compile(r"\s*#\s*(if|ifdef|ifndef|elif|else|endif|include)\b\s*(.*)")
-_NAMED = re.compile(r'<([^<>"]+)>|"([^<>"]+)"')
 _PROGRAMS = ("add_executable", "add_library")
 _USES = ("ament_target_dependencies", "target_link_libraries")
 _NOT_CODE = ("test/", "tests/")
@@ -41,13 +34,22 @@ class Included:
     own: tuple[tuple[str, str], ...] = ()
 
 
+def is_built(path: str) -> bool:
+    """Whether a file counts as its package's code; the path is relative to the package."""
+    return not path.startswith(_NOT_CODE)
+
+
 def read_included(
-    files: Mapping[str, str], cmake: str | None, cmake_file: str, is_package: Callable[[str], bool]
+    files: Mapping[str, Sequence[tuple[str, int, bool]]],
+    cmake: str | None,
+    cmake_file: str,
+    is_package: Callable[[str], bool],
 ) -> Included:
     """What the sources of a package and its CMakeLists.txt need.
 
     Args:
-        files: Path of each source and header, from the folder of the package -> its text.
+        files: Path of each source and header, from the folder of the package -> headers that it
+            includes, each with its line, and whether a condition may leave it out.
         cmake_file: Path of CMakeLists.txt, as are the paths of the answer.
         is_package: Whether a name is that of another ROS package.
     """
@@ -59,9 +61,9 @@ def read_included(
     own: list[tuple[str, str]] = []
     every = (
         (path, *one)
-        for path, text in sorted(files.items())
-        if not path.startswith(_NOT_CODE)
-        for one in _includes(text)
+        for path, includes in sorted(files.items())
+        if is_built(path)
+        for one in includes
     )
     for path, header, line, optional in islice(every, _MOST):
         found = _own_header(header, path, files)
@@ -111,29 +113,7 @@ def needed_files(
     return files, lines
 
 
-def _includes(text: str) -> Iterator[tuple[str, int, bool]]:
-    """Each header that is included, its line, and whether it is under a condition."""
-    code = _COMMENT.sub(lambda m: m[0] if m[0][0] == '"' else "\n" * m[0].count("\n"), text)
-    # Of each open condition: whether its lines are left out, and whether they may be.
-    open_: list[tuple[bool, bool]] = []
-    for number, line in enumerate(code.split("\n"), start=1):
-        match = _DIRECTIVE.match(line)
-        if match is None:
-            continue
-        word, rest = match[1], match[2].strip()
-        if word in ("if", "ifdef", "ifndef"):
-            open_.append((word == "if" and rest == "0", word != "ifndef"))
-        elif word in ("elif", "else") and open_:
-            open_[-1] = (False, True)
-        elif word == "endif":
-            del open_[-1:]
-        elif word == "include" and not any(dead for dead, _ in open_):
-            named = _NAMED.match(rest)
-            if named is not None:
-                yield named[1] or named[2], number, any(doubtful for _, doubtful in open_)
-
-
-def _own_header(header: str, includer: str, files: Mapping[str, str]) -> str | None:
+def _own_header(header: str, includer: str, files: Collection[str]) -> str | None:
     """The file of the package that a header is: beside the includer, or in any folder."""
     beside = posixpath.normpath(posixpath.join(posixpath.dirname(includer), header))
     ends = f"/{header}"

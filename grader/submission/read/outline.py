@@ -7,14 +7,19 @@ stand for.
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
-from grader.recording.submission import SourceClass, SourceFile, SourceFunction
+from grader.recording.submission import SourceCall, SourceClass, SourceFile, SourceFunction
 
 _MOST = 2000
 _LONGEST_NAME = 200
 _CONSOLE = ("sys.stdout", "sys.stderr", "stdout", "stderr", "sys.__stdout__", "sys.__stderr__")
+
+_ABSTRACT = ("abstractmethod", "abstractproperty")
+_LITERAL = re.compile(r"[\w/~{}.-]{1,200}")
 
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -22,6 +27,8 @@ _Function = ast.FunctionDef | ast.AsyncFunctionDef
 class _Scope(NamedTuple):
     prefix: str = ""
     in_class: bool = False
+    owner: str = ""
+    """The class that it is in, or that its method is of."""
 
 
 def outline(tree: ast.Module, path: str, module: str) -> SourceFile:
@@ -34,6 +41,9 @@ def outline(tree: ast.Module, path: str, module: str) -> SourceFile:
     to_file: set[ast.expr] = set()
     uses: set[str] = set()
     sets: list[tuple[str, int]] = []
+    calls: list[SourceCall] = []
+    constructs: list[tuple[str, int]] = []
+    fields: dict[str, dict[str, int]] = {}
     redefined = False
     for node, scope in _walk(tree):
         if isinstance(node, ast.ClassDef):
@@ -52,39 +62,53 @@ def outline(tree: ast.Module, path: str, module: str) -> SourceFile:
             for alias in node.names:
                 if alias.name == "*":
                     stars.append(origin)
+                    constructs.append(("import *", node.lineno))
                 else:
                     names[alias.asname or alias.name] = f"{origin}.{alias.name}"
+        elif isinstance(node, ast.Global):
+            constructs.append(("global", node.lineno))
         elif isinstance(node, ast.Assign):
             dotted = _dotted(node.value)
             if dotted and not scope.prefix:
                 targets = (item.id for item in node.targets if isinstance(item, ast.Name))
                 names.update(dict.fromkeys(targets, dotted))
-        elif isinstance(node, ast.Call) and not _is_to_console(node):
-            to_file.add(node.func)
+        elif isinstance(node, ast.Call):
+            to_file.update([] if _is_to_console(node) else [node.func])
+            calls.append(_call(node))
         elif isinstance(node, ast.Attribute):
             if isinstance(node.ctx, ast.Load):
                 uses.add(node.attr[:_LONGEST_NAME])
             elif dotted := _dotted(node):
                 sets.append((dotted, node.lineno))
+                if dotted == f"self.{node.attr}" and scope.owner:
+                    fields.setdefault(scope.owner, {}).setdefault(node.attr, node.lineno)
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             # As getattr() takes it.
             is_name = node.value.isidentifier() and len(node.value) <= _LONGEST_NAME
             uses.update([node.value] if is_name else [])
-        elif isinstance(node, ast.Name) and node.id == "print":
-            prints[node] = node.lineno
-            redefined |= isinstance(node.ctx, ast.Store)
+        elif isinstance(node, ast.Name):
+            if scope.in_class and isinstance(node.ctx, ast.Store):
+                fields.setdefault(scope.owner, {}).setdefault(node.id, node.lineno)
+            if node.id == "print":
+                prints[node] = node.lineno
+                redefined |= isinstance(node.ctx, ast.Store)
     lines = {line for node, line in prints.items() if node not in to_file}
     return SourceFile(
         path=path,
         module=module,
         documented=bool(ast.get_docstring(tree)),
-        classes=tuple(sorted(classes, key=lambda item: item.line)[:_MOST]),
+        classes=tuple(
+            replace(one, fields=tuple(fields.get(one.name, {}).items())[:_MOST])
+            for one in sorted(classes, key=lambda item: item.line)[:_MOST]
+        ),
         functions=tuple(sorted(functions, key=lambda item: item.line)[:_MOST]),
         names=tuple(sorted(names.items())[:_MOST]),
         stars=tuple(dict.fromkeys(stars)),
         prints=() if redefined else tuple(sorted(lines)[:_MOST]),
         uses=tuple(sorted(uses)[:_MOST]),
         sets=tuple(sorted(sets, key=lambda item: item[1])[:_MOST]),
+        calls=tuple(sorted(calls, key=lambda item: item.line)[:_MOST]),
+        constructs=tuple(sorted(constructs, key=lambda item: item[1])[:_MOST]),
     )
 
 
@@ -95,18 +119,33 @@ def _walk(tree: ast.Module) -> Iterator[tuple[ast.AST, _Scope]]:
         node, scope = pending.pop()
         yield node, scope
         if isinstance(node, ast.ClassDef):
-            scope = _Scope(f"{scope.prefix}{node.name}."[-_LONGEST_NAME:], in_class=True)
+            name = scope.prefix + node.name
+            scope = _Scope(f"{name}."[-_LONGEST_NAME:], in_class=True, owner=name)
         elif isinstance(node, _Function):
-            scope = _Scope(f"{scope.prefix}{node.name}.<locals>."[-_LONGEST_NAME:])
+            inside = f"{scope.prefix}{node.name}.<locals>."[-_LONGEST_NAME:]
+            scope = _Scope(inside, owner=scope.owner)
         # Reversed, so that the stack gives them in the order of the file.
         pending += [(child, scope) for child in reversed(list(ast.iter_child_nodes(node)))]
 
 
 def _class(node: ast.ClassDef, scope: _Scope) -> SourceClass:
     bases = tuple(dict.fromkeys(name for base in node.bases for name in _base_names(base)))
+    given = (one.value for one in node.keywords if one.arg == "metaclass")
     return SourceClass(
-        scope.prefix + node.name, node.lineno, bases[:_MOST], bool(ast.get_docstring(node))
+        name=scope.prefix + node.name,
+        line=node.lineno,
+        bases=bases[:_MOST],
+        documented=bool(ast.get_docstring(node)),
+        end=node.end_lineno or 0,
+        metaclass=next(map(_dotted, given), ""),
     )
+
+
+def _call(node: ast.Call) -> SourceCall:
+    last = node.func.attr[:_LONGEST_NAME] if isinstance(node.func, ast.Attribute) else ""
+    texts = (one.value for one in node.args if isinstance(one, ast.Constant))
+    names = (text for text in texts if isinstance(text, str) and _LITERAL.fullmatch(text))
+    return SourceCall(_dotted(node.func) or last, node.lineno, next(names, ""))
 
 
 def _base_names(base: ast.expr) -> list[str]:
@@ -138,6 +177,7 @@ def _function(node: _Function, scope: _Scope) -> SourceFunction:
             one.arg for one in (*positional, *others) if one is not None and one.annotation is None
         ),
         returns=node.returns is not None,
+        pure=any(name.rpartition(".")[2] in _ABSTRACT for name in decorators),
     )
 
 

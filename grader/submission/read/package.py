@@ -7,10 +7,17 @@ import re
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
 
 from grader.machine.ros import RosInstallation
-from grader.recording.submission import EMPTY, Definition, Import, Lint, PackageRecord, SourceError
+from grader.recording.submission import (
+    EMPTY,
+    Definition,
+    Import,
+    Lint,
+    PackageRecord,
+    SourceError,
+    SourceFile,
+)
 from grader.submission.build.installed import (
     MOST_BYTES,
     InstallSpace,
@@ -23,7 +30,7 @@ from grader.submission.intake.paths import is_within, join, shown
 from grader.submission.read import source
 from grader.submission.read.dependencies import is_known
 from grader.submission.read.imports import find_imports, is_code, ros_imports
-from grader.submission.read.includes import CODE, MOST_SOURCE_BYTES, MOST_SOURCES, read_included
+from grader.submission.read.includes import is_built, read_included
 from grader.submission.read.lint import lint, newer_syntax
 from grader.submission.read.manifest import MANIFEST, Manifest, read_manifest
 from grader.submission.read.outline import outline
@@ -45,7 +52,7 @@ class Package:
     Attributes:
         hashes: Path of each Python file in the submission -> hash of its content.
         trees: Path of each Python file -> its syntax tree, or why there is none.
-        code_cpp: Path of each file of C and C++, from the folder of the package -> its text.
+        code_cpp: Path of each file of C and C++, from the folder of the package -> what it says.
     """
 
     name: str
@@ -59,7 +66,7 @@ class Package:
     trees: Mapping[str, ast.Module | SourceError]
     lint: Lint | None = None
     newer_syntax: tuple[SourceError, ...] = ()
-    code_cpp: Mapping[str, str] = field(default_factory=dict)
+    code_cpp: Mapping[str, SourceFile] = field(default_factory=dict)
 
     @property
     def build_type(self) -> str:
@@ -133,7 +140,7 @@ class Package:
         newer = {error.file for error in self.newer_syntax}
         errors = (tree for _, tree in sorted(self.trees.items()) if isinstance(tree, SourceError))
         included = read_included(
-            {shown(path): text for path, text in self.code_cpp.items()},
+            {shown(path): one.includes for path, one in self.code_cpp.items()},
             self.cmake,
             shown(join(self.folder, CMAKE)),
             lambda name: name != self.name and name in {*PACKAGES, *ros.packages, *submitted},
@@ -176,9 +183,12 @@ class Package:
             groups=self.manifest.groups,
             cmake=None if self.cmake is None else self.cmake[:MOST_BYTES],
             definitions=tuple(replace(one, file=shown(one.file)) for one in self.definitions),
-            sources=tuple(
-                outline(tree, shown(path), _module(shown(self._module_path(path))))
-                for path, tree in self._parsed()
+            sources=(
+                *(
+                    outline(tree, shown(path), _module(shown(self._module_path(path))))
+                    for path, tree in self._parsed()
+                ),
+                *(one for path, one in sorted(self.code_cpp.items()) if is_built(path)),
             ),
             lint=self.lint,
         )
@@ -189,8 +199,13 @@ def read_package(
     folder: str,
     ros: RosInstallation,
     allowance: source.Allowance | None = None,
+    outlines: Mapping[str, SourceFile] | None = None,
 ) -> Package:
-    """Read a package from the private copy of its submission."""
+    """Read a package from the private copy of its submission.
+
+    Args:
+        outlines: What its C++ says, by paths in the submission.
+    """
 
     def content(name: str) -> bytes | None:
         return _bytes(located, join(folder, name))
@@ -215,11 +230,9 @@ def read_package(
             hashes[file.path] = hash_of(data)
             trees[file.path] = source.parse(data, shown(file.path), allowance)
     code_cpp = {
-        file.path if folder == "." else file.path[len(folder) + 1 :]: _text(
-            _bytes(located, file.path) or b""
-        )
-        for file in islice((one for one in files if one.path.endswith(CODE)), MOST_SOURCES)
-        if file.size <= MOST_SOURCE_BYTES
+        path if folder == "." else path[len(folder) + 1 :]: one
+        for path, one in (outlines or {}).items()
+        if is_within(path, folder)
     }
     folder_name = located.id if folder == "." else folder.rpartition("/")[2]
     package = Package(
