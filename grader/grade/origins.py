@@ -1,10 +1,12 @@
 """Where the student's program creates what a finding is about: its publisher, its timer.
 
-A process declares these places itself, so no verdict may depend on them.
+A process in Python declares these places itself; of one in C++ they are looked up in its source. No
+verdict may depend on them.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
@@ -13,12 +15,18 @@ from grader.checks.check import Parameters
 from grader.diagnosis.process.raised import submission_path
 from grader.findings.finding import Finding
 from grader.recording.model import Declaration, Recording
-from grader.recording.submission import SourceError
+from grader.recording.submission import CPP, SourceError
 
 _MOST = 3
 _LONGEST_NAME = 200
 # What a declaration is called by, and what it says.
 _NAMES = {"node": "node", "timer": "callback"}
+# Functions of rclcpp that create it.
+_CREATED_BY = {
+    "publisher": ("create_publisher",),
+    "subscription": ("create_subscription",),
+    "timer": ("create_wall_timer", "create_timer"),
+}
 _WORDS = {"published": "messages on {} are published here"}
 
 
@@ -57,11 +65,42 @@ def _places(seen: str, parameters: Parameters, recording: Recording) -> Iterator
     # What was observed, and only without that what was asked for.
     found = [one for one in found if f"`{_name(one)}`" in seen] or found
     nodes = {one.data.get("node") for one in found}
-    for one in [*(one for one in timers if not nodes or one.data.get("node") in nodes), *found]:
+    # A compiled process does not tell the node of a timer.
+    near = [one for one in timers if not nodes or one.data.get("node") in {*nodes, None}]
+    for one in [*near, *found]:
         path = submission_path(str(one.data.get("file")), recording.submission)
+        words = _WORDS.get(one.kind, f"the {one.kind} {{}} is created here")
         if path and isinstance(line := one.data.get("line"), int):
-            words = _WORDS.get(one.kind, f"the {one.kind} {{}} is created here")
             yield SourceError(path, line, words.format(_name(one)[:_LONGEST_NAME]))
+        elif "file" not in one.data and (call := _call_in_cpp(one, recording)):
+            name = one.data.get("topic", "")
+            text = words.format(str(name)[:_LONGEST_NAME]).replace("  ", " ")
+            yield SourceError(*call, text)
+
+
+def _call_in_cpp(one: Declaration, recording: Recording) -> tuple[str, int] | None:
+    """File and line of the call that creates something in C++, if only one can be meant.
+
+    That is the call with the name, or the only one that has its name from elsewhere.
+    """
+    calls = [
+        (file.path, call)
+        for package in recording.submission.packages
+        for file in package.sources
+        for call in file.calls
+        if file.language == CPP
+        and re.split(r"\.|::", call.name)[-1] in _CREATED_BY.get(one.kind, ())
+    ]
+    topic = str(one.data.get("topic", ""))
+    named = [(file, call) for file, call in calls if _is_named(topic, call.literal)]
+    meant = named or [(file, call) for file, call in calls if not call.literal]
+    return (meant[0][0], meant[0][1].line) if len(meant) == 1 else None
+
+
+def _is_named(topic: str, written: str) -> bool:
+    """Whether a topic may be what a name in the source stands for, in whatever namespace."""
+    last = written.lstrip("~/")
+    return bool(last) and f"/{topic}".endswith(f"/{last}")
 
 
 def _name(one: Declaration) -> str:

@@ -114,7 +114,7 @@ class TestClass:
         assert f"{FOLDER}/node.py:4: SyntaxError" in failing("source.class", run, **PACKAGE)
 
     def test_a_package_without_code(self):
-        assert "no Python code" in failing("source.class", submission(), **PACKAGE)
+        assert "has no code" in failing("source.class", submission(), **PACKAGE)
 
 
 class TestDocstrings:

@@ -16,6 +16,8 @@ from grader.findings.finding import Evidence, Finding
 from grader.grade.origins import with_origins
 from grader.recording.model import Recording
 from grader.recording.submission import PackageRecord, SourceError
+from grader.submission.read.cpp import source_file
+from grader.submission.read.cpp_contents import outline
 from tests.checks.builder import declared
 from tests.grade.sample import make_recording, make_submission
 from tests.report.gallery import ahead_until
@@ -109,3 +111,51 @@ def test_they_do_not_make_two_mistakes_one():
     assert found.evidence.origins
     # The same places are the same mistake.
     assert found.evidence.places == ()
+
+
+CPP_CODE = """\
+Bot::Bot() : Node("bot") {
+  publisher_ = this->create_publisher<Twist>("cmd_vel", 10);
+  status_ = create_publisher<String>(topic_, 10);
+  subscription_ = create_subscription<Odometry>("/odom", 10, [](auto) {});
+  // create_wall_timer(1s, other);
+  timer_ = rclcpp::create_timer(this, get_clock(), 500ms, [this] { tick(); });
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("parameters", "expected"),
+    [
+        (Depth(topic="/cmd_vel", kind="publisher", depth=10), [2]),
+        (Depth(topic="/status", kind="publisher", depth=10), [3]),
+        (Depth(topic="/odom", kind="subscription", depth=10), [4]),
+        (Timer(topic="/cmd_vel"), [6, 2]),
+    ],
+)
+def test_what_cpp_creates_is_found_in_its_source(parameters: Any, expected: list[int]) -> None:
+    path = "src/bot_publisher/src/bot.cpp"
+    code = source_file(path, outline(CPP_CODE.encode()))
+    package = PackageRecord("bot_publisher", "src/bot_publisher", sources=(code,))
+    things = (
+        declared("publisher", node="/bot", topic="/cmd_vel"),
+        declared("publisher", node="/bot", topic="/status"),
+        declared("subscription", node="/bot", topic="/odom"),
+        declared("timer", period_s=0.5),
+    )
+    submission = make_submission(packages=(package,))
+    recording = make_recording(submission=submission, declarations=things)
+    found = with_origins(FAILED, parameters, recording).evidence.origins
+    assert [(one.file, one.line) for one in found] == [(path, line) for line in expected]
+
+
+def test_of_two_calls_in_cpp_that_may_be_meant_none_is_shown() -> None:
+    code = source_file(
+        "a.cpp", outline(b"void f() { create_wall_timer(a); create_wall_timer(b); }")
+    )
+    package = PackageRecord("bot_publisher", "src/bot_publisher", sources=(code,))
+    recording = make_recording(
+        submission=make_submission(packages=(package,)),
+        declarations=(declared("timer", period_s=0.5),),
+    )
+    assert with_origins(FAILED, Timer(topic="/cmd_vel"), recording).evidence.origins == ()

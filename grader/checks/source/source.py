@@ -1,4 +1,4 @@
-"""Checks of the source as handed in: its classes, docstrings, type hints, prints, style.
+"""Checks of the source as handed in: docstrings, type hints, prints, style.
 
 All of them judge facts that were read from syntax trees; nothing of the student's is imported.
 Tests, launch files, setup.py and conftest.py are left aside.
@@ -10,152 +10,39 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, field_validator
+from pydantic import AfterValidator, Field
 
-from grader.checks.check import Subject, check, stop_if
+from grader.checks.check import Subject, check
 from grader.checks.need import RuffRules, Submitted
 from grader.checks.package.package import OfPackage
+from grader.checks.source.judged import (
+    MOST_PLACES,
+    OfPython,
+    Share,
+    judged_package,
+    shared,
+    unless_unread,
+)
 from grader.diagnosis.explanation import mistaken
-from grader.diagnosis.not_built import existing_package, why_no_package, why_too_new
-from grader.findings.finding import Evidence, Finding
-from grader.findings.words import code, codes, counted, listing, percent
+from grader.findings.finding import Evidence, Finding, Status
+from grader.findings.words import codes, counted, listing, worded
 from grader.recording.submission import (
+    CPP,
     PYTHON,
-    PackageRecord,
     SourceError,
     SourceFile,
     SourceFunction,
     SubmissionRecord,
 )
-from grader.spec.nearest_name import nearest
-from grader.spec.quantity import Ratio
-from grader.submission.read.inheritance import NODE, Family, FoundClass
 from grader.submission.read.lint import EXCLUDED
 
-_MOST_PLACES = 20
-_DOTTED = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+")
 _RULE = re.compile(r"[A-Z]+[0-9]*")
-
-
-class OfPython(OfPackage):
-    """Part of the parameters of every check of the source."""
-
-    only = PYTHON
-
-
-def _judged_package(submission: SubmissionRecord, name: str) -> PackageRecord:
-    """The package with its Python files; ends the check if they cannot be judged."""
-    stop_if(why_no_package(submission, name))
-    package = existing_package(submission, name)
-    stop_if(why_too_new(package))
-    if package.syntax_errors:
-        seen = f"Python cannot read {package.syntax_errors[0]}"
-        places = package.syntax_errors[:_MOST_PLACES]
-        stop_if(mistaken("unreadable", seen, Evidence(places=places)))
-    if not package.sources:
-        seen = f"the package {code(name)} has no Python code"
-        stop_if(mistaken("no_python", seen, folder=code(f"{name}/{name}")))
-    return package
-
-
-def _dotted_name(text: str) -> str:
-    if not _DOTTED.fullmatch(text):
-        raise ValueError(f"{text!r} is not a class with its module, such as {NODE!r}")
-    return text
-
-
-class Class(OfPython):
-    """Parameters of source.class."""
-
-    name: str | None = Field(None, description="Name of the class; by default any.")
-    inherits: Annotated[str, AfterValidator(_dotted_name)] = Field(
-        NODE, description="Class that it inherits, with its module."
-    )
-
-    def _asked(self) -> str:
-        what = f"the class {code(self.name)}" if self.name else "a class"
-        return f"{what} that inherits {code(self.inherits.rpartition('.')[2])}"
-
-
-@check("source.class", Subject.SUBMISSION, Class)
-def class_(submission: SubmissionRecord, parameters: Class) -> Finding:
-    """The class is there and inherits Node.
-
-    Judged by the syntax of the package's Python files. It does not matter how the base class is
-    imported or called (`rclpy.node.Node`, `import ... as`, an alias), and whether it is inherited
-    directly or through another class in any file. A lifecycle node is a node.
-    """
-    package = _judged_package(submission, parameters.package)
-    family = Family([file for other in submission.packages for file in other.sources])
-    classes = [item for item in family.classes if item.file in package.sources]
-    named = [item for item in classes if parameters.name in (None, _short(item))]
-    kin = [item for item in named if family.inherits(item, parameters.inherits)]
-    if not kin:
-        stop_if(_why_no_class(family, classes, named, parameters))
-    place = _place(kin[0], f"class {kin[0].found.name}")
-    observed = f"{codes(item.found.name for item in kin)} ({place.file}:{place.line})"
-    return Finding.as_asked(observed, Evidence(places=(place,)))
-
-
-def _why_no_class(
-    family: Family, classes: Sequence[FoundClass], named: Sequence[FoundClass], parameters: Class
-) -> Finding:
-    module, _, base = parameters.inherits.rpartition(".")
-    name = parameters.name or "MyClass"
-    write = f"from {module} import {base}", f"class {name}({base}):"
-    if not classes:
-        return mistaken("no_class", "no class is defined in the package", write=codes(write))
-    evidence = Evidence(places=tuple(_place(item, _inherits(item)) for item in classes[:10]))
-    if not named:
-        there = sorted({_short(item) for item in classes})
-        match = nearest(name, there)
-        found = f"found the class {code(match)}" if match else f"found {codes(there)} only"
-        return mistaken("other_class", found, evidence, name=code(name))
-    for item in named:
-        foreign = family.foreign(item)
-        if foreign:
-            seen = f"{code(item.found.name)} inherits {codes(foreign)}, which was not handed in"
-            hint = "A person has to look at the class: the source of its base class is needed."
-            return Finding.ours(seen, hint)
-    place = _place(named[0], "")
-    seen = "; ".join(_inherits(item) for item in named[:4])
-    return mistaken("no_class", f"{seen} ({place.file}:{place.line})", evidence, write=codes(write))
-
-
-def _inherits(item: FoundClass) -> str:
-    return f"{code(item.found.name)} inherits {codes(item.found.bases) or 'nothing'}"
-
-
-def _short(item: FoundClass) -> str:
-    return item.found.name.rpartition(".")[2]
-
-
-def _place(item: FoundClass, message: str) -> SourceError:
-    return SourceError(item.file.path, item.found.line, message)
-
-
-class _Share(OfPython):
-    """Part of the parameters of source.docstrings and source.type_hints."""
-
-    share: Ratio = Field(1.0, description="Share of them that must have one.")
-
-    @field_validator("share")
-    @classmethod
-    def _possible(cls, share: float) -> float:
-        if not 0.0 < share <= 1.0:
-            raise ValueError("the share must be more than 0 % and at most 100 %")
-        return share
-
-    @property
-    def needed(self) -> str:
-        """The share in words."""
-        return "all" if self.share == 1.0 else f"at least {percent(self.share)} of the"
 
 
 _PLURALS = {"module": "modules", "class": "classes", "function": "functions"}
 
 
-class Docstrings(_Share):
+class Docstrings(Share):
     """Parameters of source.docstrings."""
 
     of: tuple[Literal["module", "class", "function"], ...] = Field(
@@ -170,24 +57,34 @@ class Docstrings(_Share):
 
 @check("source.docstrings", Subject.SUBMISSION, Docstrings)
 def docstrings(submission: SubmissionRecord, parameters: Docstrings) -> Finding:
-    """Classes and functions have docstrings.
+    """Classes and functions have docstrings, or comments for Doxygen.
 
-    Judged by the syntax of the package's Python files. Names that begin with an underscore need
-    none, `__init__` included, nor do functions inside of functions, overloads, setters, and an
-    empty `__init__.py`.
+    Judged by the syntax of the package's files. In Python, names that begin with an underscore need
+    no docstring, `__init__` included, nor do functions inside of functions, overloads, setters, and
+    an empty `__init__.py`. In C++, a comment for Doxygen (`/** */`, `///`) stands before the
+    declaration or the definition. What is private or protected, constructors, destructors,
+    operators, and methods with `override` need none.
     """
-    package = _judged_package(submission, parameters.package)
+    package, files = judged_package(submission, parameters.package)
+    documentable = [(file, one) for file in files for one in _documentable(file)]
+    documentable += _documentable_cpp([file for file in files if file.language == CPP])
     judged = [
         (documented, SourceError(file.path, line, text))
-        for file in package.sources
-        for kind, documented, line, text in _documentable(file)
+        for file, (kind, documented, line, text) in documentable
         if kind in parameters.of
     ]
-    return _shared(parameters, judged, "a docstring", "no_docstring")
+    what = worded(python="a docstring", cpp="a comment for Doxygen")
+    found = shared(parameters, judged, what, "no_docstring")
+    return found if found.status is Status.PASSED else unless_unread(submission, package, found)
 
 
-def _documentable(file: SourceFile) -> Iterator[tuple[str, bool, int, str]]:
-    """What should have a docstring: its kind, whether it has one, its line, and words for it."""
+_Item = tuple[str, bool, int, str]
+"""What should have a docstring: its kind, whether it has one, its line, and words for it."""
+
+
+def _documentable(file: SourceFile) -> Iterator[_Item]:
+    if file.language == CPP:
+        return
     if file.classes or file.functions or file.names or file.stars or file.prints:
         yield "module", file.documented, 1, "the module"
     for one in file.classes:
@@ -199,12 +96,35 @@ def _documentable(file: SourceFile) -> Iterator[tuple[str, bool, int, str]]:
             yield "function", function.documented, function.line, f"{function.name}()"
 
 
+def _documentable_cpp(files: Sequence[SourceFile]) -> Iterator[tuple[SourceFile, _Item]]:
+    """The same of C++, where a declaration and a definition may be in two files."""
+    found: dict[str, list[tuple[SourceFile, SourceFunction]]] = {}
+    for file in files:
+        for one in file.classes:
+            if "<locals>" not in one.name:
+                yield file, ("class", one.documented, one.line, f"the class {one.name}")
+        for function in file.functions:
+            # With its class: the namespace may be left out where it is defined.
+            name = "::".join(function.name.split("::")[-2:])
+            found.setdefault(name, []).append((file, function))
+    classes = {one.short for file in files for one in file.classes}
+    for name, places in found.items():
+        file, first = places[0]
+        all_ = [function for _, function in places]
+        is_special = first.short in classes or first.short.startswith(("~", "operator"))
+        if is_special or "<locals>" in first.name or any(one.overriding for one in all_):
+            continue
+        if all(one.public for one in all_):
+            documented = any(one.documented for one in all_)
+            yield file, ("function", documented, first.line, f"{name}()")
+
+
 def _is_public(name: str) -> bool:
     parts = name.split(".")
     return "<locals>" not in parts and not any(part.startswith("_") for part in parts)
 
 
-class TypeHints(_Share):
+class TypeHints(Share, OfPython):
     """Parameters of source.type_hints."""
 
     returns: bool = Field(True, description="Whether return values need a hint too.")
@@ -221,14 +141,14 @@ def type_hints(submission: SubmissionRecord, parameters: TypeHints) -> Finding:
     Judged by the syntax of the package's Python files: every parameter and every return value.
     `self`, `cls`, the return value of `__init__` and lambdas need no hint.
     """
-    package = _judged_package(submission, parameters.package)
+    _, files = judged_package(submission, parameters.package, (PYTHON,))
     judged = [
         (not lacking, SourceError(file.path, one.line, f"{one.name}(): {lacking}"))
-        for file in package.sources
+        for file in files
         for one in file.functions
         for lacking in [_lacking(one, parameters.returns)]
     ]
-    return _shared(parameters, judged, "every hint", "no_type_hint")
+    return shared(parameters, judged, "every hint", "no_type_hint")
 
 
 def _lacking(one: SourceFunction, returns: bool) -> str:
@@ -239,43 +159,28 @@ def _lacking(one: SourceFunction, returns: bool) -> str:
     return f"no hint for {missing}" if missing else ""
 
 
-def _shared(
-    parameters: _Share, judged: Sequence[tuple[bool, SourceError]], what: str, mistake: str
-) -> Finding:
-    """The finding by the share of items that have what they need."""
-    lacking = [place for good, place in judged if not good]
-    having = len(judged) - len(lacking)
-    observed = f"{having} of {len(judged)} have {what}"
-    # The small amount is float noise of the product.
-    if judged and having >= parameters.share * len(judged) - 1e-9:
-        return Finding.as_asked(observed)
-    first = f"the first without is {lacking[0]}" if lacking else "there is nothing to judge"
-    shown = Evidence(places=tuple(lacking[:_MOST_PLACES]))
-    return mistaken(mistake, f"{observed}; {first}", shown)
-
-
-class NoPrint(OfPython):
+class NoPrint(OfPackage):
     """Parameters of source.no_print."""
 
-    asks = "no print(): the node's logger tells what happens"
+    asks = "no print() or std::cout: the node's logger tells what happens"
 
 
 @check("source.no_print", Subject.SUBMISSION, NoPrint)
 def no_print(submission: SubmissionRecord, parameters: NoPrint) -> Finding:
-    """The code does not call print(): the node logs.
+    """The code does not print: the node logs.
 
-    Judged by the syntax of the package's Python files: `print` is neither called nor passed as a
-    function. Printing to a file is allowed.
+    Judged by the syntax of the package's files. In Python, `print` is neither called nor passed as
+    a function. In C++, nothing is written to `std::cout`, `std::cerr`, `std::clog` or by `printf()`
+    and the like. Printing to a file is allowed.
     """
-    package = _judged_package(submission, parameters.package)
-    places = [
-        SourceError(file.path, line, "print") for file in package.sources for line in file.prints
-    ]
+    _, files = judged_package(submission, parameters.package)
+    places = [SourceError(file.path, line, "print") for file in files for line in file.prints]
+    what = worded(python="print()", cpp="std::cout, printf() or the like")
     if not places:
-        return Finding.as_asked("no print()")
+        return Finding.as_asked(f"no {what}")
     number = counted(len(places), "place")
-    seen = f"{number} with print(), the first at {places[0].file}:{places[0].line}"
-    return mistaken("prints", seen, Evidence(places=tuple(places[:_MOST_PLACES])))
+    seen = f"{number} with {what}, the first at {places[0].file}:{places[0].line}"
+    return mistaken("prints", seen, Evidence(places=tuple(places[:MOST_PLACES])))
 
 
 def _rule(text: str) -> str:
@@ -323,7 +228,7 @@ def ruff(submission: SubmissionRecord, parameters: Ruff) -> Finding:
     the style guide of ROS 2, without the student's configuration and `# noqa`. If the machine that
     grades lacks ruff, the check ends as an error and costs no points.
     """
-    lint = _judged_package(submission, parameters.package).lint
+    lint = judged_package(submission, parameters.package, (PYTHON,))[0].lint
     if lint is None or lint.problem is not None:
         why = "ruff was not asked" if lint is None else lint.problem
         return Finding.ours(f"the style was not looked at: {why}")
@@ -335,7 +240,7 @@ def ruff(submission: SubmissionRecord, parameters: Ruff) -> Finding:
     return mistaken(
         "breaks_rule",
         f"{counted(len(places), 'place')}, the first at {places[0]}",
-        Evidence(places=tuple(places[:_MOST_PLACES])),
+        Evidence(places=tuple(places[:MOST_PLACES])),
         rules=",".join(parameters.rules),
         rule=found[0].code,
     )
