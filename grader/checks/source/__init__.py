@@ -1,1 +1,1 @@
-"""Checks of Python source as handed in."""
+"""Checks of the source as handed in."""

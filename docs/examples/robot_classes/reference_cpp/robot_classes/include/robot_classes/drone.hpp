@@ -1,0 +1,10 @@
+#pragma once
+
+#include "robot_classes/robot_node.hpp"
+
+/// Flies.
+class Drone : public RobotNode {
+ public:
+  Drone();
+  double move() override;
+};
