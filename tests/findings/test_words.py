@@ -40,6 +40,7 @@ _OF_PYTHON = re.compile(
 _READS_PYTHON = {
     *("newer_name", "why_too_new", "why_nothing_to_run"),
     *("why_unknown_imports", "tests"),
+    *("why_unreadable", "_documentable_python", "_CONSTRUCTS"),
 }
 SOURCE = SourceFile("src/look/bin/look", "look")
 _FOLDERS = ("checks", "diagnosis", "findings", "measure", "grade")

@@ -16,14 +16,14 @@ from grader.findings.finding import Evidence, Finding
 from grader.findings.words import codes, counted
 from grader.recording.submission import SourceError, SourceFile, SubmissionRecord
 
-_WORDS = ("using namespace", "goto", "new", "delete", "#define", "global", "import *")
+_CONSTRUCTS = ("using namespace", "goto", "new", "delete", "#define", "global", "import *")
 _NAME = re.compile(r"[A-Za-z_]\w*((\.|::)[A-Za-z_]\w*)*")
 
 
 def _construct(text: str) -> str:
     name = text.removeprefix("using namespace ")
-    if text not in _WORDS and not _NAME.fullmatch(name):
-        known = ", ".join(map(repr, _WORDS))
+    if text not in _CONSTRUCTS and not _NAME.fullmatch(name):
+        known = ", ".join(map(repr, _CONSTRUCTS))
         raise ValueError(
             f"{text!r} is neither the name of a function nor one of {known}, 'using namespace std'"
         )
@@ -71,7 +71,7 @@ def _lines(file: SourceFile, construct: str) -> Iterator[int]:
     for found, line in file.constructs:
         if found == construct or found.startswith(f"{construct} "):
             yield line
-    if construct in _WORDS:
+    if construct in _CONSTRUCTS:
         return
     names = dict(file.names)
     separator = "::" if "::" in construct else "."

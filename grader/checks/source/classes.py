@@ -150,10 +150,11 @@ def _write(parameters: Class) -> str:
     if inherits is None:
         return worded(python=code(f"class {name}:"), cpp=code(f"class {name} {{ ... }};"))
     module, _, base = inherits.rpartition(".")
-    imported = [f"from {module} import {base}"] if module else []
     cpp_base = "rclcpp::Node" if inherits in (NODE, "Node") else inherits.replace(".", "::")
     return worded(
-        python=codes([*imported, f"class {name}({base}):"]),
+        python=codes(
+            [*([f"from {module} import {base}"] if module else []), f"class {name}({base}):"]
+        ),
         cpp=code(f"class {name} : public {cpp_base}"),
     )
 

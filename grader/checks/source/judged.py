@@ -39,10 +39,7 @@ def judged_package(
     stop_if(why_no_package(submission, name))
     package = existing_package(submission, name)
     stop_if(why_too_new(package))
-    if package.syntax_errors:
-        seen = f"Python cannot read {package.syntax_errors[0]}"
-        places = package.syntax_errors[:MOST_PLACES]
-        stop_if(mistaken("unreadable", seen, Evidence(places=places)))
+    stop_if(why_unreadable(package))
     files = [file for file in package.sources if file.language in languages]
     if not files:
         if submission.language(package) == CPP and CPP in languages:
@@ -50,6 +47,14 @@ def judged_package(
         seen = f"the package {code(name)} has no {PYTHON if languages != _BOTH else ''} code"
         stop_if(mistaken("no_code", seen.replace("  ", " "), folder=code(f"{name}/{name}")))
     return package, files
+
+
+def why_unreadable(package: PackageRecord) -> Finding | None:
+    """Why Python cannot parse the package; None if it can."""
+    if not package.syntax_errors:
+        return None
+    seen = f"Python cannot read {package.syntax_errors[0]}"
+    return mistaken("unreadable", seen, Evidence(places=package.syntax_errors[:MOST_PLACES]))
 
 
 def _of_before() -> Finding:

@@ -66,7 +66,7 @@ def docstrings(submission: SubmissionRecord, parameters: Docstrings) -> Finding:
     operators, and methods with `override` need none.
     """
     package, files = judged_package(submission, parameters.package)
-    documentable = [(file, one) for file in files for one in _documentable(file)]
+    documentable = [(file, one) for file in files for one in _documentable_python(file)]
     documentable += _documentable_cpp([file for file in files if file.language == CPP])
     judged = [
         (documented, SourceError(file.path, line, text))
@@ -82,7 +82,7 @@ _Item = tuple[str, bool, int, str]
 """What should have a docstring: its kind, whether it has one, its line, and words for it."""
 
 
-def _documentable(file: SourceFile) -> Iterator[_Item]:
+def _documentable_python(file: SourceFile) -> Iterator[_Item]:
     if file.language == CPP:
         return
     if file.classes or file.functions or file.names or file.stars or file.prints:
@@ -162,7 +162,7 @@ def _lacking(one: SourceFunction, returns: bool) -> str:
 class NoPrint(OfPackage):
     """Parameters of source.no_print."""
 
-    asks = "no print() or std::cout: the node's logger tells what happens"
+    asks = "nothing is printed: the node's logger tells what happens"
 
 
 @check("source.no_print", Subject.SUBMISSION, NoPrint)
