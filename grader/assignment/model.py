@@ -502,10 +502,10 @@ class Assignment(Model):
     underlays: tuple[str, ...] = Field(
         (),
         description="What the assignment needs beyond rclpy and the common interfaces, such as "
-        "`[tf2]`: a named set (see `rosgrade underlay list`), a `.repos` file or a folder of "
-        "packages, relative to assignment.yaml. A set or file has to be built once on the machine "
-        "that grades, by `rosgrade underlay add`. Packages in a folder `packages` beside "
-        "assignment.yaml need no entry.",
+        "`[tf2]`: a package of ROS 2 or a set of them (see `rosgrade underlay list`), a `.repos` "
+        "file or a folder of packages, relative to assignment.yaml. All but a folder have to be "
+        "built once on the machine that grades, by `rosgrade underlay add`. Packages in a folder "
+        "`packages` beside assignment.yaml need no entry.",
     )
     scenarios: tuple[Scenario, ...] = Field((), description="The runs, or groups of them.")
     checks: tuple[CheckSpec, ...] = Field(

@@ -20,7 +20,7 @@ from grader.machine import ros
 from grader.machine.resources import cache_folder
 from grader.sandbox.choice import Choice
 from grader.spec.nearest_name import nearest_or_all
-from grader.submission.underlay.definition import find_underlay, named_sets
+from grader.submission.underlay.definition import SETS, find_underlay, packages_of_ros
 from grader.submission.underlay.ros2_command import write_command
 from grader.submission.underlay.store import UnderlayStore
 
@@ -37,8 +37,9 @@ def add(
     what: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="NAME|FILE.repos|FOLDER",
-            help="A named set (see `rosgrade underlay list`), a .repos file, a folder of packages.",
+            metavar="PACKAGE|FILE.repos|FOLDER",
+            help="A package of ROS 2 Jazzy or a set of them (see `rosgrade underlay list`), a "
+            ".repos file, a folder of packages.",
         ),
     ] = None,
     assignment: Annotated[
@@ -58,8 +59,9 @@ def add(
 ) -> None:
     """Fetch packages and build them, once for this machine and ROS installation.
 
-    Every submission of an assignment that names them in `underlays` can use them. A package that
-    ROS already has is not built. After an interruption, the command continues where it stopped.
+    With each package of ROS 2 comes what it needs. What ROS already has is not built. Submissions
+    that need such a package get it; .repos files and folders only where the assignment names them
+    in `underlays`. After an interruption, the command continues where it stopped.
     """
     found = [find_underlay(given) for given in what or ()]
     if assignment is not None:
@@ -70,7 +72,7 @@ def add(
     with progress.shown():
         place = chosen_sandbox(sandbox, progress)
         store = UnderlayStore(cache_folder(), installation, progress.say, place)
-        built = [name for underlay in found for name in store.add(underlay, wait)]
+        built = store.add(found, wait)
     if built:
         say(f"Built in {time.monotonic() - began_s:.0f} s: {', '.join(built)}")
     command = write_command(installation, store)
@@ -80,23 +82,21 @@ def add(
 
 @app.command("list")
 def list_command() -> None:
-    """List the named sets, and what is built for this ROS installation."""
-    store = UnderlayStore(cache_folder(), ros.find())
-    kept = [one for one, _ in store.installed()]
-    names = Counter(one.name for one in kept)
-    # Those of one name are told apart by where they are defined.
-    built = {
-        one.places[0] if names[one.name] > 1 and one.places else one.name: " ".join(one.packages)
-        for one in kept
-    }
+    """List the packages that courses need most, and what is built for this ROS installation."""
+    installation = ros.find()
+    store = UnderlayStore(cache_folder(), installation)
     table = Table("UNDERLAY", "HERE", "PACKAGES", box=None, pad_edge=False)
-    for name in named_sets():
-        underlay = find_underlay(name)
-        state = "no" if store.missing([underlay]) else "built" if name in built else "in ROS"
-        packages = built.pop(name, "") if state == "built" else ""
-        table.add_row(name, state, packages or " ".join(sorted(underlay.listed)))
-    for name, packages in built.items():
-        table.add_row(name, "built", packages)
+    for name, packages in SETS.items():
+        lacks = bool(store.missing([packages_of_ros(name)]))
+        state = "no" if lacks else "in ROS" if installation.packages >= {*packages} else "built"
+        table.add_row(name, state, " ".join(packages))
+    listed = {name for packages in SETS.values() for name in packages}
+    kept = [one for one, _ in store.installed() if one.name not in listed]
+    names = Counter(one.name for one in kept)
+    for one in kept:
+        # Those of one name are told apart by where they are defined.
+        name = one.places[0] if names[one.name] > 1 and one.places else one.name
+        table.add_row(name, "built", one.version or " ".join(one.packages))
     output_console().print(table)
 
 
@@ -108,8 +108,8 @@ def remove(
     installation = ros.find()
     store = UnderlayStore(cache_folder(), installation)
     for name in names:
-        if not store.remove(name):
-            known = [one.name for one, _ in store.installed()]
+        if not store.kept.remove(name):
+            known = {place for one, _ in store.installed() for place in one.asked_by}
             raise UsageError(f"no underlay {name!r} is built here.{nearest_or_all(name, known)}")
         say(f"Removed: {name}")
     write_command(installation, store)

@@ -85,14 +85,14 @@ def _sandbox() -> Part:
 
 def _underlays(installation: ros.RosInstallation) -> Iterator[Part]:
     from grader.machine.resources import cache_folder
-    from grader.submission.underlay.definition import find_underlay, named_sets
+    from grader.submission.underlay.definition import SETS, packages_of_ros
     from grader.submission.underlay.ros2_command import REMEDY, find_command
     from grader.submission.underlay.store import UnderlayStore
 
     store = UnderlayStore(cache_folder(), installation)
-    missing = {name for name in named_sets() if store.missing([find_underlay(name)])}
-    there = [*sorted(set(named_sets()) - missing)]
-    there += [one.name for one, _ in store.installed() if one.name not in named_sets()]
+    missing = {name for name in SETS if store.missing([packages_of_ros(name)])}
+    there = [*sorted(SETS.keys() - missing)]
+    there += [one.name for one, _ in store.installed() if one.name not in SETS]
     remedy = "what an assignment may need besides; `rosgrade underlay add NAME`"
     absent = f"; not here: {', '.join(sorted(missing))} ({remedy})" if missing else ""
     yield Part("underlays", True, f"{', '.join(there) or 'none'}{absent}")

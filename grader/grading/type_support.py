@@ -13,9 +13,10 @@ from grader.errors import GraderFault
 from grader.machine.resources import cache_folder
 from grader.machine.ros import RosInstallation, find
 from grader.machine.scratch import Scratch
-from grader.submission.prepare import named_packages
-from grader.submission.underlay.definition import Underlay, find_underlay, sets_with
-from grader.submission.underlay.store import UnderlayStore, on_top, packages_in
+from grader.submission.prepare import needed_packages
+from grader.submission.underlay.building import packages_in
+from grader.submission.underlay.definition import Underlay, find_underlay, packages_of_ros
+from grader.submission.underlay.store import UnderlayStore, on_top
 
 _WORD = re.compile(r"\w+")
 _INTERFACES = "share/ament_index/resource_index/rosidl_interfaces"
@@ -32,13 +33,13 @@ def wanted_underlays(loaded: LoadedAssignment, submission: Path | None = None) -
     """The underlays that it takes to grade a submission, or any submission if none is given."""
     found, ros = underlays_of(loaded), find()
     if submission is not None:
-        used = named_packages(submission, ros)
+        used = needed_packages(submission, ros)
     else:
         packages = loaded.assignment.packages
         in_cpp = (one for one in packages if "ament_cmake" in one.build_types)
         used = {"rclcpp" for one in in_cpp if not {"rclpy", "rclcpp"}.isdisjoint(one.depends)}
-    by_need = (one for one in sets_with(used - ros.packages) if one.by_need)
-    return [*found, *(one for one in by_need if one not in found)]
+    listed = frozenset[str]().union(*(one.listed for one in found))
+    return [*found, *map(packages_of_ros, sorted(used - ros.packages - listed))]
 
 
 def missing_underlays(loaded: LoadedAssignment) -> list[str]:

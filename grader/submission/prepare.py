@@ -29,6 +29,7 @@ from grader.submission.read.cpp import read_cpp
 from grader.submission.read.document import read_headings
 from grader.submission.read.package import Package, read_package, record_packages
 from grader.submission.read.parameter_file import read_parameter_files
+from grader.submission.read.rosdistro import PACKAGES
 from grader.submission.read.source import Allowance
 from grader.submission.underlay.store import UnderlayStore
 
@@ -107,8 +108,12 @@ def refused(source: Path, error: SubmissionError) -> Prepared:
     return Prepared(record, None)
 
 
-def named_packages(path: Path, ros: RosInstallation) -> set[str]:
-    """The packages that a submission names, apart from its own; none if it cannot be read."""
+def needed_packages(path: Path, ros: RosInstallation) -> set[str]:
+    """The packages of ROS 2 without which a submission is not built or does not run.
+
+    What package.xml names and nothing uses is not among them: it may be large. There are none if
+    the submission cannot be read.
+    """
     allowance = Allowance()
     try:
         with opened(path) as located:
@@ -116,7 +121,8 @@ def named_packages(path: Path, ros: RosInstallation) -> set[str]:
             packages = [read_package(located, folder, ros, allowance) for folder in folders]
     except SubmissionError:
         return set()
-    return _named(packages)
+    used = {name for package in packages for name in package.used}
+    return (used & PACKAGES) - {package.name for package in packages}
 
 
 def _named(packages: Sequence[Package]) -> set[str]:

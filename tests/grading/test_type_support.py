@@ -34,10 +34,34 @@ def test_rclcpp_is_wanted_where_a_submission_is_or_may_be_in_cpp(
     submission: str | None, names: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     installation = RosInstallation("wheels", tmp_path / "python", (tmp_path,))
+    index = tmp_path / "share/ament_index/resource_index/packages"
+    index.mkdir(parents=True)
+    for name in ("ament_cmake", "geometry_msgs", "rclpy", "std_msgs"):
+        (index / name).touch()
     monkeypatch.setattr("grader.grading.type_support.find", lambda: installation)
     folder = None if submission is None else resources.reference() / submission
     wanted = wanted_underlays(load_assignment("timed_publisher"), folder)
     assert [one.name for one in wanted] == names
+
+
+def test_what_is_only_named_is_not_built_and_what_is_compiled_against_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    installation = RosInstallation("wheels", tmp_path / "python", (tmp_path,))
+    monkeypatch.setattr("grader.grading.type_support.find", lambda: installation)
+    package = tmp_path / "bot"
+    package.mkdir()
+    (package / "package.xml").write_text(
+        PACKAGE["package.xml"]
+        .replace("<depend>rclpy</depend>", "<depend>rclcpp_action</depend>")
+        .replace("<depend>geometry_msgs</depend>", "<exec_depend>nav2_bringup</exec_depend>")
+        .replace("ament_python", "ament_cmake")
+    )
+    (package / "CMakeLists.txt").write_text(
+        "find_package(tf2_ros REQUIRED)\nfind_package(OpenCV REQUIRED)\ninstall(DIRECTORY launch)\n"
+    )
+    wanted = wanted_underlays(load_assignment("timed_publisher"), package)
+    assert [one.name for one in wanted] == ["rclcpp_action", "tf2_ros"]
 
 
 def test_the_copy_is_that_of_the_reference() -> None:

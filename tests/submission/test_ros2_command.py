@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 from pathlib import Path
 
@@ -10,6 +9,9 @@ import pytest
 
 from grader.machine.ros import RosInstallation
 from grader.submission.underlay import ros2_command
+from grader.submission.underlay.building import digest
+from grader.submission.underlay.distribution import SNAPSHOT
+from grader.submission.underlay.kept import Installed, Kept
 from grader.submission.underlay.ros2_command import absence_note, find_command, write_command
 from grader.submission.underlay.store import UnderlayStore
 
@@ -25,15 +27,13 @@ def wheels(tmp_path: Path) -> RosInstallation:
 
 
 def kept(cache: Path, ros: RosInstallation, name: str, package: str) -> Path:
-    """An underlay as the store keeps it; where it is installed."""
-    folder = cache / "underlays/builds" / name
-    (folder / "install").mkdir(parents=True)
-    about = {
-        **{"name": name, "given": name, "ros": str(ros.prefixes[0]), "packages": [package]},
-        **{"commits": {}, "built": "2026-11-24T14:00:00+00:00", "duration_s": 1.0},
-    }
-    (folder / "underlay.json").write_text(json.dumps(about))
-    return folder / "install"
+    """A package as the store keeps it; where it is installed."""
+    kept = Kept(cache / "underlays", ros)
+    install = kept.install(name)
+    install.mkdir(parents=True)
+    about = Installed(name, "", (package,), (name,), SNAPSHOT.version, installation=digest(ros))
+    kept.note(name, about)
+    return install
 
 
 def test_it_runs_the_underlay_s_ros2_behind_what_is_sourced_and_goes_with_it(
@@ -54,7 +54,7 @@ def test_it_runs_the_underlay_s_ros2_behind_what_is_sourced_and_goes_with_it(
             check=True,
         )
         assert done.stdout.strip() == f"{seen}|{install}/bin/ros2 topic list"
-    store.remove("ros2cli")
+    store.kept.remove("ros2cli")
     write_command(wheels, store)
     assert not command.exists()
 

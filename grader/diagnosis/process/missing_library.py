@@ -35,4 +35,4 @@ def lacking_here(failure: Failure, recording: Recording) -> tuple[str, str] | No
     if name not in PACKAGES or (name not in PYTHON_MODULES and _WITHOUT_PYTHON.fullmatch(name)):
         return None
     apt = f"`sudo apt install ros-jazzy-{name.replace('_', '-')}`"
-    return name, ways_to_get(PYTHON_MODULES.get(name, (name,))) or apt
+    return name, ways_to_get(PYTHON_MODULES.get(name, (name,))[-1:]) or apt

@@ -28,6 +28,7 @@ from grader.submission.intake.listing import SubmissionFile
 from grader.submission.intake.locate import Located
 from grader.submission.intake.paths import is_within, join, shown
 from grader.submission.read import source
+from grader.submission.read.cmake import read_commands
 from grader.submission.read.dependencies import is_known
 from grader.submission.read.imports import find_imports, is_code, ros_imports
 from grader.submission.read.includes import is_built, read_included
@@ -42,6 +43,7 @@ SETUP_PY, CMAKE = "setup.py", "CMakeLists.txt"
 _INTERFACES = (".msg", ".srv", ".action")
 _MOST_DEFINITIONS = 200
 _WORD = re.compile(r"\w+")
+_FOR_BUILD = ("depend", "build_depend", "buildtool_depend", "build_export_depend")
 _CONDITIONS = {"ROS_VERSION": "2", "ROS_PYTHON_VERSION": "3"}
 
 
@@ -80,6 +82,18 @@ class Package:
         found = {dependency.name for dependency in self.manifest.dependencies}
         found |= {item.module for item in self.imports}
         return found | set(_WORD.findall(self.cmake or ""))
+
+    @property
+    def used(self) -> set[str]:
+        """Names of packages without which it is not built, or its Python does not run."""
+        modules = (item.module for item in self.imports)
+        found = {PYTHON_MODULES.get(name, (name,))[-1] for name in modules}
+        if self.cmake is not None:
+            named = self.manifest.dependencies
+            found |= {one.name for one in named if one.kind in _FOR_BUILD}
+            calls = (one for one in read_commands(self.cmake) if one.name == "find_package")
+            found |= {one.arguments[0] for one in calls if one.arguments}
+        return found
 
     @property
     def texts(self) -> dict[str, Sequence[str]]:

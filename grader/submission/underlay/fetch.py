@@ -63,6 +63,11 @@ def fetch(
     return place / _FILES
 
 
+def commit_of(files: Path) -> str:
+    """The commit of a repository that :func:`fetch` fetched."""
+    return (files.parent / _COMMIT).read_text(encoding="ascii")
+
+
 def _fetch(repository: Repository, folder: Path, answer_s: float) -> None:
     files = folder / _FILES
     files.mkdir(parents=True)

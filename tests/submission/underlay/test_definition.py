@@ -7,27 +7,28 @@ from pathlib import Path
 import pytest
 
 from grader.errors import AssignmentError, UsageError
+from grader.submission.read.rosdistro import PACKAGES
 from grader.submission.underlay.definition import (
+    SETS,
     find_underlay,
-    named_sets,
-    sets_with,
+    providers,
     ways_to_get,
 )
 
 REPOSITORY = "repositories:\n  a/b:\n    type: git\n    url: https://example.org/b.git\n"
 
 
-def test_the_named_sets_are_those_that_courses_need() -> None:
-    assert named_sets() == ("ament_cmake_auto", "launch", "rclcpp", "ros2cli", "tf2")
+def test_every_set_stands_for_packages_of_ros() -> None:
+    assert set(SETS) == {"ament_cmake_auto", "launch", "rclcpp", "ros2cli", "tf2"}
+    assert {name for listed in SETS.values() for name in listed} <= PACKAGES
 
 
-@pytest.mark.parametrize("name", named_sets())
-def test_a_named_set_pins_every_commit_and_lists_what_is_built(name: str) -> None:
-    repos = find_underlay(name).repos
-    assert repos is not None
-    for repository in repos.repositories.values():
-        assert repository.commit and repository.packages
-    assert set(repos.requires) <= set(named_sets()) - {name}
+def test_any_package_is_named_as_in_ros() -> None:
+    assert find_underlay("rclcpp_action").packages == ("rclcpp_action",)
+    # The index decides, where it is there; this list is not whole.
+    assert find_underlay("some_new_driver").packages == ("some_new_driver",)
+    with pytest.raises(UsageError, match=r"no underlay 'Some/Driver'\. The usual ones are: "):
+        find_underlay("Some/Driver")
 
 
 def test_the_name_of_a_set_comes_before_a_folder_of_that_name(tmp_path: Path) -> None:
@@ -58,12 +59,14 @@ def test_an_unknown_name_is_told_the_nearest(tmp_path: Path) -> None:
         find_underlay("tf", tmp_path)
 
 
-def test_the_set_that_has_a_package_is_found() -> None:
-    assert [one.name for one in sets_with({"tf2_ros_py", "turtlesim"})] == ["tf2"]
-    assert sets_with({"turtlesim"}) == []
-
-
-def test_what_students_choose_needs_a_command_and_the_rest_an_entry_of_the_assignment() -> None:
+def test_one_command_gets_what_is_lacking_by_the_smallest_sets() -> None:
     assert ways_to_get({"rclcpp"}) == "`rosgrade underlay add rclcpp` on that machine"
-    assert ways_to_get({"tf2_ros_py"}) == "`underlays: [tf2]` in assignment.yaml"
-    assert ways_to_get({"turtlesim"}) == ""
+    lacking = {"tf2_ros_py", "rclcpp_action", "ros2run"}
+    assert ways_to_get(lacking) == (
+        "`rosgrade underlay add rclcpp_action ros2cli tf2` on that machine"
+    )
+    assert ways_to_get({"g++"}) == ""
+
+
+def test_a_module_is_named_by_the_package_that_has_it() -> None:
+    assert providers({"tf2_ros"}) == {"tf2_ros", "tf2_ros_py"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,28 @@ from grader.machine.ros import RosInstallation
 from grader.submission.underlay.definition import Underlay, find_underlay
 from grader.submission.underlay.store import MissingUnderlay, UnderlayStore
 from tests.submission.underlay.conftest import Repository
+
+
+def earlier(cache: Path, ros: RosInstallation, name: str, *packages: str) -> Path:
+    """A named set as an earlier rosgrade built it."""
+    folder = cache / "underlays/builds/earlier"
+    (folder / "install").mkdir(parents=True)
+    about = {"name": name, "ros": str(ros.prefixes[0]), "packages": packages, "places": [name]}
+    (folder / "underlay.json").write_text(json.dumps(about))
+    return folder
+
+
+def test_a_set_that_an_earlier_rosgrade_built_is_left_out_and_can_be_removed(
+    named_ros: RosInstallation, tmp_path: Path
+) -> None:
+    folder = earlier(tmp_path, named_ros, "tf2", "tf2", "tf2_ros_py")
+    store = UnderlayStore(tmp_path, named_ros)
+    assert store.installed() == []
+    assert store.missing([find_underlay("tf2")])
+    assert store.needed(named_ros, {"tf2"}) == named_ros
+    assert store.kept.remove("tf2")
+    assert not folder.exists()
+    assert not store.kept.remove("tf2")
 
 
 def repos(tmp_path: Path, *entries: str) -> Underlay:
@@ -28,7 +51,7 @@ def test_where_ros_has_the_packages_nothing_is_built_and_nothing_is_missing(
         (named_ros.prefixes[0] / "share/ament_index/resource_index/packages" / name).touch()
     told: list[str] = []
     store = UnderlayStore(tmp_path / "cache", named_ros, told.append)
-    assert store.missing([underlay]) == store.add(underlay, 1.0) == []
+    assert store.missing([underlay]) == store.add([underlay], 1.0) == []
     assert store.lay([underlay]) == named_ros
     assert told == ["tf2: this ROS has its packages, nothing is built"]
 
@@ -40,9 +63,9 @@ def test_where_nothing_is_built_no_library_is_looked_for(
     underlay = repos(tmp_path, entry, "python: [no-such-library]\n")
     store = UnderlayStore(tmp_path / "cache", named_ros)
     with pytest.raises(GraderFault, match=r"course needs the library 'no-such-library'"):
-        store.add(underlay, 1.0)
+        store.add([underlay], 1.0)
     (named_ros.prefixes[0] / "share/ament_index/resource_index/packages/arm").touch()
-    assert UnderlayStore(tmp_path / "cache", replace(named_ros)).add(underlay, 1.0) == []
+    assert UnderlayStore(tmp_path / "cache", replace(named_ros)).add([underlay], 1.0) == []
 
 
 def test_what_is_missing_is_a_fault_of_ours_with_the_command_that_gets_it(
@@ -66,17 +89,17 @@ def test_two_versions_of_a_package_are_refused_before_anything_is_built(
     both = repos(tmp_path, repository.entry("1.0.0"), other.entry("2.0.0"))
     store = UnderlayStore(tmp_path / "cache", named_ros)
     with pytest.raises(UsageError, match=r"'arm' is in robots 1\.0\.0 and in others 2\.0\.0"):
-        store.add(both, 20.0)
+        store.add([both], 20.0)
     lacking = repos(tmp_path, repository.entry("1.0.0", packages="[head]"))
     with pytest.raises(UsageError, match=r"robots 1\.0\.0 has no package 'head'"):
-        store.add(lacking, 20.0)
+        store.add([lacking], 20.0)
 
 
 def test_a_folder_without_a_package_is_refused(named_ros: RosInstallation, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     (tmp_path / "empty/notes.txt").write_text("none")
     with pytest.raises(UsageError, match=r"there is no package in it"):
-        UnderlayStore(tmp_path / "cache", named_ros).add(find_underlay("empty", tmp_path), 1.0)
+        UnderlayStore(tmp_path / "cache", named_ros).add([find_underlay("empty", tmp_path)], 1.0)
 
 
 @pytest.mark.ros
@@ -88,11 +111,11 @@ def test_a_file_is_built_once_laid_under_submissions_and_removed(
     underlay = repos(tmp_path, repository.entry("1.0.0", commit=commit, packages="[arm]"))
     told: list[str] = []
     store = UnderlayStore(tmp_path / "cache", real_ros, told.append)
-    assert store.add(underlay, 20.0) == ["course"]
+    assert store.add([underlay], 20.0) == ["course"]
     ((built, _),) = store.installed()
     assert built.packages == ("arm",)
     assert any("course: building arm (1 of 1" in line for line in told)
-    assert store.add(underlay, 20.0) == []
+    assert store.add([underlay], 20.0) == []
     laid = store.lay([underlay])
     assert laid.packages - real_ros.packages == {"arm"}
     assert "arm" in laid.python_modules
@@ -100,7 +123,7 @@ def test_a_file_is_built_once_laid_under_submissions_and_removed(
     folder = find_underlay("robots", tmp_path)
     with pytest.raises(UsageError, match=r"the package 'arm' is in two underlays"):
         store.lay([underlay, folder])
-    assert store.remove("course")
+    assert store.kept.remove("course")
     assert store.missing([underlay])
 
 
@@ -115,38 +138,20 @@ def test_lists_of_one_name_in_two_courses_keep_their_builds(
     first, second = repos(tmp_path / "first", arm), repos(tmp_path / "second", leg)
     store = UnderlayStore(tmp_path / "cache", real_ros)
     for underlay in (first, second):
-        assert store.add(underlay, 20.0) == ["course"]
+        assert store.add([underlay], 20.0) == ["course"]
     assert store.missing([first, second]) == []
     # The first course now takes what the second takes, and what it took before goes.
     changed = repos(tmp_path / "first", leg)
-    assert store.add(changed, 20.0) == []
+    assert store.add([changed], 20.0) == []
     assert store.missing([first, second, changed]) != []
     assert store.missing([second, changed]) == []
     # So it stays until none of them wants it.
-    assert store.add(repos(tmp_path / "second", arm), 20.0) == ["course"]
+    assert store.add([repos(tmp_path / "second", arm)], 20.0) == ["course"]
     assert store.missing([changed]) == []
     with pytest.raises(UsageError, match=f"remove {changed.place} or {second.place}"):
-        store.remove("course")
-    assert store.remove(changed.place)
+        store.kept.remove("course")
+    assert store.kept.remove(changed.place)
     assert [one.packages for one, _ in store.installed()] == [("arm",)]
-
-
-@pytest.mark.ros
-@pytest.mark.slow
-def test_a_set_by_need_is_laid_where_it_is_built_under_what_names_one_of_its_packages(
-    real_ros: RosInstallation,
-    repository: Repository,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    repository.commit("arm", tag="1.0.0")
-    repos(tmp_path, repository.entry("1.0.0", packages="[arm]"), "by_need: true\n")
-    monkeypatch.setattr("grader.submission.underlay.definition.SETS", tmp_path)
-    store = UnderlayStore(tmp_path / "cache", real_ros)
-    assert store.needed(real_ros, {"arm"}) == real_ros
-    store.add(find_underlay("course"), 20.0)
-    assert store.needed(real_ros, {"leg"}) == real_ros
-    assert store.needed(real_ros, {"arm"}).packages - real_ros.packages == {"arm"}
 
 
 @pytest.mark.ros
@@ -161,6 +166,6 @@ def test_a_package_that_does_not_build_is_named_with_its_reason_and_tried_again(
     store = UnderlayStore(tmp_path / "cache", real_ros)
     folder = find_underlay("robots", tmp_path)
     with pytest.raises(GraderFault, match=r"arm of robots could not be built: .*no arms today"):
-        store.add(folder, 1.0)
+        store.add([folder], 1.0)
     setup.write_text(good)
-    assert store.add(folder, 1.0) == ["robots"]
+    assert store.add([folder], 1.0) == ["robots"]
