@@ -12,7 +12,7 @@ from grader.submission.underlay import packages
 from grader.submission.underlay.definition import Underlay, find_underlay
 from grader.submission.underlay.store import MissingUnderlay, UnderlayStore
 from grader.submission.underlay.system_libraries import System
-from tests.submission.underlay.conftest import Index
+from tests.submission.underlay.conftest import Index, Repository
 
 
 def named(*names: str) -> list[Underlay]:
@@ -142,8 +142,9 @@ def test_a_list_of_a_course_is_built_on_packages_of_ros(
 ) -> None:
     index.add("base")
     index.pin(monkeypatch)
-    index.releases.commit("arm", tag="1.0.0")
-    entry = index.releases.entry("1.0.0", packages="[arm]")
+    robots = Repository(tmp_path / "robots")
+    robots.commit("arm", tag="1.0.0")
+    entry = robots.entry("1.0.0", packages="[arm]")
     (tmp_path / "course.repos").write_text(f"repositories:\n{entry}requires: [base]\n")
     course = find_underlay("course.repos", tmp_path)
     store = UnderlayStore(tmp_path / "cache", real_ros)
