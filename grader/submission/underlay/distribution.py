@@ -33,8 +33,8 @@ _T = TypeVar("_T")
 _NAME = "the index of ROS 2"
 _INDEX = "index-v4.yaml"
 _KEYS = ("rosdep/base.yaml", "rosdep/python.yaml")
-# The index has 20,000 lines, which the loader without C reads in eight seconds.
-_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+# The index has 20,000 lines, which the loader that is not C reads in eight seconds.
+_LOADER = yaml.CSafeLoader
 
 
 class _Files(BaseModel):
