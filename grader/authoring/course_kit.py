@@ -14,12 +14,19 @@ from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.selection import visible_part
-from grader.authoring.export import Member, checkout, write_members
+from grader.authoring.export import Member, carried_underlays, checkout, write_members
 from grader.authoring.starter import rendered
 from grader.authoring.visible_files import visible_files
 from grader.errors import AssignmentError, UsageError
 from grader.machine import resources
-from grader.machine.bootstrap import APT, DISTRO, WHEELS_PLATFORM, read_lock
+from grader.machine.bootstrap import (
+    APT,
+    DISTRO,
+    UNDERLAYS_FILE,
+    UNDERLAYS_PLACE,
+    WHEELS_PLATFORM,
+    read_lock,
+)
 from grader.report.files import refuse_part
 from grader.report.html.handout import make_handout
 
@@ -36,12 +43,16 @@ _RENDERED = {
 """Path in the kit -> template."""
 
 
-def write_kit(chosen: Sequence[LoadedAssignment], out: Path, title: str, tag: str = "") -> Path:
+def write_kit(
+    chosen: Sequence[LoadedAssignment], out: Path, title: str, tag: str = "", underlays: str = ""
+) -> Path:
     """Write a course kit into a new folder, or renew the one that is there.
 
     Args:
         title: The course's name.
         tag: Pattern of the tags that the workflow grades; every push if empty.
+        underlays: What its set-up imports, see
+            :func:`~grader.authoring.export.carried_underlays`.
     """
     for loaded in chosen:
         refuse_part(out, loaded.folder, f"the assignment in {loaded.folder}")
@@ -55,6 +66,7 @@ def write_kit(chosen: Sequence[LoadedAssignment], out: Path, title: str, tag: st
     with tempfile.TemporaryDirectory() as folder:
         wheel = _build_wheel(checkout(files), Path(folder), files)
         members = {wheel.name: Member(wheel.read_bytes()), _LOCK: Member(_runtime_lock(wheel))}
+    members |= carried_underlays(underlays)
     values = {
         "title": title,
         "tag": tag,
@@ -62,6 +74,7 @@ def write_kit(chosen: Sequence[LoadedAssignment], out: Path, title: str, tag: st
         "hidden": any(visible_part(loaded).withheld.checks for loaded in chosen),
         "distro": DISTRO,
         "apt": APT,
+        "underlays": bool(underlays),
         "platform": WHEELS_PLATFORM.removeprefix("linux-"),
     }
     for path, template in _RENDERED.items():
@@ -70,8 +83,8 @@ def write_kit(chosen: Sequence[LoadedAssignment], out: Path, title: str, tag: st
     for assignment, content in files.items():
         for inside, data in content.items():
             members[f"{_ASSIGNMENTS}/{assignment}/{inside}"] = Member(data)
-    for file in old:
-        file.unlink()
+    for file in (*old, out / UNDERLAYS_FILE, out / UNDERLAYS_PLACE):
+        file.unlink(missing_ok=True)
     shutil.rmtree(out / _ASSIGNMENTS, ignore_errors=True)
     write_members(out, members)
     return out

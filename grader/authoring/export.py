@@ -16,8 +16,9 @@ from grader.authoring.starter import rendered
 from grader.authoring.visible_files import files_in, grading_files, visible_files
 from grader.errors import UsageError
 from grader.machine import resources
-from grader.machine.bootstrap import APT
+from grader.machine.bootstrap import APT, UNDERLAYS_FILE, UNDERLAYS_PLACE
 from grader.report.files import refuse_inputs, refuse_part, write_whole
+from grader.submission.underlay.transfer import check_archive, is_address
 
 _CHECKOUT = ("pyproject.toml", "requirements.lock", "README.md", "LICENSE")
 _FOLDERS = ("grader", "sim", "templates", "docs/concepts")
@@ -35,12 +36,16 @@ class Member:
     executable: bool = False
 
 
-def gradescope(loaded: LoadedAssignment, out: Path) -> Path:
-    """Write the autograder that is uploaded to Gradescope."""
+def gradescope(loaded: LoadedAssignment, out: Path, underlays: str = "") -> Path:
+    """Write the autograder that is uploaded to Gradescope.
+
+    Args:
+        underlays: What its set-up imports, see :func:`carried_underlays`.
+    """
     members = {
         "setup.sh": _template("gradescope-setup.sh", loaded, executable=True),
         "run_autograder": _template("gradescope-run_autograder", loaded, executable=True),
-        **_rosgrade(loaded, grading_files(loaded)),
+        **_rosgrade(loaded, grading_files(loaded), underlays),
     }
     file = out / f"gradescope-{loaded.assignment.id}.zip"
     refuse_part(file, loaded.folder, f"the assignment in {loaded.folder}")
@@ -48,16 +53,19 @@ def gradescope(loaded: LoadedAssignment, out: Path) -> Path:
     return file
 
 
-def classroom50(loaded: LoadedAssignment, out: Path) -> Path:
+def classroom50(loaded: LoadedAssignment, out: Path, underlays: str = "") -> Path:
     """Write the folder that goes into a Classroom 50 classroom's ``autograders/``.
 
     Everybody who knows the classroom's address can read its files, so it holds no hidden check.
+
+    Args:
+        underlays: What its set-up imports, see :func:`carried_underlays`.
     """
     folder = out / f"classroom50-{loaded.assignment.id}"
     refuse_part(folder, loaded.folder, f"the assignment in {loaded.folder}")
     members = {
         "autograder.py": _template("classroom50-autograder.py", loaded),
-        **_rosgrade(loaded, visible_files(loaded)),
+        **_rosgrade(loaded, visible_files(loaded), underlays),
     }
     shutil.rmtree(folder, ignore_errors=True)
     write_members(folder, members)
@@ -90,8 +98,28 @@ def github(loaded: LoadedAssignment, out: Path, action: str, tag: str = "") -> P
     return file
 
 
-def _rosgrade(loaded: LoadedAssignment, files: Mapping[str, bytes]) -> dict[str, Member]:
-    members = checkout({loaded.assignment.id: files})
+def carried_underlays(place: str) -> dict[str, Member]:
+    """The file that a set-up imports packages of ROS 2 from; none if nothing is named.
+
+    Args:
+        place: What ``rosgrade underlay export`` wrote, which is carried along, or the address where
+            it lies, which is named.
+
+    Raises:
+        UsageError: It is not such a file or address.
+    """
+    if not place:
+        return {}
+    if is_address(place):
+        return {UNDERLAYS_PLACE: Member(f"{place}\n".encode())}
+    check_archive(Path(place))
+    return {UNDERLAYS_FILE: Member(Path(place).read_bytes())}
+
+
+def _rosgrade(
+    loaded: LoadedAssignment, files: Mapping[str, bytes], underlays: str
+) -> dict[str, Member]:
+    members = {**checkout({loaded.assignment.id: files}), **carried_underlays(underlays)}
     return {f"{_OWN_FOLDER}/{name}": member for name, member in members.items()}
 
 

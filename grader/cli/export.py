@@ -35,6 +35,15 @@ Tag = Annotated[
         help="On GitHub, grade only pushes of tags such as `submit*`; by default every push.",
     ),
 ]
+Underlays = Annotated[
+    str,
+    typer.Option(
+        "--underlays",
+        metavar="FILE|URL",
+        help="Built packages, such as rclcpp: what `rosgrade underlay export` wrote, or where it "
+        "lies (https://ADDRESS#sha256=HASH). The set-up imports them instead of building them.",
+    ),
+]
 
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None)
@@ -46,9 +55,10 @@ def other_systems() -> None:
 
 
 @app.command()
-def gradescope(assignment: AssignmentName, out: Folder = Path()) -> None:
+def gradescope(assignment: AssignmentName, out: Folder = Path(), underlays: Underlays = "") -> None:
     """Write the autograder zip for Gradescope."""
-    say(f"Upload to Gradescope: {export.gradescope(load_assignment(assignment), out)}")
+    file = export.gradescope(load_assignment(assignment), out, underlays)
+    say(f"Upload to Gradescope: {file}")
 
 
 @app.command()
@@ -66,9 +76,11 @@ def github(
 
 
 @app.command()
-def classroom50(assignment: AssignmentName, out: Folder = Path()) -> None:
+def classroom50(
+    assignment: AssignmentName, out: Folder = Path(), underlays: Underlays = ""
+) -> None:
     """Write the autograder folder for a Classroom 50 classroom."""
-    folder = export.classroom50(load_assignment(assignment), out)
+    folder = export.classroom50(load_assignment(assignment), out, underlays)
     say(f"Copy its content to CLASSROOM/autograders/ASSIGNMENT/: {folder}")
 
 
@@ -80,13 +92,14 @@ def course(
     out: Annotated[Path, typer.Option("--out", help="A new folder, or an earlier kit.")],
     title: Annotated[str, typer.Option(help="Name of the course.")] = "ROS 2 assignments",
     tag: Tag = "",
+    underlays: Underlays = "",
 ) -> None:
     """Write a course kit: what you give to students.
 
     It holds rosgrade, the assignments without solutions and hidden checks, a set-up command, a
     GitHub workflow, a devcontainer, and a README.
     """
-    kit = write_kit([load_assignment(name) for name in assignments], out, title, tag)
+    kit = write_kit([load_assignment(name) for name in assignments], out, title, tag, underlays)
     say(f"Give this folder to your students, for example as a template repository: {kit}")
 
 

@@ -20,6 +20,7 @@ from grader.machine import ros
 from grader.machine.resources import cache_folder
 from grader.sandbox.choice import Choice
 from grader.spec.nearest_name import nearest_or_all
+from grader.submission.underlay import transfer
 from grader.submission.underlay.definition import SETS, find_underlay, packages_of_ros
 from grader.submission.underlay.ros2_command import write_command
 from grader.submission.underlay.store import UnderlayStore
@@ -113,3 +114,47 @@ def remove(
             raise UsageError(f"no underlay {name!r} is built here.{nearest_or_all(name, known)}")
         say(f"Removed: {name}")
     write_command(installation, store)
+
+
+@app.command("export")
+def export_command(
+    file: Annotated[Path, typer.Argument(help="Archive to write: a .tar.gz.")],
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[PACKAGE]...", help="Packages or sets; by default all."),
+    ] = None,
+) -> None:
+    """Write the packages of ROS 2 that are built here to a file, for machines of the same kind.
+
+    Whoever imports the file does not have to build them. Lists and folders of a course are not in
+    it.
+    """
+    store = UnderlayStore(cache_folder(), ros.find())
+    wanted = [package for name in names or () for package in packages_of_ros(name).packages]
+    written = transfer.export(store.packages, wanted, file)
+    say(f"{file}: {', '.join(written)}")
+    say(f"To name where it lies: https://ADDRESS/{file.name}#sha256={transfer.sha256_of(file)}")
+
+
+@app.command("import")
+def import_command(
+    place: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE|URL",
+            help="What `rosgrade underlay export` wrote, or https://ADDRESS#sha256=HASH.",
+        ),
+    ],
+) -> None:
+    """Take packages that were built on another machine of the same kind.
+
+    The same kind is: processor, release of the system, version of Python and of ROS. Only import
+    files of people whom you trust, as the file holds programs.
+    """
+    installation = ros.find()
+    store = UnderlayStore(cache_folder(), installation)
+    brought = transfer.bring(store.packages, place)
+    say(f"Imported: {', '.join(brought)}" if brought else "All of it is there already")
+    command = write_command(installation, store)
+    if command:
+        say(f"The command ros2: {command}")

@@ -36,6 +36,8 @@ SUPPORTED = ((3, 13), (3, 12), (3, 11), (3, 10))
 WHEELS_PLATFORM = "linux-x86_64"
 VENV = ".venv"
 STAMP = "rosgrade-setup.json"
+UNDERLAYS_FILE, UNDERLAYS_PLACE = "underlays.tar.gz", "underlays.txt"
+"""What `rosgrade underlay export` wrote, or a file with its address, beside the lock."""
 
 COMPILERS = {"cmake": "cmake", "c++": "g++", "make": "make"}
 """What a package needs that is not pure Python -> what it is called by Debian and Ubuntu."""
@@ -52,6 +54,7 @@ APT = " ".join([*sorted(_PROGRAMS.values()), *("python3-" + part for part in _PA
 _FROM_SYSTEM = {"numpy", "empy", "lark-parser"}
 # One package of the lock has no wheel and is built by these, so they are installed before it.
 _BUILD_TOOLS = {"setuptools"}
+_MARK, _ERROR_MARK = "rosgrade: ", "rosgrade: error: "
 _TOLD_EACH = 20
 """Packages between two lines of progress."""
 
@@ -206,6 +209,7 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
     with _alone(root):
         installed = _read_stamp(venv)
         if installed == wanted:
+            _import_underlays(root, environ)
             return
         if venv.is_symlink() or (venv.exists() and not (venv / "pyvenv.cfg").is_file()):
             raise SetupError(f"{venv} is not a virtual environment: move it away")
@@ -232,6 +236,7 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
         options = ["--no-deps", "--no-build-isolation", *itself]
         _pip(venv, options, "rosgrade itself could not be installed")
         _write_stamp(venv, wanted)
+        _import_underlays(root, environ)
         if chosen.ros == "wheels":
             _add_ros2(venv, environ)
     if lacks:
@@ -303,10 +308,9 @@ def _add_ros2(venv: Path, environ: Mapping[str, str]) -> None:
     _say("building the command ros2 (a minute; not where github.com cannot be reached)")
     rosgrade = str(venv / "bin" / "rosgrade")
     command = [rosgrade, "underlay", "add", "--wait", "10", "ros2cli"]
-    error_mark = "rosgrade: error: "
 
     def tell(line: str) -> None:
-        if not line.startswith(error_mark):
+        if not line.startswith(_ERROR_MARK):
             print(line, end="", flush=True)
 
     try:
@@ -315,8 +319,24 @@ def _add_ros2(venv: Path, environ: Mapping[str, str]) -> None:
     except OSError as error:
         problem = str(error)
     if problem:
-        reason = problem.replace(error_mark, "")
+        reason = problem.replace(_ERROR_MARK, "")
         _say(f"no ros2 yet ({reason}); to get it: {VENV}/bin/rosgrade underlay add ros2cli")
+
+
+def _import_underlays(root: Path, environ: Mapping[str, str]) -> None:
+    """Take the built packages that a course gives along; quick where they are there already."""
+    named = root / UNDERLAYS_PLACE
+    place = named.read_text(encoding="utf-8").strip() if named.is_file() else ""
+    place = str(root / UNDERLAYS_FILE) if (root / UNDERLAYS_FILE).is_file() else place
+    if not place:
+        return
+    command = [str(root / VENV / "bin" / "rosgrade"), "underlay", "import", place]
+    done = _run(command, _clean(environ))
+    last = (done.stdout.splitlines() or ["no reason"])[-1]
+    if done.returncode:
+        _say(f"built packages were not imported ({last.replace(_ERROR_MARK, '')})")
+    else:
+        _say(f"built packages: {last.replace(_MARK, '')}")
 
 
 def _clean(environ: Mapping[str, str]) -> Dict[str, str]:

@@ -343,3 +343,14 @@ def test_the_solutions_that_instructors_install_beside_it_are_found(tmp_path: Pa
         command, cwd=tmp_path, env=environ, capture_output=True, text=True, check=True
     )
     assert done.stdout == f"{site / 'grader' / '_data'}\n"
+
+
+def test_a_kit_names_where_built_packages_lie_until_it_is_renewed_without(tmp_path: Path) -> None:
+    chosen = [load_assignment("timed_publisher")]
+    address = "https://example.org/underlays.tar.gz#sha256=" + "0" * 64
+    kit = write_kit(chosen, tmp_path / "kit", "Course", underlays=address)
+    assert (kit / "underlays.txt").read_text() == f"{address}\n"
+    assert "also brings packages of ROS" in (kit / "README.md").read_text()
+    write_kit(chosen, kit, "Course")
+    assert not (kit / "underlays.txt").exists()
+    assert "also brings packages of ROS" not in (kit / "README.md").read_text()

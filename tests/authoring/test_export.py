@@ -73,6 +73,36 @@ def test_the_same_files_give_the_same_zip(loaded, tmp_path):
     assert export.gradescope(loaded, tmp_path / "b").read_bytes() == first
 
 
+ADDRESS = "https://example.org/underlays.tar.gz#sha256=" + "0" * 64
+
+
+def test_built_packages_lie_where_the_set_up_looks_for_them(loaded, tmp_path, monkeypatch):
+    archive = tmp_path / "rclcpp.tar.gz"
+    archive.write_bytes(b"packages")
+    monkeypatch.setattr(export, "check_archive", lambda _: None)
+    for place, name, content in (
+        (str(archive), "underlays.tar.gz", b"packages"),
+        (ADDRESS, "underlays.txt", f"{ADDRESS}\n".encode()),
+    ):
+        with zipfile.ZipFile(export.gradescope(loaded, tmp_path, place)) as written:
+            assert written.read(f"rosgrade/{name}") == content
+        assert (export.classroom50(loaded, tmp_path, place) / "rosgrade" / name).read_bytes() == (
+            content
+        )
+
+
+def test_what_holds_no_built_packages_is_not_given_along(loaded, tmp_path):
+    archive = tmp_path / "notes.tar.gz"
+    archive.write_text("notes")
+    for place, told in (
+        (str(archive), r"notes\.tar\.gz: is neither"),
+        (str(tmp_path / "none.tar.gz"), "there is no such file"),
+        ("https://example.org/underlays.tar.gz", "#sha256=HASH"),
+    ):
+        with pytest.raises(UsageError, match=told):
+            export.gradescope(loaded, tmp_path, place)
+
+
 @pytest.mark.parametrize("name", ["setup.sh", "run_autograder"])
 def test_the_scripts_are_bash(loaded, tmp_path, name):
     with zipfile.ZipFile(export.gradescope(loaded, tmp_path)) as archive:

@@ -299,6 +299,37 @@ def test_a_set_up_without_the_sources_of_ros2_says_in_one_line_how_to_get_it(
     ]
 
 
+@pytest.mark.parametrize(
+    ("file", "status", "told"),
+    [
+        (None, 0, []),
+        ("underlays.txt", 0, ["rosgrade: built packages: Imported: rclcpp"]),
+        ("underlays.tar.gz", 3, ["rosgrade: built packages were not imported (no room)"]),
+    ],
+)
+def test_a_set_up_imports_the_built_packages_that_lie_beside_it_and_goes_on_without(
+    file: str | None,
+    status: int,
+    told: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    rosgrade = tmp_path / ".venv/bin/rosgrade"
+    rosgrade.parent.mkdir(parents=True)
+    last = "error: no room" if status else "Imported: rclcpp"
+    rosgrade.write_text(
+        f'#!/bin/sh\necho "$@" > {tmp_path}/called\necho "rosgrade: {last}"\nexit {status}\n'
+    )
+    rosgrade.chmod(0o755)
+    if file is not None:
+        (tmp_path / file).write_text("https://example.org/u.tar.gz#sha256=0\n")
+    bootstrap._import_underlays(tmp_path, os.environ)
+    assert capsys.readouterr().out.splitlines() == told
+    place = tmp_path / "underlays.tar.gz" if status else "https://example.org/u.tar.gz#sha256=0"
+    if file is not None:
+        assert (tmp_path / "called").read_text() == f"underlay import {place}\n"
+
+
 def test_a_set_up_that_fails_leaves_nothing_half_made(tmp_path: Path) -> None:
     assert set_up(tmp_path, "one", "bootstrap._install_lock = None") != 0
     assert not (tmp_path / ".venv").exists()

@@ -99,7 +99,7 @@ class Packages:
         keys: dict[str, str] = {}
         notes = [self._note(one) for one in plan]
         for note in notes:
-            keys[note.name] = self._key(note, keys)
+            keys[note.name] = self.key(note, keys)
         built = [one for one in plan if not self.kept.has(keys[one.release.name])]
         self._ask_for_libraries(built, distribution)
         if built:
@@ -159,7 +159,7 @@ class Packages:
             needs=tuple(sorted(source.needs)),
         )
 
-    def _key(self, note: Installed, keys: dict[str, str]) -> str:
+    def key(self, note: Installed, keys: dict[str, str]) -> str:
         """The name of the build of a package; those of what it needs are known."""
         below = [keys[name] for name in note.needs if name in keys]
         return digest(self.ros, note.name, note.commit, below)
