@@ -11,6 +11,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 
 from grader.recording.event import Breach
 from grader.run.process.descendants import send
@@ -36,7 +37,6 @@ _FULL = 0.99
 _MOST_SESSIONS = 16
 _MOST_IN_FLIGHT = 64
 _JUST_ENDED = 8
-_DISK, _SHARED = str(STUDENT / "disk"), str(STUDENT / "shared")
 
 
 class Watchdog:
@@ -121,10 +121,10 @@ class Watchdog:
             self._end_all("output", f"{size_words(written)} of output", allowed)
         for kind, violation in self._violations():
             self._end_all(kind, violation, "")
-        self._look_at(_DISK, "disk", "/tmp and home")
-        self._look_at(_SHARED, "shared memory", "/dev/shm")
+        self._look_at(STUDENT / "disk", "disk", "/tmp and home")
+        self._look_at(STUDENT / "shared", "shared memory", "/dev/shm")
 
-    def _look_at(self, place: str, what: str, name: str) -> None:
+    def _look_at(self, place: Path, what: str, name: str) -> None:
         status = os.statvfs(place)
         size, free = status.f_blocks * status.f_frsize, status.f_bfree * status.f_frsize
         if free < (1 - _FULL) * size:
