@@ -59,6 +59,22 @@ def test_it_runs_the_underlay_s_ros2_behind_what_is_sourced_and_goes_with_it(
     assert not command.exists()
 
 
+def test_the_command_of_an_earlier_rosgrade_stays_as_long_as_what_it_runs(
+    wheels: RosInstallation, tmp_path: Path
+) -> None:
+    program = kept(tmp_path, wheels, "ros2cli", "ros2cli") / "bin/ros2"
+    program.parent.mkdir()
+    program.touch()
+    command = write_command(wheels, UnderlayStore(tmp_path, wheels))
+    assert command is not None
+    (program.parents[2] / "underlay.json").unlink()
+    write_command(wheels, UnderlayStore(tmp_path, wheels))
+    assert command.is_file()
+    program.unlink()
+    write_command(wheels, UnderlayStore(tmp_path, wheels))
+    assert not command.exists()
+
+
 def test_a_command_that_rosgrade_did_not_write_is_left_alone(
     wheels: RosInstallation, tmp_path: Path
 ) -> None:

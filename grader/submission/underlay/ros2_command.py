@@ -30,7 +30,8 @@ def write_command(ros: RosInstallation, store: UnderlayStore) -> Path | None:
     kept = store.installed()
     program = next((prefix for one, prefix in kept if "ros2cli" in one.packages), None)
     if program is None:
-        file.unlink(missing_ok=True)
+        if not _runs(file):
+            file.unlink(missing_ok=True)
         return None
     environment = replace(ros, underlays=tuple(prefix for _, prefix in kept)).environment({})
     lines = ["#!/bin/sh", _MARK]
@@ -67,6 +68,14 @@ def absence_note(text: str) -> str:
         f"The command `ros2` is not on this machine: {REMEDY}. Without it, `rosgrade check` runs "
         "your nodes, and with --verbose shows what they print."
     )
+
+
+def _runs(file: Path) -> bool:
+    """Whether what the command runs is still there, such as the build of an earlier rosgrade."""
+    if not file.is_file():
+        return False
+    last = file.read_text(encoding="utf-8", errors="replace").splitlines()[-1]
+    return Path(shlex.split(last)[-2]).is_file()
 
 
 def _is_ours(file: Path) -> bool:
