@@ -99,7 +99,7 @@ def test_good_ones_are_read(found: Found, stimuli: str) -> None:
 
 ONE_WAY = "give the messages by one of message, messages, from, python"
 FORM = [
-    ("      - {after: 1 s}\n", "14: .*its first key must be one of call, join, kill, lifecycle, publish"),
+    ("      - {after: 1 s}\n", "14: .*its first key must be one of call, join, kill, lifecycle"),
     ("      - {pubish: /a, type: a/msg/B, message: {}}\n", "unknown key 'pubish'. Did you mean"),
     (publish("after: 1 s"), f"14: .*{ONE_WAY}, but none is given"),
     (publish("message: {}\nmessages: [{}]"), f"{ONE_WAY}, not message and messages"),

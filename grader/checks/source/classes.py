@@ -186,7 +186,7 @@ def _why_not_as_asked(family: Family, item: FoundClass, parameters: Class) -> Fi
             near = f"; it has {code(there)}" if there else ""
             seen = f"{name} does not declare {code(member)} ({_at(item)}){near}"
             shown = _shown([(item, f"{member} is not declared here")])
-            return mistaken("not_declared_here", seen, shown, name=code(member))
+            return mistaken("declared_elsewhere", seen, shown, name=code(member))
     for member in parameters.shares:
         for heir in family.heirs(item):
             if (line := _members(heir).get(member)) is not None:

@@ -64,7 +64,7 @@ class Kept:
         """Name the folder of underlays."""
         self.cache = BuildCache(folder, is_pruned=False)
         self._folder = folder / BUILDS
-        self._ros = str(ros.prefixes[0])
+        self._ros = str(next(iter(ros.prefixes), ""))
 
     def has(self, key: str) -> bool:
         """Whether a build is there, whole and noted."""

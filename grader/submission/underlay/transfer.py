@@ -56,7 +56,7 @@ class Kind:
     """What built programs hold for.
 
     Attributes:
-        machine: The processor: ``x86_64``.
+        machine: The processor, as ``uname -m`` says it.
         system: The Linux distribution and its C library: ``debian bookworm glibc-2.36``.
         python: Version, such as ``3.12``.
         ros: The wheels of ROS with their versions, or the client libraries of a sourced ROS.
