@@ -24,7 +24,7 @@ _OUTCOMES = {True: "succeeded", False: "failed", None: "was not answered"}
 
 
 def why_never(recording: Recording, seen: str, shown: Evidence | None = None) -> Finding:
-    """Why something never happened: the process ended, or nobody can tell."""
+    """Why something never happened: the process ended, or it does not get so far."""
     shown = shown or Evidence(moments=(until_the_end(recording),))
     return why_ended(recording, seen) or mistaken("never_happened", seen, shown)
 
