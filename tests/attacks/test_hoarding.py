@@ -67,7 +67,7 @@ def graded(sandbox: Sandbox, tmp_path_factory: pytest.TempPathFactory) -> Graded
             capture_output=True,
             text=True,
             check=False,
-            timeout=450,
+            timeout=600,
         )
         assert done.returncode == 0, done.stderr
         found: dict[str, str] = json.loads(done.stdout.splitlines()[-1])
@@ -76,7 +76,6 @@ def graded(sandbox: Sandbox, tmp_path_factory: pytest.TempPathFactory) -> Graded
     return run
 
 
-@pytest.mark.timeout(900)
 def test_six_honest_grades_are_the_same_bits_beside_submissions_that_hoard(graded: Graded) -> None:
     honest = {name: HONEST[name] for name in NAMES}
     calm = graded(honest)

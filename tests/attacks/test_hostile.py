@@ -688,7 +688,6 @@ def graded(sandbox: Sandbox, tmp_path_factory: pytest.TempPathFactory) -> dict[s
     return grade_class(tmp_path_factory.mktemp("hostile"), possible({**HONEST, **ATTACKS}))
 
 
-@pytest.mark.timeout(800)
 @pytest.mark.parametrize("name", named(ATTACKS))
 def test_an_attack_costs_its_own_points_and_is_named(name: str, graded: dict[str, Handed]) -> None:
     attack, handed = ATTACKS[name], graded[name]
@@ -699,7 +698,6 @@ def test_an_attack_costs_its_own_points_and_is_named(name: str, graded: dict[str
     assert handed.result.score is not None and handed.result.score < handed.result.max_score
 
 
-@pytest.mark.timeout(800)
 @pytest.mark.parametrize("name", named(HONEST))
 def test_an_honest_grade_is_the_same_byte_for_byte(
     name: str, calm: dict[str, Handed], graded: dict[str, Handed]

@@ -18,7 +18,6 @@ from tests.attacks.submissions import write_submission
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     ("number", "hits_sandbox"), [(signal.SIGKILL, False), (signal.SIGSTOP, True)]
 )

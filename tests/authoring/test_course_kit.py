@@ -296,7 +296,6 @@ def test_the_wheel_of_a_kit_lacks_nothing_of_rosgrade_but_other_assignments(
 
 
 @pytest.mark.ros
-@pytest.mark.timeout(300)
 def test_what_pip_installs_from_the_wheel_lists_explains_starts_and_checks(
     kit: Path, tmp_path: Path
 ) -> None:

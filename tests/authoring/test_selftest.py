@@ -40,7 +40,6 @@ def runner() -> Iterator[Runner]:
 
 @pytest.mark.ros
 @pytest.mark.slow
-@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("name", NAMES)
 def test_the_mutation_score_is_perfect(name: str, runner: Runner) -> None:
     loaded = load_assignment(EXAMPLES.get(name, name))

@@ -92,7 +92,6 @@ def grade(
     return sorted(done, key=lambda item: item.entry.key)
 
 
-@pytest.mark.timeout(300)
 def test_a_worker_that_dies_loses_nothing_and_changes_nothing(
     tmp_path: Path, cluster: Cluster
 ) -> None:
@@ -118,7 +117,6 @@ def test_a_worker_that_dies_loses_nothing_and_changes_nothing(
     assert {item.result.score for item in far if item.result} >= {0.0, 10.0}
 
 
-@pytest.mark.timeout(120)
 def test_a_cluster_takes_what_its_workers_can_and_is_lost_with_its_scheduler(
     tmp_path: Path, cluster: Cluster
 ) -> None:

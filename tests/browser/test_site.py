@@ -62,7 +62,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", folder],
         cwd=resources.root(),
         env={**os.environ, "NO_MKDOCS_2_WARNING": "1", "ROSGRADE_REPOSITORY": REPOSITORY},
-        timeout=100,
+        timeout=600,
         check=True,
     )
     (folder / AXE).write_text(AXE_SCRIPT, encoding="utf-8")
@@ -96,7 +96,6 @@ def violations(page: Page, without: Sequence[str] = (), **options: object) -> li
     return found
 
 
-@pytest.mark.timeout(900)
 def test_every_page_is_accessible_and_none_is_endless(page: Page, site: Path, address: str) -> None:
     found, asked, complaints = [], [], []
     page.on("request", lambda request: asked.append(request.url))

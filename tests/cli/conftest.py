@@ -25,7 +25,7 @@ def rosgrade(tmp_path: Path) -> Rosgrade:
             env={**os.environ, "COLUMNS": str(columns), "PYTHONPATH": str(ROOT)},
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=600,
             check=False,
         )
 

@@ -31,7 +31,7 @@ def opened(folder: Path, browser: str | None) -> subprocess.CompletedProcess[str
         env={**environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=600,
         check=False,
     )
 

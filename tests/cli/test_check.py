@@ -185,7 +185,7 @@ def test_an_interrupted_check_leaves_nothing_behind_that_stops_the_next(
         if "run: recording" in line:
             break
     check.send_signal(number)
-    _, told = check.communicate(timeout=60)
+    _, told = check.communicate(timeout=600)
     assert check.returncode == 130, told
     assert "rosgrade: interrupted: ending what still runs" in told
     assert "Traceback" not in told

@@ -34,10 +34,10 @@ def test_the_printed_address_opens_the_class_and_ctrl_c_ends_it(tmp_path: Path) 
         first = review.stdout.readline()
         assert "by AK: http://127.0.0.1:" in first
         browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
-        with browser.open(first.split()[-1], timeout=60) as page:
+        with browser.open(first.split()[-1], timeout=600) as page:
             assert "Class overview" in page.read().decode()
         review.send_signal(signal.SIGINT)
-        told, _ = review.communicate(timeout=60)
+        told, _ = review.communicate(timeout=600)
     finally:
         review.kill()
         review.wait()

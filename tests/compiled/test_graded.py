@@ -97,7 +97,6 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
         return Results(verdicts, observed)
 
 
-@pytest.mark.timeout(400)
 @pytest.mark.parametrize("name", SOLUTIONS)
 def test_a_right_node_gets_full_points_and_a_wrong_one_loses_what_it_must(
     name: str, results: Results
@@ -110,7 +109,6 @@ def test_a_right_node_gets_full_points_and_a_wrong_one_loses_what_it_must(
     assert not wrong
 
 
-@pytest.mark.timeout(400)
 @pytest.mark.parametrize(
     "end", ["SIGSEGV: segmentation fault", "std::runtime_error: no speed is left"]
 )

@@ -39,7 +39,7 @@ def rosgrade(copy: Path, *arguments: str) -> str:
         env={**os.environ, "PYTHONPATH": str(copy), "COLUMNS": "200"},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=600,
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
@@ -48,7 +48,7 @@ def rosgrade(copy: Path, *arguments: str) -> str:
 
 def python(copy: Path, code: str) -> None:
     environment = {**os.environ, "PYTHONPATH": str(copy)}
-    subprocess.run([sys.executable, "-c", code], cwd=copy, env=environment, check=True, timeout=60)
+    subprocess.run([sys.executable, "-c", code], cwd=copy, env=environment, check=True, timeout=600)
 
 
 def test_the_map_shows_every_room_of_the_house_and_no_other() -> None:

@@ -25,7 +25,6 @@ def extend(file: Path, content: str) -> None:
 
 @pytest.mark.ros
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_every_step_does_what_the_page_says(tmp_path: Path) -> None:
     for step in steps(PAGE.read_text(encoding="utf-8"), skipped=("text",)):
         if isinstance(step, WriteFile):

@@ -40,7 +40,6 @@ def test_dots_stand_for_anything(printed: str, output: str, same: bool) -> None:
 
 @pytest.mark.ros
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 def test_every_step_does_what_the_page_says(tmp_path: Path) -> None:
     done = steps(PAGE.read_text(encoding="utf-8"))
     assert len(done) > 10

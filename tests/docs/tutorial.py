@@ -77,7 +77,7 @@ def run(step: Command, folder: Path, ends_with: int = 0) -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        timeout=300,
+        timeout=1200,
         check=False,
     )
     told = f"$ {step.line}\n{ended.stdout}"

@@ -89,7 +89,7 @@ def test_a_node_hears_the_same_words_never_earlier_than_then(
     given = read_inputs(file, recording)
     assert [message.cdr[8:9].decode() for message in given] == WORDS
     player = replay(file, place, tmp_path)
-    told, _ = player.communicate(timeout=60)
+    told, _ = player.communicate(timeout=600)
     assert player.returncode == 0, told
     heard = re.findall(r"^ *([\d.]+) s  bot_pub  heard (\w)$", told, re.MULTILINE)
     assert [word for _, word in heard] == WORDS
@@ -110,7 +110,7 @@ def test_ctrl_c_ends_the_node_and_leaves_nothing(run: tuple[Path, Path], tmp_pat
         if "heard a" in line:
             break
     player.send_signal(signal.SIGINT)
-    told, _ = player.communicate(timeout=60)
+    told, _ = player.communicate(timeout=600)
     assert player.returncode == 130, told
     assert "Traceback" not in re.sub(r"bot_pub  .*", "", told)
     assert not running(str(tmp_path)) and not running(str(place))
@@ -122,7 +122,7 @@ def test_a_node_that_never_listens_is_reported(run: tuple[Path, Path], tmp_path:
     file, _ = run
     place = install(tmp_path, "import time\nprint('no robot today', flush=True)\n")
     player = replay(file, place, tmp_path)
-    told, _ = player.communicate(timeout=60)
+    told, _ = player.communicate(timeout=600)
     assert player.returncode == 1
     assert "bot_pub  no robot today" in told
     assert "the node has ended by itself (exit code 0)" in told

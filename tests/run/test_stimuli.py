@@ -12,7 +12,7 @@ from mcap_ros2.writer import Writer
 from grader.recording.model import Ending, Kind, Owner
 from tests.run.conftest import RunNode
 
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.ros]
 
 STRING = "std_msgs/msg/String"
 INT = "std_msgs/msg/Int64"

@@ -17,7 +17,7 @@ from grader.submission.prepare import Preparation, Prepared, prepare
 from tests.checks.builder import judge
 from tests.submission.samples import MANIFEST, Tree
 
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.ros]
 
 FOLDER = "src/bot_publisher"
 CMAKE = """\

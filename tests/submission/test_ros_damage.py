@@ -142,7 +142,6 @@ set_target_properties(nav2_util::nav2_util PROPERTIES IMPORTED_LOCATION
 
 @pytest.mark.ros
 @pytest.mark.compiles
-@pytest.mark.timeout(600)
 def test_a_build_that_a_damaged_package_stops_costs_nothing_and_is_not_kept(
     tree: Tree, real_ros: RosInstallation, tmp_path: Path
 ) -> None:

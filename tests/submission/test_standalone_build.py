@@ -149,7 +149,7 @@ def printed(found: Prepared, ros: RosInstallation) -> str:
         capture_output=True,
         text=True,
         check=True,
-        timeout=60,
+        timeout=600,
     ).stdout
 
 
@@ -162,7 +162,6 @@ for place in os.environ['PYTHONPATH'].split(':'):
 """
 
 
-@pytest.mark.timeout(600)
 @pytest.mark.compiles
 @pytest.mark.ros
 @pytest.mark.slow

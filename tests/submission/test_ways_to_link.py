@@ -10,7 +10,7 @@ from grader.machine import ros as ros_module
 from grader.submission.prepare import Preparation, prepare
 from tests.submission.samples import MANIFEST, Tree
 
-pytestmark = [pytest.mark.ros, pytest.mark.compiles, pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.ros, pytest.mark.compiles, pytest.mark.slow]
 
 # rcl links to the tracing library, as rclcpp does, and is part of the wheels.
 CODE = """\

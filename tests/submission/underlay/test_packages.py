@@ -59,7 +59,6 @@ def test_an_index_that_was_changed_under_its_tag_is_refused(
 
 @pytest.mark.ros
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_what_two_names_need_is_built_once_and_stays_until_neither_needs_it(
     index: Index, real_ros: RosInstallation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -91,7 +90,6 @@ def test_what_two_names_need_is_built_once_and_stays_until_neither_needs_it(
 
 @pytest.mark.ros
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_what_was_built_stays_when_a_later_package_fails(
     index: Index, real_ros: RosInstallation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -115,7 +113,6 @@ def test_what_was_built_stays_when_a_later_package_fails(
 
 @pytest.mark.ros
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_a_submission_gets_by_need_what_it_names_and_is_built(
     index: Index, real_ros: RosInstallation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -136,7 +133,6 @@ def test_a_submission_gets_by_need_what_it_names_and_is_built(
 
 @pytest.mark.ros
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_a_list_of_a_course_is_built_on_packages_of_ros(
     index: Index, real_ros: RosInstallation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

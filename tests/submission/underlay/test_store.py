@@ -129,7 +129,6 @@ def test_a_file_is_built_once_laid_under_submissions_and_removed(
 
 @pytest.mark.ros
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_lists_of_one_name_in_two_courses_keep_their_builds(
     real_ros: RosInstallation, repository: Repository, tmp_path: Path
 ) -> None:
