@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from grader.checks.interface.interface import Has
 from grader.findings.finding import Finding, Status
 from grader.recording.submission import BuildRecord, Definition, Dependency, PackageRecord
 from tests.checks import builder
@@ -217,6 +218,89 @@ class TestFields:
         )
         assert "has 0 lines `---`, not 1" in found
         assert "request and response" in found
+
+
+ASKED = {"place": ["geometry_msgs/msg/Pose", ["float64", "float64"]], "severity": "float64"}
+
+
+class TestHas:
+    def has(self, definition: str, *, others: tuple[Definition, ...] = (), **asked) -> Finding:
+        subject = handed_in(
+            definition,
+            definitions=(Definition("src/bot_msgs/msg/BotStatus.msg", definition), *others),
+            generated=(Definition("msg/BotStatus.msg", definition),),
+        )
+        return judge("interface.has", subject, interface=INTERFACE, fields=asked or ASKED)
+
+    @pytest.mark.parametrize(
+        "text",
+        [
+            "geometry_msgs/Pose where\nfloat64 how_bad\n",
+            "float64 how_bad\nstring note\ngeometry_msgs/Pose where\n",
+            "float64 a\nfloat64 b\nfloat64 c\n",
+            "Spot spot\nfloat64 c\n",
+            "float64 c 1.0  # of 1\nfloat64 LEAST=0.0\ngeometry_msgs/msg/Pose[] all\nSpot s\n",
+        ],
+    )
+    def test_any_name_order_and_one_of_the_choices_will_do(self, text: str):
+        spot = Definition("src/bot_msgs/msg/Spot.msg", "float64 x\nfloat64 y\nSpot within\n")
+        assert self.has(text, others=(spot,)).status is Status.PASSED
+
+    @pytest.mark.parametrize(
+        ("text", "words"),
+        [
+            ("geometry_msgs/Pose where\n", "no field is left for severity (place is `where`)"),
+            ("float64 a\nfloat64 b\n", "no field is left for place (severity is `a`)"),
+            ("float64[3] all\n", "no field is left for place and severity"),
+            ("", "has no field: no field is left for place and severity"),
+            ("float32 a\nfloat64 b\nfloat64 c\n", "no field is left for place"),
+        ],
+    )
+    def test_a_field_stands_for_one_thing_only(self, text: str, words: str):
+        finding = self.has(text)
+        assert finding.status is Status.FAILED
+        assert words in finding.observed
+
+    def test_what_to_add_is_said_and_what_is_asked_in_words(self):
+        finding = self.has("float64 a\n")
+        told = builder.text(finding)
+        assert "`geometry_msgs/msg/Pose` or 2 fields of `float64`" in told
+        assert "Its name is your choice" in told
+
+    def test_a_word_stands_for_several_types(self):
+        assert (
+            self.has("uint8 n\nwstring w\n", number="number", text="text").status is Status.PASSED
+        )
+        assert self.has("string n\n", number="number").status is Status.FAILED
+
+    @pytest.mark.parametrize(
+        ("fields", "words"),
+        [
+            ({"x": "float46"}, "'float46' is no type of a field"),
+            ({str(one): ["bool", "text", "float"] for one in range(9)}, "more than 256 choices"),
+            ({}, "at least 1 item"),
+        ],
+    )
+    def test_what_cannot_be_asked_is_refused(self, fields, words: str):
+        with pytest.raises(ValueError, match=words):
+            Has(interface=INTERFACE, fields=fields)
+
+    def test_a_part_of_a_service_can_be_asked(self):
+        text = "string name\n---\nbool ok\n"
+        subject = handed_in(text, file="srv/Ask.srv")
+        for part, status in (("request", Status.PASSED), ("response", Status.FAILED)):
+            given = {"interface": "bot_msgs/srv/Ask", "part": part, "fields": {"name": "text"}}
+            assert judge("interface.has", subject, **given).status is status
+        with pytest.raises(ValueError, match="a srv has no part 'goal'"):
+            Has(interface="bot_msgs/srv/Ask", part="goal", fields={"name": "text"})
+
+
+def test_fields_in_another_order_pass_where_any_order_will_do():
+    text = "float64 b\nuint8 a\n"
+    for order, status in (("any", Status.PASSED), ("same", Status.FAILED)):
+        wanted = {"definition": "uint8 a\nfloat64 b\n", "order": order}
+        finding = judge("interface.fields", handed_in(text), interface=INTERFACE, **wanted)
+        assert finding.status is status
 
 
 class TestConstants:

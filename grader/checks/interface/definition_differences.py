@@ -19,7 +19,9 @@ class Difference:
     hint: str
 
 
-def field_differences(wanted: Section, own: Section, package: str) -> Iterator[Difference]:
+def field_differences(
+    wanted: Section, own: Section, package: str, *, in_order: bool
+) -> Iterator[Difference]:
     """How the fields of a section differ."""
     expected = {field.name: field for field in wanted.fields}
     observed = {field.name: field for field in own.fields}
@@ -30,7 +32,7 @@ def field_differences(wanted: Section, own: Section, package: str) -> Iterator[D
             hint = "Remove it. A constant has an equals sign, such as `uint8 ON=1`."
             yield Difference(name, f"a field {code(str(field))} that is not asked for", hint)
     order = [name for name in observed if name in expected]
-    if len(order) == len(expected) == len(observed) and order != list(expected):
+    if in_order and len(order) == len(expected) == len(observed) and order != list(expected):
         text = f"the fields are in the order {listing(map(code, order))}"
         hint = "ROS sends the fields in this order. Use the order that is asked for."
         yield Difference(order[0], text, hint)

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import partial
+from itertools import islice
+from math import prod
+from pathlib import PurePosixPath
+from typing import Annotated, Any, Literal
 
+from pydantic import BeforeValidator, model_validator
 from pydantic import Field as Parameter
-from pydantic import model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
+from grader.checks.interface.asked_fields import (
+    FAMILIES,
+    Alternatives,
+    all_fields,
+    assigned,
+    words_of,
+)
 from grader.checks.interface.definition_differences import (
     Difference,
     constant_differences,
@@ -27,8 +40,16 @@ from grader.diagnosis.not_generated import (
 )
 from grader.findings.finding import Comparison, Evidence, Finding, Table
 from grader.findings.words import code, codes, listing, worded
-from grader.recording.interface import DefinitionError, Section, sections_of
+from grader.recording.interface import (
+    PRIMITIVES,
+    DefinitionError,
+    Field,
+    Section,
+    fields_of,
+    sections_of,
+)
 from grader.recording.submission import Definition, PackageRecord, SourceError, SubmissionRecord
+from grader.spec.name import INTERFACE
 from grader.spec.name import InterfaceName as Interface
 from grader.spec.names import Thing
 
@@ -36,6 +57,9 @@ _BUILD_KINDS = frozenset({"buildtool_depend", "build_depend", "depend"})
 _RUN_KINDS = frozenset({"exec_depend", "run_depend", "depend"})
 _RUNTIME = "rosidl_default_runtime"
 _PARTS = {1: ("",), 2: ("request", "response"), 3: ("goal", "result", "feedback")}
+_OF_KIND = {"msg": 1, "srv": 2, "action": 3}
+_MOST_CHOICES = 256
+_MOST_FIELDS = 1000
 
 
 class OfInterface(Parameters):
@@ -126,9 +150,16 @@ class Defined(OfInterface):
 class Fields(Defined):
     """Parameters of interface.fields."""
 
+    order: Literal["same", "any"] = Parameter(
+        "same",
+        description="`any`: the fields may be in another order. Then only nodes that use the "
+        "student's own definition can communicate.",
+    )
+
     def _asked(self) -> str:
         wanted = [str(item) for section in self.sections for item in section.fields]
-        return f"the fields {codes(wanted)}" if wanted else "no field"
+        free = ", in any order" if self.order == "any" and len(wanted) > 1 else ""
+        return f"the fields {codes(wanted)}{free}" if wanted else "no field"
 
 
 @check("interface.fields", Subject.SUBMISSION, Fields, concept="interfaces")
@@ -139,7 +170,97 @@ def fields(submission: SubmissionRecord, parameters: Fields) -> Finding:
     constants do not matter. Two nodes can communicate only if all of this is the same: ROS compares
     a hash of it.
     """
-    return _compared(submission, parameters, field_differences)
+    differ = partial(field_differences, in_order=parameters.order == "same")
+    return _compared(submission, parameters, differ)
+
+
+def _alternatives(written: Any) -> Any:
+    """A type alone, or several of which one is enough; those in a list of their own go together."""
+    choices = written if isinstance(written, list | tuple) else [written]
+    return [one if isinstance(one, list | tuple) else [one] for one in choices]
+
+
+class Has(OfInterface):
+    """Parameters of interface.has."""
+
+    fields: dict[str, Annotated[Alternatives, BeforeValidator(_alternatives)]] = Parameter(
+        description="What for -> the type of the field, such as `float64`, `float64[]`, "
+        "`geometry_msgs/msg/Pose`, or one of the words `number`, `integer`, `float` and `text`. Of "
+        "a list, one type is enough; a list in it, such as `[float64, float64]`, stands for "
+        "several fields.",
+        min_length=1,
+    )
+    part: Literal["request", "response", "goal", "result", "feedback"] | None = Parameter(
+        None, description="Part of a service or an action; by default all parts together."
+    )
+
+    @model_validator(mode="after")
+    def _known(self) -> Has:
+        for what, alternatives in self.fields.items():
+            for type in (type for types in alternatives for type in types):
+                single = type.removesuffix("[]")
+                if single not in (*PRIMITIVES, *FAMILIES) and not re.fullmatch(INTERFACE, single):
+                    raise ValueError(
+                        f"{what}: {type!r} is no type of a field, such as float64, text or "
+                        "geometry_msgs/msg/Pose"
+                    )
+        if prod(map(len, self.fields.values())) > _MOST_CHOICES:
+            raise ValueError(f"'fields' leave more than {_MOST_CHOICES} choices")
+        parts = _PARTS[_OF_KIND[self.parts.kind]]
+        if self.part is not None and self.part not in parts:
+            raise ValueError(f"a {self.parts.kind} has no part {self.part!r}")
+        return self
+
+    def _asked(self) -> str:
+        wanted = (f"{what} ({words_of(types)})" for what, types in self.fields.items())
+        place = f" in its {self.part}" if self.part else ""
+        return f"`{self.interface}` has{place} what stands for {listing(wanted)}"
+
+
+@check("interface.has", Subject.SUBMISSION, Has, concept="interfaces")
+def has(submission: SubmissionRecord, parameters: Has) -> Finding:
+    """The interface has fields for what is asked, under any name and in any order.
+
+    Judged by the types of the fields. Each field stands for one thing only. The fields of the
+    package's own messages in it count too, and further fields do not matter.
+    """
+    name = parameters.own(submission)
+    definition = _definition(submission, parameters)
+    own = _sections(name, definition)
+    stop_if(_why_other_parts(name, definition, own, Evidence()))
+    parts = dict(zip(_PARTS[len(own)], own, strict=True))
+    chosen = [parts[parameters.part]] if parameters.part else [*own]
+    messages = dict(_own_messages(submission, name))
+    written = [field for section in chosen for field in section.fields]
+    fields = [*islice(all_fields(written, messages), _MOST_FIELDS)]
+    found = assigned(parameters.fields, fields)
+    taken = [
+        f"{what} is {codes(field.name for field in found[what])}"
+        for what in parameters.fields
+        if what in found
+    ]
+    if len(found) == len(parameters.fields):
+        return Finding.as_asked("; ".join(taken))
+    lacking = {what: one for what, one in parameters.fields.items() if what not in found}
+    return mistaken(
+        "no_field_for",
+        f"{code(definition.file)} has {codes(map(str, written)) or 'no field'}: no field is left "
+        f"for {listing(lacking)}{f' ({listing(taken)})' if taken else ''}",
+        Evidence(places=(SourceError(definition.file, None, "lacks a field"),)),
+        fields=listing(f"{words_of(types)} for {what}" for what, types in lacking.items()),
+    )
+
+
+def _own_messages(
+    submission: SubmissionRecord, name: InterfaceName
+) -> Iterator[tuple[str, tuple[Field, ...]]]:
+    """The messages of a package, each with its fields; what cannot be read has none."""
+    package = existing_package(submission, name.package)
+    for item in (*package.definitions, *package.generated):
+        path = PurePosixPath(item.file)
+        if path.suffix == ".msg":
+            full = f"{name.package}/msg/{path.stem}"
+            yield full, tuple(fields_of(full, item.text).values())
 
 
 class Constants(Defined):
@@ -166,19 +287,10 @@ def _compared(
 ) -> Finding:
     name, wanted = parameters.parts, parameters.sections
     definition = _definition(submission, parameters)
-    try:
-        own = sections_of(str(name), definition.text)
-    except DefinitionError as error:
-        shown = Evidence(places=(SourceError(definition.file, error.line, "cannot be read"),))
-        seen = f"{definition.file}:{error.line} cannot be read: {error}"
-        return mistaken("unreadable_definition", seen, shown)
+    own = _sections(name, definition)
     title = f"{name.file}: as it should be, and yours"
     sides = (Comparison(title, tuple(_lines(wanted)), tuple(_lines(own))),)
-    if len(own) != len(wanted):
-        seen = f"{code(definition.file)} has {len(own) - 1} lines `---`, not {len(wanted) - 1}"
-        parts = listing(_PARTS[len(wanted)])
-        shown = Evidence(comparisons=sides)
-        return mistaken("other_parts", seen, shown, kind=name.kind, parts=parts)
+    stop_if(_why_other_parts(name, definition, own, Evidence(comparisons=sides)))
     differing = [
         (item, section.lines.get(item.name))
         for expected, section in zip(wanted, own, strict=True)
@@ -195,6 +307,29 @@ def _compared(
         Evidence(places=places[:10], comparisons=sides),
         write=" ".join(dict.fromkeys(item.hint for item, _ in differing[:2])),
     )
+
+
+def _sections(name: InterfaceName, definition: Definition) -> tuple[Section, ...]:
+    """The parts of a student's definition; ends the check where it cannot be read."""
+    try:
+        return sections_of(str(name), definition.text)
+    except DefinitionError as error:
+        shown = Evidence(places=(SourceError(definition.file, error.line, "cannot be read"),))
+        seen = f"{definition.file}:{error.line} cannot be read: {error}"
+        stop_if(mistaken("unreadable_definition", seen, shown))
+        raise
+
+
+def _why_other_parts(
+    name: InterfaceName, definition: Definition, own: tuple[Section, ...], shown: Evidence
+) -> Finding | None:
+    """Why a definition has not the parts of its kind, or None if it has."""
+    wanted = _OF_KIND[name.kind]
+    if len(own) == wanted:
+        return None
+    seen = f"{code(definition.file)} has {len(own) - 1} lines `---`, not {wanted - 1}"
+    parts = listing(_PARTS[wanted])
+    return mistaken("other_parts", seen, shown, kind=name.kind, parts=parts)
 
 
 def _lines(sections: tuple[Section, ...]) -> Iterator[str]:
