@@ -110,6 +110,13 @@ def write_interfaces(folder: Path, values: Values, target: Path) -> None:
             copy.write_text(fill_interface(file.read_text("utf-8"), values), "utf-8")
 
 
+def open_interfaces(assignment: Assignment, folder: Path, values: Values) -> list[str]:
+    """The interfaces that only a variable names, and that the author has no copy of."""
+    copies = {fill_text(file.parent.name, values) for file in (folder / FOLDER).rglob(_MANIFEST)}
+    names = [values[name] for name, one in assignment.variables.items() if one.in_ == "interfaces"]
+    return [name for name in names if name.partition("/")[0] not in copies]
+
+
 def interface_problems(
     source: Source, assignment: Assignment, checks: Sequence[BoundCheck], known: Interfaces
 ) -> Iterator[Problem]:
@@ -119,9 +126,12 @@ def interface_problems(
     judged: it may have the interface.
     """
     handed_in = {package.name for package in assignment.packages}
+    left_open = open_interfaces(assignment, source.file.parent, known.values)
     elsewhere = {name for package in assignment.packages for name in package.depends} | PACKAGES
     for place, interface, is_imported in _named(assignment, checks):
         package = interface.split("/")[0]
+        if interface in left_open:
+            continue
         if package not in handed_in or (is_imported and package in known.packages):
             yield from _unknown(source, place, interface, elsewhere, known)
         elif is_imported:

@@ -15,6 +15,7 @@ from grader.spec.source import Model, Source
 KEY = "variables"
 ANY = "any"
 _PLACE = re.compile(r"(?<!\$)\{([a-z][a-z0-9_]*)\}")
+_STEPS = 3
 _NUMBER = re.compile(r"0|[1-9][0-9]*")
 
 Values = Mapping[str, str]
@@ -34,7 +35,7 @@ class Variable(Model):
         None,
         description="Form of the name in what was handed in, such as `group{n}_gp2`: `{n}` is the "
         "part that was chosen, of letters, digits and underscores. `any`: the whole name is free, "
-        "and there is exactly one.",
+        "and there is exactly one (of interfaces, one of the kind that the example has).",
     )
     in_: Literal[
         "packages",
@@ -55,7 +56,8 @@ class Variable(Model):
     of: str | None = Field(
         None,
         description="Only executables of this package; only publishers, subscriptions, services "
-        "or actions of this type.",
+        "or actions of this type; only interfaces of this package, or the one that this topic, "
+        "service or action has in the runs, such as `/victims`.",
     )
     column: str | None = Field(
         None,
@@ -79,6 +81,12 @@ class Variable(Model):
     def is_of_runs(self) -> bool:
         """Whether it is found in runs, and not in what was handed in."""
         return self.in_ not in ("packages", "executables", "interfaces")
+
+    @property
+    def kind(self) -> str:
+        """``msg``, ``srv`` or ``action`` of an interface that may have any name, or nothing."""
+        steps = str(self.example).split("/")
+        return steps[1] if self.in_ == "interfaces" and len(steps) == _STEPS else ""
 
     @property
     def part(self) -> str:

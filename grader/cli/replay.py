@@ -14,6 +14,7 @@ from grader.cli.screen.progress import Progress
 from grader.errors import UsageError
 from grader.grade.judging import why_not_run
 from grader.grade.naming import with_chosen_names
+from grader.grading.own_interfaces import own_packages
 from grader.grading.regrading import find_recordings
 from grader.grading.type_support import TypeSupport
 from grader.machine import ros
@@ -60,8 +61,10 @@ def replay(
         how = Preparation(ros=installation, cache=cache_folder(), on_progress=progress.say)
         prepared = prepare(submission, how)
         record = replace(prepared.record, given=recorded.submission.given)
-        loaded = with_chosen_names(loaded, record, {recorded.scenario: recorded}).loaded
-        type_support = TypeSupport(loaded, ros.find(), cache_folder()).prefixes(progress.say)
+        named = with_chosen_names(loaded, record, {recorded.scenario: recorded})
+        loaded, own = named.loaded, own_packages(named.loaded, named.submission)
+        support = TypeSupport(loaded, ros.find(), cache_folder(), own=own)
+        type_support = support.prefixes(progress.say)
     reason = why_not_run(prepared.record, [one.name for one in loaded.assignment.packages])
     if prepared.install is None or reason is not None:
         problem = reason.observed if reason else prepared.record.problem

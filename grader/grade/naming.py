@@ -226,18 +226,42 @@ class _Search:
         packages = [self.of] if self.of else [one.name for one in self.submission.packages]
         return any(why_not_built(self.submission, package) for package in packages)
 
+    def _interfaces(self, package: PackageRecord) -> Iterator[str]:
+        """Interfaces of a package; of those of any name, what has the kind of the example."""
+        for item in (*package.definitions, *package.generated):
+            file = PurePosixPath(item.file)
+            kind = file.suffix[1:]
+            if self.variable.kind in ("", kind):
+                yield f"{package.name}/{kind}/{file.stem}"
+
+    def _interfaces_in_use(self, name: str) -> list[str]:
+        """The student's interfaces of a topic, a service or an action in the runs.
+
+        Before any run, and where nothing is seen of it, one stands for all.
+        """
+        own = [one for package in self.submission.packages for one in self._interfaces(package)]
+        there = [
+            item
+            for recording in self.recordings.values()
+            for noun in _WORDS.values()
+            for item in NoEndpoint(recording, noun, "").there
+        ]
+        seen = {item.type for item in there if item.name == name}
+        return [one for one in own if one in seen] or own[:1]
+
     def offered(self) -> Iterator[str]:
         """The names among which it is."""
         variable, of = self.variable, self.of
+        if variable.in_ == "interfaces" and of is not None and of.startswith("/"):
+            yield from self._interfaces_in_use(of)
+            return
         for package in self.submission.packages:
             if variable.in_ == "packages":
                 yield package.name
             elif variable.in_ == "executables" and of in (None, package.name):
                 yield from _programs(package)
-            elif variable.in_ == "interfaces":
-                for item in (*package.definitions, *package.generated):
-                    file = PurePosixPath(item.file)
-                    yield f"{package.name}/{file.suffix[1:]}/{file.stem}"
+            elif variable.in_ == "interfaces" and of in (None, package.name):
+                yield from self._interfaces(package)
         source = self.loaded.source
         runs = source.data["scenarios"] if source and variable.is_of_runs else ()
         using = {run["id"] for run in runs if f"{{{self.name}}}" in json.dumps(run)}

@@ -15,6 +15,7 @@ from grader.assignment.load import LoadedAssignment
 from grader.checks.check import Parameters
 from grader.checks.need import Bags, Need, StudentTests
 from grader.grade.naming import with_chosen_names
+from grader.grading.own_interfaces import Definitions, own_packages
 from grader.grading.type_support import TypeSupport
 from grader.machine.load import cpu_count
 from grader.recording.model import Recording
@@ -122,12 +123,18 @@ class Grading:
             place=self._build_place,
         )
 
-    def type_support_of(self, loaded: LoadedAssignment) -> TypeSupport:
-        """What lies under a submission, with the names that it chose in the assignment."""
-        return self._type_support if loaded is self.loaded else self._new_support(loaded)
+    def type_support_of(
+        self, loaded: LoadedAssignment, submission: SubmissionRecord
+    ) -> TypeSupport:
+        """What lies under a submission, with the names and interfaces that it chose."""
+        own = own_packages(loaded, submission)
+        is_shared = loaded is self.loaded and not own
+        return self._type_support if is_shared else self._new_support(loaded, own)
 
-    def _new_support(self, loaded: LoadedAssignment) -> TypeSupport:
-        return TypeSupport(loaded, self.runner.ros, self._cache, self._stop)
+    def _new_support(
+        self, loaded: LoadedAssignment, own: Mapping[str, Definitions] = {}
+    ) -> TypeSupport:
+        return TypeSupport(loaded, self.runner.ros, self._cache, self._stop, own)
 
     @contextmanager
     def _build_place(self, alone: bool) -> Iterator[None]:

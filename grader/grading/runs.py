@@ -33,7 +33,7 @@ class Runs:
         named = with_chosen_names(grading.loaded, prepared.record)
         self._loaded = named.loaded
         self._grading = grading
-        self._support = grading.type_support_of(self._loaded)
+        self._support = grading.type_support_of(self._loaded, named.submission)
         self._prepared = replace(prepared, record=named.submission)
         self._folder = folder
         self._can_run = prepared.install is not None and named.unnamed is None
@@ -58,6 +58,8 @@ class Runs:
             self._grading.loaded, self._record, self._recordings, self._faults
         )
         # Some names that students choose, such as that of a service, show only in a run.
+        if grade.loaded.values != self._loaded.values:
+            self._support = self._grading.type_support_of(grade.loaded, self._record)
         self._loaded = grade.loaded
         disturbed = grade.disturbed_scenarios(Status.ERROR)
         faulty = [name for name, recording in self._recordings.items() if recording.faults]
@@ -131,7 +133,7 @@ class Runs:
                 ),
                 worlds=loaded.folder,
                 underlays=self._prepared.underlays,
-                type_support=self._support.prefixes(),
+                type_support=self._support.prefixes(grading.told.progress),
                 names=run.names,
                 mistakes=grading.mistakes,
                 pauses=any(

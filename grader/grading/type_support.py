@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from grader.assignment.interfaces import FOLDER, FOLDERS, write_interfaces
 from grader.assignment.load import LoadedAssignment
 from grader.errors import GraderFault
+from grader.grading.own_interfaces import OWN, Definitions, write_packages
 from grader.machine.resources import cache_folder
 from grader.machine.ros import RosInstallation, find
 from grader.machine.scratch import Scratch
@@ -61,11 +62,13 @@ class TypeSupport:
         ros: RosInstallation,
         cache: Path,
         stop: threading.Event | None = None,
+        own: Mapping[str, Definitions] = {},
     ) -> None:
         """Set up; nothing is built yet.
 
         Args:
             stop: Set when nothing needs to be built any more.
+            own: Packages of interfaces of the student's own, which the probe has to read.
 
         Raises:
             MissingUnderlay: The assignment needs one that is not on this machine.
@@ -75,6 +78,7 @@ class TypeSupport:
         self._ros = ros
         self._cache = cache
         self._stop = stop
+        self._own = own
         self._lock = threading.Lock()
         self._found: dict[bool, RosInstallation] = {}
 
@@ -112,6 +116,11 @@ class TypeSupport:
                 names = packages_in(own).keys() - (frozenset() if for_probe else handed_in)
                 if names:
                     ros = on_top(ros, [store.folder_prefix(own, ros, names)])
+            if for_probe and self._own:
+                own = copies / OWN
+                theirs = {name: one for name, one in self._own.items() if name not in ros.packages}
+                write_packages(theirs, own)
+                ros = on_top(ros, [store.folder_prefix(own, ros)] if theirs else [])
         if for_probe:
             types = [type for one in assignment.scenarios for type in one.recorded_types.values()]
             named = _WORD.findall(" ".join([assignment.model_dump_json(), *types]))

@@ -177,7 +177,7 @@ def fields(submission: SubmissionRecord, parameters: Fields) -> Finding:
 def _alternatives(written: Any) -> Any:
     """A type alone, or several of which one is enough; those in a list of their own go together."""
     choices = written if isinstance(written, list | tuple) else [written]
-    return [one if isinstance(one, list | tuple) else [one] for one in choices]
+    return tuple(tuple(one) if isinstance(one, list | tuple) else (one,) for one in choices)
 
 
 class Has(OfInterface):
