@@ -116,6 +116,7 @@ PARAMETERS = {
     "motion.within_limits": {},
     "motion.slows_down": {"share": "100 %"},
     "topic.untouched": {},
+    "topic.not_subscribed": {"topics": ["/scan"]},
     "log.follows": {"topic": "/cmd_vel", "fields": ["linear.x", "angular.z"]},
     "log.contains": {"text": "ready", "level": "INFO"},
     "log.level": {"at_most": "WARN"},

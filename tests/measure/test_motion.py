@@ -15,7 +15,7 @@ from grader.findings.reference import (
 )
 from grader.findings.words import degrees, metres, point, side, speed
 from grader.measure.motion.ground import ahead, nearest
-from grader.recording.model import NS
+from grader.recording.model import NS, Kind
 from grader.recording.simulated import Scene, Truth
 from sim.motion import ORIGIN, Pose
 from sim.shapes import MovingObstacle, Waypoint
@@ -163,6 +163,27 @@ class TestUntouched:
 
     def test_a_run_without_a_node_fails(self):
         failing("topic.untouched", nodeless())
+
+
+class TestNotSubscribed:
+    def test_a_subscription_to_what_is_not_for_the_node_is_named(self):
+        reader = endpoint("/scan", kind=Kind.SUBSCRIPTION, type="sensor_msgs/msg/LaserScan")
+        run = recording(endpoints=(*recording().endpoints, reader))
+        said = failing("topic.not_subscribed", run, topics=["/odom", "/scan"])
+        assert "the node `/bot_publisher` subscribes to `/scan`" in said
+        assert judge("topic.not_subscribed", run, topics=["/odom"]).status is Status.PASSED
+
+    def test_another_node_may_subscribe_where_one_is_named(self):
+        reader = endpoint("/scan", kind=Kind.SUBSCRIPTION, node="/driver")
+        run = recording(
+            nodes=(node(), node("/driver")), endpoints=(*recording().endpoints, reader)
+        )
+        given = {"topics": ["/scan"], "node": "bot_publisher"}
+        assert judge("topic.not_subscribed", run, **given).status is Status.PASSED
+        failing("topic.not_subscribed", run, topics=["/scan"], node="driver")
+
+    def test_a_run_without_the_node_fails(self):
+        failing("topic.not_subscribed", nodeless(), topics=["/scan"])
 
 
 def test_measures_have_their_units():

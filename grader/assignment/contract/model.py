@@ -124,6 +124,9 @@ class Program(Part):
         (),
         description="Topics on which it must not publish; `robot`: those of the simulated robot.",
     )
+    does_not_subscribe: tuple[str, ...] = Field(
+        (), description="Topics to which it must not subscribe."
+    )
 
 
 class Interface(Part):

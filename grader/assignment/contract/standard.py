@@ -499,6 +499,18 @@ AFTERWARDS = (
         "Only the robot publishes its sensors. Your node only subscribes to them.",
         ("starts",),
     ),
+    Fact(
+        "not_subscribed",
+        "topic.not_subscribed",
+        lambda it: (
+            {"topics": list(it.program.does_not_subscribe)}
+            if it.program.does_not_subscribe
+            else None
+        ),
+        "{subject} does not subscribe to what is not for it",
+        "What it needs comes from another node.",
+        ("starts",),
+    ),
 )
 """Facts of a program that build on those of its topics."""
 

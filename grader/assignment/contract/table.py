@@ -93,6 +93,9 @@ def _program(executable: str, program: Program, place: Place) -> Iterator[Row]:
         yield Row("parameter", text, (*place, "parameters", name), ("parameter",))
     if program.leaves_alone not in ((), "robot"):
         yield Row("does not publish on", codes(program.leaves_alone), place, ("untouched",))
+    if program.does_not_subscribe:
+        topics = codes(program.does_not_subscribe)
+        yield Row("does not subscribe to", topics, place, ("not_subscribed",))
     ends = f", and ends within {program.ends} of it" if program.ends else ""
     if program.alive:
         yield Row("runs", f"until Ctrl+C{ends}", place, ("alive", "ends"))

@@ -309,6 +309,12 @@ def _untouched(run: _Run) -> Iterator[_Wrong]:
         yield _Wrong("publishes_too", title, "", (("publishes", "node", topic),))
 
 
+def _not_subscribed(run: _Run) -> Iterator[_Wrong]:
+    for topic in [one for one in run.given.topics if one not in run.topics][:1]:
+        title = f"The node subscribes to {topic}, too"
+        yield _Wrong("subscribes_too", title, "", (("subscribes", "node", topic),))
+
+
 def _type(run: _Run) -> Iterator[_Wrong]:
     topic = run.given.topic
     other = next(name for name in _OTHER_TYPES if name != run.given.type)
@@ -445,6 +451,7 @@ _RULES: dict[str, Callable[[_Run], Iterable[_Wrong]]] = {
     "topic.subscribed": partial(_endpoint, "subscription"),
     "topic.type": _type,
     "topic.untouched": _untouched,
+    "topic.not_subscribed": _not_subscribed,
     "service.exists": partial(_name, "service"),
     "qos.offered": _qos,
     "qos.requested": _qos,

@@ -13,11 +13,11 @@ from grader.checks.wrong_name import Named, misnamed
 from grader.diagnosis.destroyed_endpoint import why_dropped
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_endpoint import ENDPOINTS, meant_endpoint, why_no_endpoint
-from grader.diagnosis.no_node import why_no_node
+from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.findings.finding import Evidence, Finding, endpoints_seen, nodes_seen
 from grader.findings.words import code, codes, type_in_code
 from grader.recording.model import PROBE_NODE, Kind, Recording
-from grader.spec.name import InterfaceName, TopicName
+from grader.spec.name import InterfaceName, QualifiedNodeName, TopicName
 from grader.spec.names import Thing
 
 
@@ -88,6 +88,37 @@ def _absence(recording: Recording, kind: Kind, parameters: Topic) -> Finding | N
     shown = Evidence(moments=endpoints_seen(recording, there))
     meant = meant_endpoint(recording, ENDPOINTS[kind], parameters.topic)
     return misnamed(recording, parameters, cause, meant, shown)
+
+
+class NotSubscribed(Parameters):
+    """Parameters of topic.not_subscribed."""
+
+    topics: tuple[TopicName, ...] = Field(description="Topics that are not for it.", min_length=1)
+    node: QualifiedNodeName | None = Field(
+        None, description="Name of the node; by default every node that was launched."
+    )
+
+    def _asked(self) -> str:
+        whose = f" of {code(self.node)}" if self.node else ""
+        return f"no subscription{whose} on {codes(self.topics, last='or')}"
+
+
+@check("topic.not_subscribed", Subject.RECORDING, NotSubscribed, concept="names")
+def not_subscribed(recording: Recording, parameters: NotSubscribed) -> Finding:
+    """The node does not subscribe to the topics.
+
+    Judged by the ROS graph, such as for a layer that must not read a sensor itself.
+    """
+    name = parameters.node
+    stop_if(why_not_node(recording, name) if name else why_no_node(recording))
+    for endpoint in recording.student_endpoints(Kind.SUBSCRIPTION):
+        if endpoint.topic in parameters.topics and name in (None, endpoint.node):
+            return mistaken(
+                "not_its_topic",
+                f"the node {code(endpoint.node)} subscribes to {code(endpoint.topic)}",
+                Evidence(moments=endpoints_seen(recording, [endpoint])),
+            )
+    return Finding.as_asked("none")
 
 
 class Type(Topic):

@@ -149,6 +149,14 @@ PUBLIC rcl_ret_t rcl_node_init(
     result = rcl_publisher_init(
       &publisher, node, type_called("builtin_interfaces/msg/Time"), too, &given);
   }
+  too = mistake("subscribes", NULL);
+  if (too && result == RCL_RET_OK) {
+    static rcl_subscription_t subscription;
+    rcl_subscription_options_t given = rcl_subscription_get_default_options();
+    subscription = rcl_get_zero_initialized_subscription();
+    result = rcl_subscription_init(
+      &subscription, node, type_called("builtin_interfaces/msg/Time"), too, &given);
+  }
   return result;
 }
 

@@ -152,11 +152,13 @@ def _patch_node(module: Any) -> None:
             atexit.register(wait)
         return node
 
-    def publishing(_: Any, node: Any) -> None:
-        if too := MISTAKES.get(("publishes", "node")):
-            from builtin_interfaces.msg import Time
+    def meddling(_: Any, node: Any) -> None:
+        from builtin_interfaces.msg import Time
 
+        if too := MISTAKES.get(("publishes", "node")):
             node.create_publisher(Time, too, 10)
+        if too := MISTAKES.get(("subscribes", "node")):
+            node.create_subscription(Time, too, print, 10)
 
     def timed(_: Any, given: dict[str, Any]) -> None:
         factor = float(MISTAKES.get(("period", "timers"), "1"))
@@ -166,7 +168,7 @@ def _patch_node(module: Any) -> None:
         _renamed(node, given, "srv_name")
 
     node_class = module.Node
-    _bound(node_class, "__init__", named, publishing)
+    _bound(node_class, "__init__", named, meddling)
     _bound(node_class, "create_publisher", _endpoint, _publisher)
     _bound(node_class, "create_subscription", _endpoint)
     _bound(node_class, "create_service", service)
