@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from grader.assignment.model import CheckSpec, Scenario
 from grader.errors import AssignmentError
-from grader.spec.document import Place, places
+from grader.spec.document import Place
 from grader.spec.nearest_name import nearest_or_all
+from grader.spec.rewriting import Rewriting
 from grader.spec.source import Model, Source, in_order
 
 MODELS: Mapping[str, type[Model]] = {"scenarios": Scenario, "checks": CheckSpec}
@@ -37,13 +38,12 @@ def ungrouped(source: Source) -> Source:
     }
     if not grouped:
         return source
-    flat = _Flat(source)
+    flat = _Flat(Rewriting(source))
     made = {key: [*flat.entries(key, entries)] for key, entries in grouped.items()}
     if flat.problems:
         problems = [source.problem(place, text) for place, text in flat.problems]
         raise AssignmentError(source.file, in_order(problems))
-    data = {**source.data, **made}
-    return replace(source, data=data, lines=flat.lines, origins=flat.origins)
+    return flat.written.document({**source.data, **made})
 
 
 def keys_of(key: str) -> tuple[str, ...]:
@@ -57,25 +57,19 @@ def _is_group(key: str, entry: Any) -> bool:
 
 @dataclass
 class _Flat:
-    """The lines of a document without groups: where the author wrote each part of it."""
+    """The members of all groups, each with what its group says."""
 
-    source: Source
-    lines: dict[Place, int] = field(init=False)
-    origins: dict[Place, Place] = field(default_factory=dict)
+    written: Rewriting
     problems: list[tuple[Place, str]] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self.lines = dict(self.source.lines)
 
     def entries(self, key: str, written: list[Any]) -> Iterator[Any]:
         """The entries of a list, with members in the places of groups."""
-        for place in [one for one in self.lines if one[:1] == (key,) and len(one) > 1]:
-            del self.lines[place]
+        self.written.empty(key)
         count = 0
         for index, entry in enumerate(written):
             origin: Place = (key, index)
             if not _is_group(key, entry):
-                self._move(entry, origin, (key, count))
+                self.written.moved(entry, origin, (key, count))
                 yield entry
                 count += 1
                 continue
@@ -88,7 +82,7 @@ class _Flat:
 
     def _member(self, group: dict[str, Any], member: Any, origin: Place, place: Place) -> Any:
         """A member with what its group says; ``origin`` is where it is written."""
-        self._move(member, origin, place)
+        self.written.moved(member, origin, place)
         if not isinstance(member, dict):
             return member
         key, above = str(place[0]), origin[:2]
@@ -101,7 +95,7 @@ class _Flat:
         own_id, points = member.get("id"), group.get(_POINTS)
         if isinstance(points, dict) and isinstance(own_id, str) and own_id in points:
             whole[_POINTS] = points[own_id]
-            self._move(whole[_POINTS], (*above, _POINTS, own_id), (*place, _POINTS))
+            self.written.moved(whole[_POINTS], (*above, _POINTS, own_id), (*place, _POINTS))
         return {name: whole[name] for name in (*keys_of(key), *whole) if name in whole}
 
     def _joined(
@@ -109,15 +103,9 @@ class _Flat:
     ) -> dict[str, Any]:
         """The keys of both: a member's own count, and `null` takes one of the group away."""
         for name in shared.keys() - own.keys():
-            self._move(shared[name], (*above, name), (*place, name))
+            self.written.moved(shared[name], (*above, name), (*place, name))
         taken = {name for name in shared if name in own and own[name] is None}
         return {name: one for name, one in {**shared, **own}.items() if name not in taken}
-
-    def _move(self, value: Any, origin: Place, place: Place) -> None:
-        """Note that a part which is written at one place stands at another."""
-        self.origins[place] = origin
-        for inside in places(value):
-            self.lines[(*place, *inside)] = self.source.lines[(*origin, *inside)]
 
 
 def _mistakes(key: str, group: dict[str, Any], place: Place) -> Iterator[tuple[Place, str]]:

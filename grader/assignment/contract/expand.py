@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
-from grader.assignment.contract.derive import Derivation
+from grader.assignment.contract.derive import Derivation, Derived
 from grader.assignment.contract.model import Contract
 from grader.errors import AssignmentError
-from grader.spec.document import Place, places
+from grader.spec.document import Place
+from grader.spec.rewriting import Rewriting
 from grader.spec.source import Source, in_order
 from sim.description import Topics
 
 KEY = "contract"
+_PACKAGES: Place = (KEY, "packages")
+
+
+@dataclass(frozen=True)
+class _Made:
+    """A part of the document that stands for a part of the contract.
+
+    Attributes:
+        origin: Where the author wrote what it is made from; None for the part that it replaces.
+        closer: Parts in it, by their places there, that come from another place.
+    """
+
+    value: Any
+    origin: Place | None
+    closer: Mapping[Place, Place] = field(default_factory=dict)
 
 
 def expanded(source: Source) -> Source:
@@ -32,22 +48,50 @@ def expanded(source: Source) -> Source:
     if found:
         problems = [source.problem(place, text) for place, text in found]
         raise AssignmentError(source.file, in_order(problems))
-    written = _Written(source)
-    packages = [written.package(contract, name) for name in contract.packages]
-    authors = source.data.get("checks") or []
-    checks = [derivation.entry(one) for one in derivation.kept]
-    written.move("checks", len(checks))
-    for index, (entry, one) in enumerate(zip(checks, derivation.kept, strict=True)):
-        written.stand_for(("checks", index), entry, one.place)
-        written.differs(("checks", index), entry, (KEY, "checks", one.id))
-    scenarios = [
-        written.scenario(contract, index, one)
-        for index, one in enumerate(source.data.get("scenarios") or [])
-    ]
-    data = {**source.data, "packages": packages, "checks": [*checks, *authors]}
-    if scenarios:
-        data["scenarios"] = scenarios
-    return replace(source, data=data, lines=written.lines, origins=written.origins)
+    packages = _in_list("packages", _packages(contract))
+    checks = _in_list("checks", _checks(source, derivation))
+    runs, authors = (source.data.get(key) or [] for key in ("scenarios", "checks"))
+    of_runs = [_of_run(contract, run) for run in runs]
+    data = {
+        **source.data,
+        "packages": [one.value for one in packages.values()],
+        "checks": [*(one.value for one in checks.values()), *authors],
+    }
+    if runs:
+        data["scenarios"] = [
+            {**run, **{key: one.value for key, one in parts.items()}} if parts else run
+            for run, parts in zip(runs, of_runs, strict=True)
+        ]
+    in_runs: dict[Place, _Made] = {
+        ("scenarios", number, key): one
+        for number, parts in enumerate(of_runs)
+        for key, one in parts.items()
+    }
+    written = Rewriting(source)
+    written.begins("packages", _PACKAGES)
+    written.begins("checks", (KEY,))
+    written.moved_all("checks", authors, by=len(checks))
+    for made in (packages, checks, in_runs):
+        for place, one in made.items():
+            _note(written, place, one)
+    return written.document(data)
+
+
+def _in_list(key: str, made: Iterable[_Made]) -> dict[Place, _Made]:
+    """Entries of a list, by their places."""
+    return {(key, number): one for number, one in enumerate(made)}
+
+
+def _note(written: Rewriting, place: Place, made: _Made) -> None:
+    """Note where a part that is made comes from."""
+    if made.origin is None:
+        return
+    written.made(made.value, made.origin, place)
+    for inside, origin in made.closer.items():
+        value = made.value
+        for step in inside:
+            value = value[step]
+        written.made(value, origin, (*place, *inside))
 
 
 _ORDER = ("rosgrade", "id", "title", "variables", "packages")
@@ -78,43 +122,9 @@ def _misfits(source: Source, derivation: Derivation) -> Iterator[tuple[Place, st
             yield ("checks", index, "id"), text
 
 
-class _Written:
-    """The lines of an expanded document: where the author wrote what a part is made of."""
-
-    _PACKAGES: Place = (KEY, "packages")
-
-    def __init__(self, source: Source) -> None:
-        self.source = source
-        self.lines = dict(source.lines)
-        self.origins = dict(source.origins)
-
-    def stand_for(self, place: Place, value: Any, origin: Place) -> None:
-        """Give a part that is made the line of the part of the contract that it comes from."""
-        self.origins[place] = origin
-        self.lines.update(dict.fromkeys(places(value, place), self.source.line(origin) or 1))
-
-    def differs(self, place: Place, made: dict[str, Any], origin: Place) -> None:
-        """Note what of an entry the author wrote under its id."""
-        for key, value in made.items():
-            if isinstance(value, dict) and key == "with":
-                self.differs((*place, key), value, (*origin, key))
-            elif (*origin, key) in self.source.lines:
-                self.stand_for((*place, key), value, (*origin, key))
-
-    def move(self, key: str, by: int) -> None:
-        """Note that the entries of a list have come to stand further down."""
-        entries = {place: line for place, line in self.lines.items() if place[:1] == (key,)}
-        self.lines = {place: line for place, line in self.lines.items() if place not in entries}
-        self.lines[key,] = entries.pop((key,), self.source.line((KEY,)) or 1)
-        self.origins = {to: written for to, written in self.origins.items() if to[0] != key}
-        for place, line in entries.items():
-            moved = (key, int(place[1]) + by, *place[2:])
-            self.lines[moved] = line
-            self.origins[moved] = self.source.written(place)
-
-    def package(self, contract: Contract, name: str) -> dict[str, Any]:
-        """The entry of ``packages``."""
-        one = contract.packages[name]
+def _packages(contract: Contract) -> Iterator[_Made]:
+    """The entries of ``packages``."""
+    for name, one in contract.packages.items():
         kinds = list(one.build_type)
         entry = {
             "name": name,
@@ -122,44 +132,54 @@ class _Written:
             "depends": list(one.depends),
             "executables": list(one.executables),
         }
-        entry = {name: value for name, value in entry.items() if value}
-        place: Place = ("packages", list(contract.packages).index(name))
-        self.lines.setdefault(("packages",), self.source.line((KEY, "packages")) or 1)
-        self.stand_for(place, entry, (KEY, "packages", name))
-        return entry
+        yield _Made({key: value for key, value in entry.items() if value}, (*_PACKAGES, name))
 
-    def scenario(self, contract: Contract, index: int, entry: Any) -> Any:
-        """A scenario; by default it runs the only program and records its topics."""
-        if not isinstance(entry, dict):
-            return entry
-        programs = contract.programs
-        place: Place = ("scenarios", index)
-        made: dict[str, Any] = {}
-        launched = _launched(contract, entry)
-        if launched != entry.get("launch"):
-            made["launch"] = launched
-            if "launch" not in entry:
-                self.stand_for((*place, "launch"), launched, self._PACKAGES)
-        launched = launched if isinstance(launched, list) else []
-        names = [one.get("executable") for one in launched if isinstance(one, dict)]
-        topics = {
-            topic: (published.type, (*self._PACKAGES, package, "executables", name))
-            for (package, name), program in programs.items()
-            if name in names
-            for topic, published in program.publishes.items()
+
+def _checks(source: Source, derivation: Derivation) -> Iterator[_Made]:
+    """The standard checks, as entries of ``checks``."""
+    for one in derivation.kept:
+        entry = derivation.entry(one)
+        yield _Made(entry, one.place, dict(_changed(source, one, entry)))
+
+
+def _changed(
+    source: Source, one: Derived, entry: Mapping[str, Any]
+) -> Iterator[tuple[Place, Place]]:
+    """What of a standard check its author wrote under its id, with where it is written."""
+    for key, value in entry.items():
+        of_with = value if key == "with" and isinstance(value, dict) else ()
+        insides: list[Place] = [(key, name) for name in of_with] or [(key,)]
+        for inside in insides:
+            origin = (KEY, "checks", one.id, *inside)
+            if origin in source.lines:
+                yield inside, origin
+
+
+def _of_run(contract: Contract, run: Any) -> dict[str, _Made]:
+    """What a scenario lacks: by default it runs the only program and records its topics."""
+    if not isinstance(run, dict):
+        return {}
+    made = {}
+    launched = _launched(contract, run)
+    if launched != run.get("launch"):
+        made["launch"] = _Made(launched, None if "launch" in run else _PACKAGES)
+    entries = launched if isinstance(launched, list) else []
+    names = [one.get("executable") for one in entries if isinstance(one, dict)]
+    topics = {
+        topic: (published.type, (*_PACKAGES, package, "executables", name, "publishes", topic))
+        for (package, name), program in contract.programs.items()
+        if name in names
+        for topic, published in program.publishes.items()
+    }
+    if "world" in run:
+        topics.pop(_command_topic(run), None)
+    if "record" not in run and topics:
+        record = [{"topic": topic, "type": type} for topic, (type, _) in topics.items()]
+        origins: dict[Place, Place] = {
+            (number,): origin for number, (_, origin) in enumerate(topics.values())
         }
-        if "world" in entry:
-            topics.pop(_command_topic(entry), None)
-        if "record" not in entry and topics:
-            made["record"] = [
-                {"topic": topic, "type": type_} for topic, (type_, _) in topics.items()
-            ]
-            self.stand_for((*place, "record"), made["record"], self._PACKAGES)
-            for number, (topic, (_, program_place)) in enumerate(topics.items()):
-                record = (*place, "record", number)
-                origin = (*program_place, "publishes", topic)
-                self.stand_for(record, made["record"][number], origin)
-        return {**entry, **made}
+        made["record"] = _Made(record, _PACKAGES, origins)
+    return made
 
 
 def _launched(contract: Contract, scenario: dict[str, Any]) -> Any:
