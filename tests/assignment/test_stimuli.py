@@ -197,6 +197,19 @@ def test_a_function_makes_messages_from_the_seed(folder: Path) -> None:
     assert found == [({"x": 7.0}, 0.0), ({"y": 2.0}, 0.0)]
 
 
+def test_messages_are_repeated_one_round_after_another(folder: Path) -> None:
+    (folder / "cases.py").write_text("def cases(seed):\n    return [{'x': 1}, {'x': 2}]\n")
+    found = read(folder, python="cases.py:cases", every="500 ms", count=2)
+    assert [(value["x"], time_s) for value, time_s in found] == [
+        (1.0, 0.0),
+        (2.0, 0.5),
+        (1.0, 1.0),
+        (2.0, 1.5),
+    ]
+    several = read(folder, messages=({"x": 3}, {"x": 4}), answer="/rpy", count=3)
+    assert [value["x"] for value, _ in several] == [3.0, 4.0] * 3
+
+
 FILES = [
     ("from: none.csv\nevery: 1 s", "cannot read none.csv: No such file"),
     ("from: ../other.csv\nevery: 1 s", r"\.\./other.csv is not in the assignment's folder"),
@@ -208,7 +221,9 @@ FILES = [
     ("from: half.mcap", "half.mcap: no MCAP file that can be read"),
     ("from: other.mcap", "other.mcap has no messages on /chatter. Its topics: /talk"),
     ("from: type.mcap", "type.mcap has /chatter as std_msgs/msg/UInt8, not std_msgs/msg/String"),
-    ("python: cases.py:none\nevery: 1 s", "has no function 'none'. Its functions: raises, text"),
+    ("python: cases.py:many\nevery: 1 s\ncount: 5000", "15000 messages: at most 10000 are"),
+    ("from: bag.mcap\ncount: 2", "with times of their own are published once"),
+    ("python: cases.py:none\nevery: 1 s", "has no function 'none'. Its functions: .*raises"),
     ("python: cases.py:raises\nevery: 1 s", "cases.py:2: ZeroDivisionError: division by zero"),
     ("python: cases.py:text\nevery: 1 s", "must return a list of messages"),
 ]
@@ -235,7 +250,9 @@ def test_a_file_that_is_wrong_is_named(found: Found, folder: Path, rest: str, wo
     (folder / "half.mcap").write_bytes(whole[: len(whole) // 2])
     bag(folder / "type.mcap", "/chatter", "std_msgs/msg/UInt8", "uint8 data", 1)
     (folder / "cases.py").write_text(
-        "def raises(seed):\n    return 1 / 0\ndef text(seed):\n    return 'a'\n", encoding="utf-8"
+        "def raises(seed):\n    return 1 / 0\ndef text(seed):\n    return 'a'\n"
+        "def many(seed):\n    return [{}] * 3\n",
+        encoding="utf-8",
     )
     (told,) = found(publish(rest))
     assert re.search(words, told), told

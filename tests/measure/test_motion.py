@@ -175,9 +175,7 @@ class TestNotSubscribed:
 
     def test_another_node_may_subscribe_where_one_is_named(self):
         reader = endpoint("/scan", kind=Kind.SUBSCRIPTION, node="/driver")
-        run = recording(
-            nodes=(node(), node("/driver")), endpoints=(*recording().endpoints, reader)
-        )
+        run = recording(nodes=(node(), node("/driver")), endpoints=(*recording().endpoints, reader))
         given = {"topics": ["/scan"], "node": "bot_publisher"}
         assert judge("topic.not_subscribed", run, **given).status is Status.PASSED
         failing("topic.not_subscribed", run, topics=["/scan"], node="driver")

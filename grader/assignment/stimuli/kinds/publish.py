@@ -66,7 +66,10 @@ class Publish(StimulusModel):
         "or until the end. Messages of an MCAP file have the times of the file by default.",
     )
     count: int | None = Field(
-        None, ge=1, le=MOST_MESSAGES, description="How often one `message` is published."
+        None,
+        ge=1,
+        le=MOST_MESSAGES,
+        description="How often the message is published, or all of them, one round after another.",
     )
     answer: TopicName | None = Field(
         None,
@@ -99,8 +102,10 @@ class Publish(StimulusModel):
         if len(names) != 1:
             lack = f"not {' and '.join(names)}" if names else "but none is given"
             raise ValueError(f"give the messages by one of {', '.join(given)}, {lack}")
-        if self.count is not None and self.message is None:
-            raise ValueError("'count' says how often one 'message' is published")
+        if self.count is not None and self._is_of_a_bag and self.every is None:
+            raise ValueError(
+                "messages with times of their own are published once: leave out 'count'"
+            )
         if self._is_several and not self._is_paced:
             raise ValueError("several messages need a pace: give 'every' or 'answer'")
         return self
@@ -108,12 +113,17 @@ class Publish(StimulusModel):
     @property
     def _is_several(self) -> bool:
         """Whether more than one message may follow the launch, without times of their own."""
-        read = self.from_ is not None and not self.from_.endswith(MCAP_SUFFIX)
-        if read or self.python is not None:
+        if self._is_of_a_bag:
+            return False
+        if self.from_ is not None or self.python is not None:
             return not self.before_launch
-        if self.count is not None:
-            return self.count > max(1, self.before_launch)
-        return len(self.messages) > self.before_launch + 1
+        number = (self.count or 1) * max(len(self.messages), 1)
+        return number > max(1, self.before_launch + (1 if self.messages else 0))
+
+    @property
+    def _is_of_a_bag(self) -> bool:
+        """Whether the messages come with times of their own."""
+        return self.from_ is not None and self.from_.endswith(MCAP_SUFFIX)
 
     @property
     def _is_paced(self) -> bool:
@@ -141,13 +151,14 @@ class Publish(StimulusModel):
         return found
 
     def _read(self, making: Making) -> Iterator[Due]:
-        given = list(self._given(making))
+        once, rounds = list(self._given(making)), self.count or 1
         key = "from" if self.from_ is not None else "python"
-        if not given:
+        if not once:
             raise StimulusError(f"{self.from_ or self.python} has no message", (key,))
-        if len(given) > MOST_MESSAGES:
-            text = f"{len(given)} messages: at most {MOST_MESSAGES} are published"
+        if len(once) * rounds > MOST_MESSAGES:
+            text = f"{len(once) * rounds} messages: at most {MOST_MESSAGES} are published"
             raise StimulusError(text, (key,))
+        given = once * rounds
         if self.before_launch > len(given):
             raise StimulusError(f"there are only {len(given)} messages", ("before_launch",))
         for number, one in enumerate(given):
@@ -162,7 +173,7 @@ class Publish(StimulusModel):
 
     def _given(self, making: Making) -> Iterable[Given]:
         if self.message is not None:
-            return [Given(self.message, ("message",))] * (self.count or 1)
+            return [Given(self.message, ("message",))]
         if self.from_ is not None:
             return from_file(self.from_, making.folder, self.publish, self.type)
         if self.python is not None:
