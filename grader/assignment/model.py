@@ -175,7 +175,11 @@ class Launch(Model):
         default_factory=dict, description="Remapping rules (`--ros-args -r from:=to`)."
     )
     arguments: tuple[str, ...] = Field(
-        (), description="Arguments of the program; for a launch file `name:=value`."
+        (),
+        description="Arguments of the program; for a launch file `name:=value`. "
+        "`$(find-pkg-share course_files)` is the folder of an installed package, such as one in "
+        "`packages/` beside assignment.yaml: `params_file:=$(find-pkg-share "
+        "course_files)/config/slow.yaml`.",
     )
     after: DurationOrZero = Field(
         0.0,

@@ -23,11 +23,12 @@ from grader.errors import GraderFault, Problem
 from grader.findings.reference import Goal
 from grader.findings.value import same_value
 from grader.spec.document import Place
-from grader.spec.name import package_name
+from grader.spec.name import FIND_SHARE, package_name
 from grader.spec.nearest_name import did_you_mean, nearest_or_all
 from grader.spec.source import Source
 from grader.spec.unit import format_duration
 from grader.submission.read.lint import find_ruff, known_rules
+from grader.submission.read.rosdistro import PACKAGES
 
 _Lack = tuple[Place, str]
 """A place below the entry of a check, and what is wrong there."""
@@ -45,11 +46,12 @@ def problems(
         except ValueError as error:
             yield source.problem(("packages", index, "name"), str(error))
     ids = [scenario.id for scenario in assignment.scenarios]
+    shares = _shares(source, assignment)
     for index, scenario in enumerate(assignment.scenarios):
         for run in sorted({*runs_of(scenario)} & {*ids} - {scenario.id}):
             text = f"a run of {scenario.id!r} would be called as the scenario {run!r}"
             yield source.problem(("scenarios", index, "repeat"), text)
-        for place, text in _scenario(assignment, scenario):
+        for place, text in (*_scenario(assignment, scenario), *_no_share(scenario, shares)):
             yield source.problem(("scenarios", index, *place), text)
     yield from _requirements(source, assignment.checks)
     yield from _points(source, assignment)
@@ -99,6 +101,23 @@ def _launch(assignment: Assignment, launch: Launch) -> Iterator[tuple[Place, str
         yield ("package",), no_package(str(launch.package), packages)
     elif launch.executable is not None and launch.executable not in package.executables:
         yield ("executable",), no_executable(launch.executable, package)
+
+
+def _shares(source: Source, assignment: Assignment) -> set[str]:
+    """The packages whose ``share`` a launch can name."""
+    beside = (source.file.parent / "packages").rglob("package.xml")
+    handed_in = (package.name for package in assignment.packages)
+    return {*handed_in, *(file.parent.name for file in beside), *PACKAGES}
+
+
+def _no_share(scenario: Scenario, shares: Collection[str]) -> Iterator[tuple[Place, str]]:
+    for number, launch in enumerate(scenario.launch):
+        for index, argument in enumerate(launch.arguments):
+            for name in FIND_SHARE.findall(argument):
+                if name not in shares:
+                    text = f"there is no package {name!r}, not in packages/ either."
+                    place = ("launch", number, "arguments", index)
+                    yield place, text + did_you_mean(name, shares)
 
 
 def _requirements(source: Source, checks: Sequence[CheckSpec]) -> Iterator[Problem]:

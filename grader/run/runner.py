@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import shutil
 import sys
 import threading
@@ -31,6 +32,7 @@ from grader.run.imposing.mistake import Mistake, with_mistakes
 from grader.run.order import CellOrder, ProcessCommand, RunLimits, SimulatorOrder, Topic, UntilOrder
 from grader.run.sandboxed_order import sandboxed
 from grader.sandbox.python_tree import unlisted
+from grader.spec.name import FIND_SHARE
 from grader.spec.names import NO_NAMES, Names, Thing
 
 if TYPE_CHECKING:
@@ -93,6 +95,22 @@ def launch_file_program(ros: RosInstallation, package: str, file: str) -> tuple[
     )
 
 
+def with_shares(arguments: Sequence[str], prefixes: Sequence[Path]) -> tuple[str, ...]:
+    """Arguments with the folders of packages in place of ``$(find-pkg-share PACKAGE)``.
+
+    Raises:
+        GraderFault: No install space has such a package.
+    """
+
+    def share(found: re.Match[str]) -> str:
+        for prefix in prefixes:
+            if (folder := prefix / "share" / found[1]).is_dir():
+                return str(folder)
+        raise GraderFault(f"{found[0]}: there is no package {found[1]!r}")
+
+    return tuple(FIND_SHARE.sub(share, one) for one in arguments)
+
+
 def process_command(
     ros: RosInstallation,
     launch: Launch,
@@ -102,6 +120,7 @@ def process_command(
     names: Names = NO_NAMES,
 ) -> ProcessCommand:
     """What to execute for a launch, with names put right."""
+    prefixes = (install, *ros.underlays, *ros.prefixes)
     asked = launch.package or assignment.packages[0].name
     package = names.own(Thing.PACKAGE, asked)
     if launch.executable is None:
@@ -116,7 +135,7 @@ def process_command(
         program = _program(ros, install / names.own(Thing.FILE, place))
     return ProcessCommand(
         name=f"{asked}/{launch.program}",
-        argv=(*program, *ros_arguments(launch, values, names)),
+        argv=(*program, *with_shares(ros_arguments(launch, values, names), prefixes)),
         after_s=launch.after,
         is_launch_file=launch.file is not None,
     )

@@ -118,9 +118,11 @@ def _arguments(sandbox: Sandbox, ros: RosInstallation, binds: Sequence[Bind]) ->
 
 def _moved(paths: Iterable[str], places: dict[str, str]) -> tuple[str, ...]:
     moved = list(paths)
-    for number, path in enumerate(moved):
+    for number, text in enumerate(moved):
+        # An argument of a launch file is `name:=path`.
+        name, given, path = text.rpartition(":=")
         for outside, inside in places.items():
             if path == outside or path.startswith(f"{outside}/"):
-                moved[number] = inside + path[len(outside) :]
+                moved[number] = name + given + inside + path[len(outside) :]
                 break
     return tuple(moved)

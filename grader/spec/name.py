@@ -20,6 +20,9 @@ LIBRARY = r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?"
 FRAME = r"[A-Za-z0-9_][A-Za-z0-9_./-]*"
 INTERFACE = r"[a-z][a-z0-9_]*/(msg|srv|action)/[A-Z][A-Za-z0-9]*(_FeedbackMessage)?"
 
+FIND_SHARE = re.compile(rf"\$\(find-pkg-share ({ID})\)")
+"""The folder ``share/<package>`` of a package, as a launch file in XML or YAML writes it."""
+
 
 def _rule(pattern: str, words: str) -> Callable[[str], str]:
     """A validator that lets names of one form pass; its ValueError says what is expected."""

@@ -14,7 +14,7 @@ from grader.findings.finding import Status
 from grader.machine import ros
 from grader.machine.ros import RosInstallation
 from grader.recording.model import Ending
-from grader.run.runner import launch_file_program
+from grader.run.runner import launch_file_program, with_shares
 from grader.run.stimuli.parameters import next_call_s
 from tests.checks.builder import judge
 from tests.run.conftest import RunNode
@@ -279,6 +279,16 @@ def test_a_launch_file_is_started_as_ros2_launch_does(tmp_path: Path) -> None:
 def test_without_ros2_launch_a_launch_file_is_our_fault(tmp_path: Path) -> None:
     with pytest.raises(GraderFault, match=r"bot/demo.launch.py is a launch file, and this ROS"):
         launch_file_program(ros_with("rclpy", folder=tmp_path), "bot", "demo.launch.py")
+
+
+def test_the_folder_of_a_package_stands_in_an_argument(tmp_path: Path) -> None:
+    (tmp_path / "b/share/course_files").mkdir(parents=True)
+    given = ("params:=$(find-pkg-share course_files)/config/slow.yaml", "plain")
+    folders = (tmp_path / "a", tmp_path / "b")
+    share = tmp_path / "b/share/course_files"
+    assert with_shares(given, folders) == (f"params:={share}/config/slow.yaml", "plain")
+    with pytest.raises(GraderFault, match="there is no package 'course_files'"):
+        with_shares(given, folders[:1])
 
 
 @given(late_s=st.lists(st.floats(0, 0.5), min_size=1, max_size=20))
