@@ -16,6 +16,13 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
 }
 """Words for several primitive types."""
 
+_WORDS = {
+    "number": "any number",
+    "integer": "any integer",
+    "float": "`float32` or `float64`",
+    "text": "`string`",
+}
+
 Types = tuple[str, ...]
 """Types of fields that a definition has together, such as two ``float64``."""
 Alternatives = tuple[Types, ...]
@@ -89,7 +96,7 @@ def _together(types: Types) -> str:
 
 def _one(type: str) -> str:
     single = type.removesuffix("[]")
-    word = single if single in FAMILIES else code(single)
+    word = _WORDS.get(single) or code(single)
     return f"array of {word}" if single != type else word
 
 

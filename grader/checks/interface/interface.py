@@ -214,7 +214,7 @@ class Has(OfInterface):
     def _asked(self) -> str:
         wanted = (f"{what} ({words_of(types)})" for what, types in self.fields.items())
         place = f" in its {self.part}" if self.part else ""
-        return f"`{self.interface}` has{place} what stands for {listing(wanted)}"
+        return f"`{self.interface}` has fields{place} for {listing(wanted)}"
 
 
 @check("interface.has", Subject.SUBMISSION, Has, concept="interfaces")
