@@ -14,6 +14,7 @@ from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 from grader.assignment.binding import BoundCheck
+from grader.assignment.interfaces import FOLDERS
 from grader.assignment.model import SHOWN_FROM, Assignment, CheckSpec, Launch, Package, Scenario
 from grader.assignment.repeat import runs_of
 from grader.assignment.stimuli.stimulus_model import StimulusModel
@@ -105,7 +106,7 @@ def _launch(assignment: Assignment, launch: Launch) -> Iterator[tuple[Place, str
 
 def _shares(source: Source, assignment: Assignment) -> set[str]:
     """The packages whose ``share`` a launch can name."""
-    beside = (source.file.parent / "packages").rglob("package.xml")
+    beside = (file for name in FOLDERS for file in (source.file.parent / name).rglob("package.xml"))
     handed_in = (package.name for package in assignment.packages)
     return {*handed_in, *(file.parent.name for file in beside), *PACKAGES}
 

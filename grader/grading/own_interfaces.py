@@ -1,10 +1,12 @@
 """Interfaces that are the students' own, written anew from what their definitions say.
 
 Where the name of an interface is left open, each submission has fields of its own, and the probe
-needs that definition to hear its messages. Nothing of the student's build is used for it: what the
-fields are goes into a package of ours, and no comment, no default value, no constant and no CMake.
-ROS compares interfaces by a hash of just that (RIHS01 of REP-2011 leaves defaults and constants
-out), so that both sides meet.
+needs that definition to hear its messages. Nothing of the student's build is used for it. rosgrade
+writes a package of its own, with the names and types of the fields. Comments, default values,
+constants and CMakeLists.txt of the student are left out.
+
+Publishers and subscriptions meet, because ROS compares a hash of just the names and types: RIHS01
+of REP-2011 leaves default values and constants out.
 """
 
 from __future__ import annotations
