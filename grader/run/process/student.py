@@ -199,6 +199,7 @@ class StudentProcesses:
     @property
     def waiting(self) -> str | None:
         """A process whose program was not started yet, because its sandbox does not stand."""
+        self.poll()
         return next((one.name for one in self._running if not one.popen.has_begun), None)
 
     def refresh(self) -> None:
