@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,10 +17,35 @@ KEY = "variables"
 ANY = "any"
 _PLACE = re.compile(r"(?<!\$)\{([a-z][a-z0-9_]*)\}")
 _STEPS = 3
+_DOES = ("publishes", "subscribes", "serves", "calls")
+_UNDESCRIBED = ("packages", "interfaces", "launch_files")
 _NUMBER = re.compile(r"0|[1-9][0-9]*")
 
 Values = Mapping[str, str]
 """What stands for each variable by its name, for an interface, or for a ``package/`` of them."""
+
+
+class Role(Model):
+    """What is looked for does this, where its name says nothing.
+
+    Each is a whole name such as `/scan`, the end of one such as `cmd_vel`, or a type such as
+    `geometry_msgs/msg/Twist`; with several, each of them.
+    """
+
+    publishes: str | tuple[str, ...] = Field((), description="Topics, or types of messages.")
+    subscribes: str | tuple[str, ...] = Field((), description="Topics, or types of messages.")
+    serves: str | tuple[str, ...] = Field((), description="Services and actions, or their types.")
+    calls: str | tuple[str, ...] = Field(
+        (), description="Services and actions that it is a client of, or their types."
+    )
+    node: str | None = Field(None, description="The node that has it.")
+
+    @property
+    def parts(self) -> list[tuple[str, str]]:
+        """What a node or an executable does: each key with a name or a type."""
+        found = {key: getattr(self, key) for key in _DOES}
+        each = {key: (one,) if isinstance(one, str) else one for key, one in found.items()}
+        return [(key, one) for key, names in each.items() for one in names]
 
 
 class Variable(Model):
@@ -46,18 +72,26 @@ class Variable(Model):
         "subscriptions",
         "services",
         "actions",
+        "parameters",
+        "launch_files",
     ] = Field(
         "packages",
         alias="in",
-        description="Where a name of this form is looked for. `nodes`, `services`, `actions` and "
-        "the topics of `publishers` and `subscriptions` are found in runs: where the student has "
-        "another name than the example, the run is repeated with that name.",
+        description="Where a name of this form is looked for. `nodes`, `services`, `actions`, "
+        "`parameters` and the topics of `publishers` and `subscriptions` are found in runs: where "
+        "the student has another name than the example, the run is repeated with that name.",
     )
     of: str | None = Field(
         None,
-        description="Only executables of this package; only publishers, subscriptions, services "
-        "or actions of this type; only interfaces of this package, or the one that this topic, "
-        "service or action has in the runs, such as `/victims`.",
+        description="Only executables or launch files of this package; only publishers, "
+        "subscriptions, services, actions or parameters of this type; only interfaces of this "
+        "package, or the one that this topic, service or action has in the runs, such as "
+        "`/victims`.",
+    )
+    where: Role | None = Field(
+        None,
+        description="What a node or an executable does that is meant, in the runs or by its "
+        "source; or the `node` that has the topic, service, action or parameter.",
     )
     column: str | None = Field(
         None,
@@ -75,12 +109,18 @@ class Variable(Model):
             raise ValueError("give a 'match', such as group{n}_bot or any, or a 'column'")
         if not re.fullmatch(self.part, str(self.example)):
             raise ValueError("the 'example' must be of letters, digits and underscores")
+        if self.where is not None:
+            described = {*dict(self.where.parts), *(["node"] if self.where.node else [])}
+            can = {*_DOES} if self.in_ in ("nodes", "executables") else {"node"}
+            if self.match != ANY or self.in_ in _UNDESCRIBED or not described <= can:
+                wrong = ", ".join(sorted(described - can)) or "where"
+                raise ValueError(f"{wrong!r} says nothing of 'match: {self.match}' in {self.in_}")
         return self
 
     @property
     def is_of_runs(self) -> bool:
         """Whether it is found in runs, and not in what was handed in."""
-        return self.in_ not in ("packages", "executables", "interfaces")
+        return self.in_ not in ("packages", "executables", "interfaces", "launch_files")
 
     @property
     def kind(self) -> str:
@@ -141,6 +181,17 @@ def filled(source: Source, values: Values) -> Source:
     return replace(source, data=data, lines=lines)
 
 
+def alike(name: str, variables: Mapping[str, Variable]) -> list[str]:
+    """The variables that stand for the same things; each takes one, in the order of their names."""
+    own = variables[name]
+    return [
+        other
+        for other, one in variables.items()
+        if own.match == one.match == ANY
+        and (own.in_, own.of, own.where) == (one.in_, one.of, one.where)
+    ]
+
+
 def form(name: str, variables: Mapping[str, Variable], values: Values) -> re.Pattern[str]:
     """The form of a variable's names; what is chosen is the group ``value``."""
     variable = variables[name]
@@ -162,26 +213,29 @@ def read_variables(source: Source) -> dict[str, Variable]:
         AssignmentError: One is not as it must be; what else is wrong in the document shows later.
     """
     written = source.data.get(KEY)
-    names = list(written) if isinstance(written, dict) else []
+    written = written if isinstance(written, dict) else {}
     found: dict[str, Variable] = {}
     problems: list[Problem] = []
-    for name in names:
+    for name, entry in written.items():
         variable, mistakes = source.examine(Variable, (KEY, name))
         problems += mistakes
         if variable is None:
             continue
         places = _PLACE.findall(variable.match or "")
-        if variable.match not in (None, ANY) and not {name} <= {*places} <= {*names}:
+        if variable.match not in (None, ANY) and not {name} <= {*places} <= {*written}:
             text = f"{variable.match!r} must have {{{name}}} in it, and may have other variables"
             problems.append(source.problem((KEY, name, "match"), text))
-        if not {*_PLACE.findall(variable.of or "")} <= {*found}:
-            text = f"{variable.of!r} may have only variables in it that stand above {name!r}"
-            problems.append(source.problem((KEY, name, "of"), text))
+        for key in ("of", "where"):
+            said = entry.get(key)
+            if not {*_PLACE.findall(json.dumps(said))} <= {*found}:
+                text = f"{said!r} may have only variables in it that stand above {name!r}"
+                problems.append(source.problem((KEY, name, key), text))
         for other, one in found.items():
-            alike = (variable.in_, variable.of) == (one.in_, one.of)
-            if alike and variable.match == one.match == ANY:
+            same = (variable.in_, variable.of, variable.where) == (one.in_, one.of, None)
+            if same and variable.match == one.match == ANY:
                 text = f"{other!r} takes any name of the {variable.in_} already: give one a form"
-                problems.append(source.problem((KEY, name, "match"), f"{text}, or another 'of'"))
+                text += ", another 'of', or both the same 'where'"
+                problems.append(source.problem((KEY, name, "match"), text))
         found[name] = variable
     if problems:
         raise AssignmentError(source.file, problems)

@@ -44,6 +44,7 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
     "assignment-yaml": {
         "The whole file": model.Assignment,
         "variables": variable.Variable,
+        "variables: where": variable.Role,
         "packages": model.Package,
         "scenarios": model.Scenario,
         "launch": model.Launch,

@@ -33,6 +33,7 @@ class Verdict(Enum):
     DOUBTFUL = "failed, perhaps by the machine: it counts if it happens again"
     SKIPPED = "not judged, because of a check that this one requires"
     OURS = "not judged, because of rosgrade or the assignment"
+    ASKS = "not judged until the submission says which of several things is meant"
     MACHINE = "not judged, because of the machine: the run should be repeated"
 
     @property
@@ -47,6 +48,7 @@ _STATUS = {
     Verdict.DOUBTFUL: Status.FAILED,
     Verdict.SKIPPED: Status.SKIPPED,
     Verdict.OURS: Status.ERROR,
+    Verdict.ASKS: Status.ERROR,
     Verdict.MACHINE: Status.ERROR,
 }
 
@@ -231,6 +233,11 @@ class Finding:
     def disturbed(self) -> bool:
         """Whether the run should be repeated because of the machine."""
         return self.verdict in (Verdict.DOUBTFUL, Verdict.MACHINE)
+
+    @property
+    def asks(self) -> bool:
+        """Whether it is a question to the student."""
+        return self.verdict is Verdict.ASKS
 
     def doubted(self, doubt: bool = True) -> Finding:
         """The same, but a failure counts only if it happens again, where there is a doubt."""

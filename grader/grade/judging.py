@@ -7,7 +7,7 @@ only where every scenario passes, and partial credit counts only as far as every
 from __future__ import annotations
 
 import statistics
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from graphlib import TopologicalSorter
 
@@ -79,7 +79,7 @@ def judge_all(
             findings = (_skipped([results[one] for one in blockers]),)
         results[name] = known.result(item, findings, blockers, hints)
     ordered = tuple(results[name] for name in bound)
-    return Grade(loaded, submission, ordered)
+    return Grade(loaded, submission, ordered, named.chosen)
 
 
 def _parameters_first(bound: Mapping[str, BoundCheck]) -> dict[str, list[str]]:
@@ -99,14 +99,14 @@ class _Known:
 
     Attributes:
         loaded: The assignment, with the names that the submission chose.
-        unnamed: Why some of these names are not known, or None.
+        unnamed: Those of these names that are not known.
     """
 
     loaded: LoadedAssignment
     submission: SubmissionRecord
     recordings: Mapping[str, Recording]
     faults: Mapping[str, str]
-    unnamed: Unnamed | None
+    unnamed: tuple[Unnamed, ...]
 
     def about(self, bound: BoundCheck) -> list[str]:
         """The packages that a check is about: one that it names, or what its scenarios launch."""
@@ -117,15 +117,17 @@ class _Known:
     def findings(self, bound: BoundCheck) -> Iterator[ScenarioFinding]:
         """What a check says of the submission, or of each of its scenarios."""
         scenarios = [scenario.id for scenario in self.loaded.scenarios_of(bound)]
-        if self.unnamed is not None and self._needs(bound, self.unnamed.variables):
-            yield from (ScenarioFinding(one, self.unnamed.finding) for one in scenarios or (None,))
+        unnamed = next((one for one in self.unnamed if self._needs(bound, one)), None)
+        if unnamed is not None and (unnamed.finding.asks or not unnamed.can_run):
+            yield from (ScenarioFinding(one, unnamed.finding) for one in scenarios or (None,))
         elif bound.check.subject is Subject.SUBMISSION:
             yield self._of_submission(bound)
         elif not scenarios:
             # Else a check that judges nothing would pass, and every student would get its points.
             yield ScenarioFinding(None, fault("there is no scenario that this check could judge"))
         else:
-            yield from (self._of_run(bound, scenario) for scenario in scenarios)
+            found = (self._of_run(bound, scenario) for scenario in scenarios)
+            yield from (_with_reason(one, unnamed) for one in found)
 
     def is_lost_by_parameters(self, bound: BoundCheck, findings: Sequence[ScenarioFinding]) -> bool:
         """Whether a check failed without credit in a run whose parameters the nodes do not take."""
@@ -160,11 +162,11 @@ class _Known:
             asked_name=getattr(bound.parameters, "asked_name", None),
         )
 
-    def _needs(self, bound: BoundCheck, variables: Collection[str]) -> bool:
-        """Whether a check needs a run, or the value of one of some variables."""
+    def _needs(self, bound: BoundCheck, unnamed: Unnamed) -> bool:
+        """Whether a check needs one of some names, or a run that cannot be made without them."""
         own = str(self.loaded.entries.get(bound.spec.id, {}).get("with"))
-        is_run = bound.check.subject is Subject.RECORDING
-        return is_run or any(f"{{{name}}}" in own for name in variables)
+        is_lost = bound.check.subject is Subject.RECORDING and not unnamed.can_run
+        return is_lost or any(f"{{{name}}}" in own for name in unnamed.variables)
 
     def _launched(self, scenario: str) -> tuple[str, ...]:
         """Packages that a scenario launches something of."""
@@ -200,6 +202,15 @@ class _Known:
         runs = [run for name, run in self.recordings.items() if item.scenario in (None, name)]
         goes_on = item.finding.status is Status.PASSED or item.finding.stands_alone
         return goes_on or (bool(names) and all(names <= run.names for run in runs))
+
+
+def _with_reason(item: ScenarioFinding, unnamed: Unnamed | None) -> ScenarioFinding:
+    """A failure to find the author's example, as what it is: nothing has the role."""
+    if unnamed is None or item.finding.status is not Status.FAILED:
+        return item
+    why = unnamed.finding
+    finding = replace(item.finding, expected=why.expected, observed=why.observed, hint=why.hint)
+    return replace(item, finding=finding)
 
 
 def _counted(counts: Counts, findings: Sequence[Finding]) -> tuple[Status, float]:

@@ -72,16 +72,27 @@ class CheckResult:
 
 
 @dataclass(frozen=True)
+class Chosen:
+    """A free name, what a submission has in its place, and why that is taken for it."""
+
+    name: str
+    value: str
+    why: str
+
+
+@dataclass(frozen=True)
 class Grade:
     """The grade of one submission.
 
     Attributes:
         loaded: The assignment, with the names that the submission chose.
+        chosen: Those names, and why they are taken.
     """
 
     loaded: LoadedAssignment
     submission: SubmissionRecord
     results: tuple[CheckResult, ...]
+    chosen: tuple[Chosen, ...] = ()
 
     @property
     def assignment(self) -> Assignment:

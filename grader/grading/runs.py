@@ -36,7 +36,7 @@ class Runs:
         self._support = grading.type_support_of(self._loaded, named.submission)
         self._prepared = replace(prepared, record=named.submission)
         self._folder = folder
-        self._can_run = prepared.install is not None and named.unnamed is None
+        self._can_run = prepared.install is not None and all(one.can_run for one in named.unnamed)
         self._recordings: dict[str, Recording] = {}
         self._faults: dict[str, str] = {}
         self._grade: Grade

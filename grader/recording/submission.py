@@ -382,6 +382,8 @@ class SubmissionRecord:
         bags: Recordings of ``ros2 bag record``; None where no check asked for them.
         build: None where nothing was built.
         given: Variable of the assignment -> its value, from the roster or from `--set`.
+        answers: Free name of the assignment -> what the submission itself says is meant by it.
+        answers_problem: Why that cannot be read, with the line, or None.
         parameter_files: Files in YAML that give parameters to nodes; at most 50.
         names: Wrong names of packages; the others are judged and run in their place.
     """
@@ -396,6 +398,8 @@ class SubmissionRecord:
     headings: tuple[tuple[str, tuple[str, ...]], ...] = ()
     bags: tuple[BagRecord, ...] | None = None
     given: tuple[tuple[str, str], ...] = ()
+    answers: tuple[tuple[str, str], ...] = ()
+    answers_problem: str | None = None
     parameter_files: tuple[ParameterFile, ...] = ()
     names: Names = NO_NAMES
 

@@ -24,6 +24,7 @@ from grader.submission.intake.locate import Located, check_path, opened, submiss
 from grader.submission.intake.members import MIB
 from grader.submission.intake.paths import shown
 from grader.submission.kept_source import keep_source
+from grader.submission.read.answers import read_answers
 from grader.submission.read.bag import read_bags
 from grader.submission.read.cpp import read_cpp
 from grader.submission.read.document import read_headings
@@ -158,6 +159,7 @@ def _hash(source: Path) -> str:
 def _prepare(located: Located, how: Preparation, store: UnderlayStore, is_second: bool) -> Prepared:
     ros, allowance = how.ros, Allowance()
     outlines = read_cpp(located, ros, how.sandbox)
+    answers, answers_problem = read_answers(located.root, located.files)
     packages = [
         read_package(located, folder, ros, allowance, outlines)
         for folder in located.packages[:_MAX_PACKAGES]
@@ -170,6 +172,8 @@ def _prepare(located: Located, how: Preparation, store: UnderlayStore, is_second
         leftovers=located.leftovers,
         files=tuple(shown(file.path) for file in located.files[:_MOST_PATHS]),
         headings=read_headings(located.root, located.files),
+        answers=answers,
+        answers_problem=answers_problem,
         parameter_files=read_parameter_files(located.root, located.files),
     )
     if record.problem is not None:

@@ -231,7 +231,7 @@ def test_a_name_that_is_open_twice_is_refused(write: Write) -> None:
     told = found(write(text))
     assert told == [
         "6: variables.b.match: 'a' takes any name of the executables already: give one a form, "
-        "or another 'of'"
+        "another 'of', or both the same 'where'"
     ]
 
 

@@ -28,6 +28,22 @@ def with_variables(text: str) -> str:
         ("n: {match: any, of: '{m}', example: 7}", "5: variables.n.of: '{m}' may have only"),
         ("n: {match: 'g{n}', example: a b}", "5: variables.n: the 'example' must be of letters"),
         ("n: {match: 'g{n}', in: package, example: 7}", "Did you mean 'packages'?"),
+        (
+            "n: {match: any, in: nodes, where: {node: a}, example: b}",
+            "5: variables.n: 'node' says nothing of 'match: any' in nodes",
+        ),
+        (
+            "n: {match: any, in: nodes, where: {publishes: '{m}'}, example: b}",
+            "5: variables.n.where: {'publishes': '{m}'} may have only variables in it that stand",
+        ),
+        (
+            "n: {match: 'g{n}', where: {publishes: /a}, example: 7}",
+            "5: variables.n: 'publishes' says nothing of 'match: g{n}' in packages",
+        ),
+        (
+            "n: {match: any, in: nodes, where: {publish: /a}, example: b}",
+            "5: variables.n.where.publish: unknown key 'publish'. Did you mean 'publishes'?",
+        ),
     ],
 )
 def test_a_mistake_in_a_variable_is_told(mistakes: Mistakes, variable: str, told: str) -> None:

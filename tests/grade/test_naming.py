@@ -91,7 +91,7 @@ def test_names_of_the_submission_stand_everywhere_and_a_number_alone_is_a_number
     record = submission("group12_gp2", "blue_maps", scripts=("driver",))
     named = with_chosen_names(loaded, record)
     found = named.loaded
-    assert named.unnamed is None
+    assert not named.unnamed
     launch = found.assignment.scenarios[0].launch[0]
     assert (launch.package, launch.executable) == ("group12_gp2", "driver")
     assert launch.parameters == {"group": 12}
@@ -128,12 +128,12 @@ def test_two_names_that_fit_are_both_told(loaded: LoadedAssignment) -> None:
     )
 
 
-def test_a_free_choice_must_be_a_single_one(loaded: LoadedAssignment) -> None:
+def test_which_of_two_is_meant_is_a_question_and_costs_nothing(loaded: LoadedAssignment) -> None:
     record = submission("group7_gp2", scripts=("bot", "test"))
-    why = with_chosen_names(loaded, record).unnamed
-    assert why is not None
-    assert why.finding.expected == "one executable of `group7_gp2` of any name, such as `bot`"
-    assert why.finding.observed == "found `bot` and `test`"
+    (why,) = with_chosen_names(loaded, record).unnamed
+    assert why.finding.expected == "one executable of `group7_gp2`"
+    assert why.finding.observed.startswith("there are `bot` and `test`")
+    assert not judge_all(loaded, record, {}).graded
 
 
 def failed_build(record: SubmissionRecord, name: str) -> SubmissionRecord:
@@ -154,14 +154,14 @@ def test_a_name_of_what_was_not_built_is_not_asked_for_and_the_build_is_told(
     record = failed_build(submission("group12_gp2", "red_maps"), "group12_gp2")
     named = with_chosen_names(loaded, record)
     found = named.loaded
-    assert named.unnamed is None
+    assert not named.unnamed
     assert (found.assignment.title, found.values["run"]) == ("The bot of group 12", "driver")
     silent = dataclasses.replace(
         record, packages=tuple(dataclasses.replace(one, cmake="") for one in record.packages)
     )
     named = with_chosen_names(loaded, silent)
     found = named.loaded
-    assert named.unnamed is None
+    assert not named.unnamed
     assert (found.assignment.title, found.values["run"]) == ("The bot of group 12", "bot")
 
 
@@ -200,15 +200,25 @@ def test_a_service_of_any_name_is_found_in_the_run_by_its_type(loaded: LoadedAss
     assert graded.result("service").status is Status.PASSED
 
 
-@pytest.mark.parametrize("services", [(), ("/light", "/lamp")])
-def test_none_or_two_services_of_the_type_are_what_the_check_finds(
-    loaded: LoadedAssignment, services: tuple[str, ...]
-) -> None:
+def test_no_service_of_the_type_is_what_the_check_finds(loaded: LoadedAssignment) -> None:
     record = submission("group7_gp2", "red_maps")
-    result = judge_all(loaded, record, runs(record, *services)).result("service")
+    result = judge_all(loaded, record, runs(record)).result("service")
     assert result.status is Status.FAILED
     assert "`/toggle`" in result.decisive.finding.expected
-    assert all(service in result.decisive.finding.observed for service in services)
+
+
+def test_of_two_services_of_the_type_the_submission_says_which_is_meant(
+    loaded: LoadedAssignment,
+) -> None:
+    record = submission("group7_gp2", "red_maps")
+    result = judge_all(loaded, record, runs(record, "/light", "/lamp")).result("service")
+    assert result.status is Status.ERROR
+    assert "`/lamp` and `/light`" in result.decisive.finding.observed
+    assert "`toggle: /lamp`" in result.decisive.finding.hint
+    told = dataclasses.replace(record, answers=(("toggle", "/light"),))
+    graded = judge_all(loaded, told, runs(told, "/light", "/lamp"))
+    assert graded.result("service").status is Status.PASSED
+    assert [(one.name, one.value) for one in graded.chosen] == [("toggle", "/light")]
 
 
 def test_a_package_name_that_begins_with_a_digit_breaks_rep_144_and_is_graded(
@@ -217,7 +227,7 @@ def test_a_package_name_that_begins_with_a_digit_breaks_rep_144_and_is_graded(
     record = submission("group7_gp2", "7up_maps")
     named = with_chosen_names(loaded, record)
     found = named.loaded
-    assert named.unnamed is None and found.values["team"] == "7up"
+    assert not named.unnamed and found.values["team"] == "7up"
     finding = judge_all(loaded, record, {}).result("maps").decisive.finding
     assert finding.status is Status.FAILED
     assert "REP-144" in finding.observed
@@ -229,8 +239,7 @@ def test_a_name_that_ros_does_not_allow_is_told_and_not_run(tmp_path: Path) -> N
     text = YAML.replace('{call: "{toggle}"', '{call: "/{team}/toggle"')
     (folder / "assignment.yaml").write_text(text, encoding="utf-8")
     loaded, record = load_assignment(folder), submission("group7_gp2", "7up_maps")
-    why = with_chosen_names(loaded, record).unnamed
-    assert why is not None
+    (why,) = with_chosen_names(loaded, record).unnamed
     assert "'/7up/toggle' is not a ROS topic name" in why.finding.observed
 
 

@@ -85,7 +85,7 @@ def test_of_several_messages_that_of_the_topic_is_the_one(loaded: LoadedAssignme
     record = handed_in(Battery="float64 volts\n", VictimReport="float64 severity\n")
     # Before any run, one stands for all.
     chosen = with_chosen_names(loaded, record)
-    assert chosen.unnamed is None
+    assert not chosen.unnamed
     assert chosen.loaded.values == {"report": "rescue_msgs/msg/Battery"}
 
 

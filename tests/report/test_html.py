@@ -159,7 +159,7 @@ SAYS = {"listen": FAIL, "renamed": Finding.passed("`x`", "a ` and nothing else")
             not_graded,
             [
                 "Not graded Something failed in the grader or the machine",
-                "This is not a fault of the submission.",
+                "This is not a fault of the submission: it can be graded again without changes.",
                 "the check itself failed: KeyError: 'depth' the host took 212 ms",
                 "Traceback (most recent call last):",
             ],

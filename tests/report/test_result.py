@@ -47,6 +47,7 @@ def test_the_keys_of_the_contract():
         "checks",
         "withheld",
         "scenarios",
+        "names",
         "build",
         "environment",
         "started",
@@ -146,7 +147,7 @@ def test_the_schema_describes_what_is_written():
     assert schema["properties"]["schema"] == {"const": 1, "title": "Schema", "type": "integer"}
     assert set(schema["properties"]) == set(written(full_points()))
     # What the earlier results of this schema lack.
-    new = {"adjustments", "comments", "attempts", "hints_opened"}
+    new = {"names", "adjustments", "comments", "attempts", "hints_opened"}
     assert set(schema["required"]) == set(schema["properties"]) - new
 
 

@@ -182,9 +182,12 @@ class Gallery(dict[tuple[Plot, str | None, bool], str]):
 
 
 def _faults(result: Result) -> list[str]:
-    """What went wrong in the grader or the machine, each cause once."""
+    """Why something could not be judged, each cause once; of a question also how to answer it."""
     findings = [finding for check in result.checks for finding in check.findings]
-    return list(dict.fromkeys(one.observed for one in findings if one.status is Status.ERROR))
+    errors = (one for one in findings if one.status is Status.ERROR)
+    return list(
+        dict.fromkeys(f"{one.observed}. {one.hint}" if one.asks else one.observed for one in errors)
+    )
 
 
 def _replays(

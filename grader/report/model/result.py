@@ -61,6 +61,7 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
             for scenario in grade.assignment.scenarios
             if scenario.id in recordings
         ),
+        names=tuple(model.NamePart(**vars(one)) for one in grade.chosen),
         build=submission.build,
         environment=dict(sorted(facts.environment.items())),
         started=facts.started,
@@ -206,7 +207,7 @@ def _tricks(recording: Recording) -> Iterator[str]:
         )
 
 
-_FINDING = frozenset({"scenario", "status", "expected", "hint", "concept"})
+_FINDING = frozenset({"scenario", "status", "expected", "hint", "concept", "asks"})
 _CHECK = _FINDING | {
     "id",
     "title",
@@ -230,6 +231,7 @@ GRADE: dict[str, Any] = {
     },
     "withheld": True,
     "scenarios": {"__all__": {"id", "seed"}},
+    "names": True,
     "build": {"succeeded", "failed_packages"},
 }
 """What of the model :class:`Result` is the grade, as pydantic's ``include``."""

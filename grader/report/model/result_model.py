@@ -81,7 +81,8 @@ class SubmissionPart(Identity):
 class FindingPart(_Part):
     """A check's finding in one scenario, or about the submission (``scenario`` is null).
 
-    ``concept`` is what ``rosgrade explain`` takes, or empty.
+    ``concept`` is what ``rosgrade explain`` takes, or empty; ``asks`` says that it is a question,
+    which of several things of the submission is meant.
     """
 
     scenario: str | None
@@ -91,6 +92,7 @@ class FindingPart(_Part):
     hint: str
     concept: str = ""
     disturbed: bool
+    asks: bool = False
     traceback: str
     evidence: Evidence
 
@@ -157,6 +159,14 @@ class ScenarioPart(_Part):
     def disturbed(self) -> bool:
         """Whether it was run again, or could not be used."""
         return self.runs > 1 or bool(self.faults)
+
+
+class NamePart(_Part):
+    """A name that the assignment leaves free: what was taken for it, and why."""
+
+    name: str
+    value: str
+    why: str
 
 
 class AdjustmentPart(_Part):
@@ -238,6 +248,7 @@ class Result(_Part):
     checks: tuple[CheckPart, ...]
     withheld: WithheldPart
     scenarios: tuple[ScenarioPart, ...]
+    names: tuple[NamePart, ...] = ()
     build: BuildRecord | None
     environment: dict[str, str]
     started: str

@@ -100,11 +100,13 @@ class Notes(NamedTuple):
 
 
 def notes_of_runs(result: Result) -> list[Notes]:
-    """Limits of the sandbox that were reached, and what else is worth knowing."""
+    """Names that were taken, limits of the sandbox, and what else is worth knowing."""
+    taken = tuple(f"{one.name} is `{one.value}`: {one.why}" for one in result.names)
     reached = [(breach, run.id) for run in result.scenarios for breach in run.breaches]
     remarked = [(remark, run.id) for run in result.scenarios for remark in run.remarks]
     kinds = (("Limits of the sandbox that were reached", reached), ("Worth knowing", remarked))
-    return [Notes(title, _lines(found)) for title, found in kinds if found]
+    names = [Notes("Names that were taken", taken)] if taken else []
+    return names + [Notes(title, _lines(found)) for title, found in kinds if found]
 
 
 def _lines(found: Sequence[tuple[str, str]]) -> tuple[str, ...]:
@@ -171,6 +173,18 @@ def score(result: Result) -> str:
     return f"{points} so far; {waits}" if waits else points
 
 
+def asks(result: Result) -> bool:
+    """Whether there is no score because of a question to the student."""
+    return any(finding.asks for check in result.open for finding in check.findings)
+
+
+def way_on(result: Result) -> str:
+    """What leads to a score where there is none."""
+    if asks(result):
+        return "Answer the question, and it is graded."
+    return "This is not a fault of the submission: it can be graded again without changes."
+
+
 def headline(result: Result) -> str:
     """One sentence on the whole, and what is judged only at grading."""
     every, withheld = len(result.checks), result.withheld
@@ -181,6 +195,8 @@ def headline(result: Result) -> str:
     full = "Full points for the checks" if result.adjustments else "Full points"
     if not result.graded:
         text = "Something failed in the grader or the machine; no points are lost"
+        if asks(result):
+            text = "It cannot be seen which name is meant; no points are lost"
         left = total(check.max_points for check in result.open)
         if left:
             earned = number(total(check.points for check in result.checks))

@@ -188,8 +188,7 @@ def _conclude(console: Console, result: Result, before: Result | None = None) ->
             text = f"“{first.title}”{where}. {explanation.waiting(result, first)}".rstrip()
             console.print(Text.assemble(("Fix this first: ", "bold"), _line(console, text)))
     if not result.graded:
-        again = "It can be graded again without changes."
-        text = f"Not graded. {explanation.headline(result)} {again}"
+        text = f"Not graded. {explanation.headline(result)} {explanation.way_on(result)}"
         console.print(Text(text, "bold magenta"))
         return
     for one in result.adjustments:

@@ -11,7 +11,7 @@ from grader.submission.read.includes import needed_files
 
 
 def only_for(package: PackageRecord, executable: str) -> PackageRecord:
-    """The package with the imports of the modules or sources that an executable needs.
+    """The package with the sources that an executable needs, and their imports.
 
     An executable that neither setup.py nor CMakeLists.txt defines, such as a script, has all.
     """
@@ -22,7 +22,8 @@ def only_for(package: PackageRecord, executable: str) -> PackageRecord:
         cmake = package.file("CMakeLists.txt")
         kept = (one for one in package.ros_imports if one.file in parts)
         named = (one for one in package.ros_imports if one.file == cmake and one.line in lines)
-        return replace(package, ros_imports=(*kept, *named))
+        sources = tuple(one for one in package.sources if one.path in parts)
+        return replace(package, ros_imports=(*kept, *named), sources=sources)
     target = dict(package.entry_points).get(executable)
     files = {source.module: source for source in package.sources}
     if target is None or target.partition(":")[0] not in files:
@@ -39,6 +40,7 @@ def only_for(package: PackageRecord, executable: str) -> PackageRecord:
         package,
         imports=tuple(item for item in package.imports if item.file in paths),
         ros_imports=tuple(item for item in package.ros_imports if item.file in paths),
+        sources=tuple(item for item in package.sources if item.path in paths),
     )
 
 

@@ -1,0 +1,188 @@
+"""Names that an assignment describes instead of saying them: who does what in the graph."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+from grader.assignment.load import LoadedAssignment, load_assignment
+from grader.findings.finding import Status
+from grader.grade import Grade, judge_all
+from grader.recording.model import Kind, Node, Owner, Recording
+from grader.recording.submission import PackageRecord, SourceCall, SourceFile, SubmissionRecord
+from tests.checks.builder import TWIST, endpoint, node, package, recording, submission
+
+SCAN, FLOAT = "sensor_msgs/msg/LaserScan", "std_msgs/msg/Float32"
+YAML = """\
+rosgrade: 1
+id: roles
+title: Layers
+variables:
+  driver:
+    {match: any, in: executables, where: {publishes: geometry_msgs/msg/Twist}, example: bot_pub}
+  near:
+    match: any
+    in: nodes
+    where: {subscribes: sensor_msgs/msg/LaserScan, publishes: nearest}
+    example: /perception
+  nearest:
+    {match: any, in: publishers, of: std_msgs/msg/Float32, where: {node: "{near}"}, example: /near}
+  first: &robot {match: any, in: nodes, where: {publishes: cmd_vel}, example: /a}
+  second: *robot
+packages: [{name: bot_publisher, executables: ["{driver}"]}]
+scenarios:
+  - id: main
+    launch: [{executable: "{driver}"}]
+    record: [{topic: "{nearest}", type: std_msgs/msg/Float32}]
+    timeout: 5 s
+checks:
+  - {id: sees, uses: node.exists, with: {name: "{near}"}, points: 1}
+  - {id: one, uses: node.exists, with: {name: "{first}"}, points: 1}
+  - {id: two, uses: node.exists, with: {name: "{second}"}, points: 1}
+"""
+
+
+@pytest.fixture
+def loaded(tmp_path: Path) -> LoadedAssignment:
+    folder = tmp_path / "roles"
+    folder.mkdir()
+    (folder / "assignment.yaml").write_text(YAML, encoding="utf-8")
+    return load_assignment(folder)
+
+
+def ends(name: str, subscribes: dict[str, str], publishes: dict[str, str]) -> Recording:
+    """What one node has."""
+    made = [
+        endpoint(topic=topic, type=type_, node=name, kind=kind)
+        for kind, topics in ((Kind.SUBSCRIPTION, subscribes), (Kind.PUBLISHER, publishes))
+        for topic, type_ in topics.items()
+    ]
+    return recording(nodes=(node(name),), endpoints=tuple(made))
+
+
+EYES = ends("/eyes", {"/scan": SCAN}, {"/nearest": FLOAT})
+RIGHT = (
+    EYES,
+    ends("/one/brain", {}, {"/one/cmd_vel": TWIST}),
+    ends("/two/brain", {}, {"/two/cmd_vel": TWIST}),
+)
+
+
+def source(name: str, *types: str) -> SourceFile:
+    calls = (SourceCall("self.create_publisher", 7, "topic"),)
+    return SourceFile(
+        f"bot_publisher/{name}.py",
+        f"bot_publisher.{name}",
+        names=tuple((one.rpartition(".")[2], one) for one in types),
+        calls=calls,
+    )
+
+
+def own(**changes: object) -> SubmissionRecord:
+    made: PackageRecord = package(
+        entry_points=(("go", "bot_publisher.go:main"), ("look", "bot_publisher.look:main")),
+        executables=("go", "look"),
+        sources=(source("go", "geometry_msgs.msg.Twist"), source("look", "std_msgs.msg.Float32")),
+    )
+    return dataclasses.replace(submission(made), **changes)
+
+
+def graded(loaded: LoadedAssignment, record: SubmissionRecord, *seen: Recording) -> Grade:
+    run = dataclasses.replace(
+        recording(),
+        scenario="main",
+        submission=record,
+        nodes=tuple(one for run in seen for one in run.nodes),
+        endpoints=tuple(one for run in seen for one in run.endpoints),
+    )
+    return judge_all(loaded, record, {"main": run})
+
+
+def values(grade: Grade) -> dict[str, str]:
+    return dict(grade.loaded.values)
+
+
+def test_each_role_is_taken_by_what_does_it_under_any_name(loaded: LoadedAssignment) -> None:
+    grade = graded(loaded, own(), *RIGHT)
+    assert values(grade) == {
+        "driver": "go",
+        "near": "/eyes",
+        "nearest": "/nearest",
+        "first": "/one/brain",
+        "second": "/two/brain",
+    }
+    assert grade.full_points
+    assert next(one for one in grade.chosen if one.name == "near").why == (
+        f"the only node that publishes on `nearest` and subscribes to `{SCAN}`"
+    )
+
+
+def test_the_order_in_which_nodes_are_seen_changes_nothing(loaded: LoadedAssignment) -> None:
+    there, back = graded(loaded, own(), *RIGHT), graded(loaded, own(), *reversed(RIGHT))
+    assert values(there) == values(back)
+    assert [one.status for one in there.results] == [one.status for one in back.results]
+
+
+def test_which_of_two_has_a_role_is_asked_and_costs_nothing(loaded: LoadedAssignment) -> None:
+    other = ends("/spy", {"/scan": SCAN}, {"/spy/nearest": FLOAT})
+    grade = graded(loaded, own(), *RIGHT, other)
+    result = grade.result("sees")
+    assert result.status is Status.ERROR and result.decisive.finding.asks
+    assert "`/eyes` and `/spy`" in result.decisive.finding.observed
+    assert "`near: /eyes`" in result.decisive.finding.hint
+    assert not grade.graded
+    # What is known is judged.
+    assert grade.result("one").status is Status.PASSED
+
+
+def test_the_submission_itself_says_which_is_meant(loaded: LoadedAssignment) -> None:
+    other = ends("/spy", {"/scan": SCAN}, {"/spy/nearest": FLOAT})
+    grade = graded(loaded, own(answers=(("near", "/spy"),)), *RIGHT, other)
+    assert grade.full_points
+    assert values(grade)["nearest"] == "/spy/nearest"
+    assert [one.why for one in grade.chosen if one.name == "near"] == ["as `rosgrade.yaml` says"]
+
+
+def test_of_two_of_one_role_the_submission_may_say_one(loaded: LoadedAssignment) -> None:
+    grade = graded(loaded, own(answers=(("first", "/two/brain"),)), *RIGHT)
+    assert (values(grade)["first"], values(grade)["second"]) == ("/two/brain", "/one/brain")
+
+
+def test_a_role_that_nothing_has_is_told_with_what_the_nearest_lacks(
+    loaded: LoadedAssignment,
+) -> None:
+    grade = graded(loaded, own(), ends("/eyes", {"/scan": SCAN}, {"/near": FLOAT}), *RIGHT[1:])
+    finding = grade.result("sees").decisive.finding
+    assert finding.status is Status.FAILED
+    assert finding.expected == (
+        f"one node that publishes on `nearest` and subscribes to `{SCAN}`, under any name"
+    )
+    assert finding.observed.endswith(
+        "`/eyes` comes nearest, and lacks this: publishes on `nearest`"
+    )
+    assert "`ros2 node info /eyes`" in finding.hint
+    assert grade.graded
+
+
+def test_where_there_is_no_node_the_check_itself_says_why(loaded: LoadedAssignment) -> None:
+    foreign = Node("/probe", Owner.PROBE, appeared_ns=0)
+    finding = graded(loaded, own(), recording(nodes=(foreign,), endpoints=())).result("sees")
+    assert finding.status is Status.FAILED
+    assert "comes nearest" not in finding.decisive.finding.observed
+
+
+@pytest.mark.parametrize(
+    ("answers", "told"),
+    [
+        ((("naer", "/eyes"),), "there is no name 'naer' to choose. Did you mean 'near'?"),
+        ((("near", ""),), "'near' cannot be '': its form is any"),
+    ],
+)
+def test_a_wrong_line_of_the_file_is_told_and_costs_nothing(
+    loaded: LoadedAssignment, answers: tuple[tuple[str, str], ...], told: str
+) -> None:
+    grade = graded(loaded, own(answers=answers), *RIGHT)
+    assert not grade.graded
+    assert {one.decisive.finding.observed for one in grade.results} == {told}
