@@ -453,6 +453,29 @@ class TestEnds:
         finding = judge("node.ends", run, within="2 s")
         assert (finding.status, finding.disturbed) == (Status.ERROR, True)
 
+    @pytest.mark.parametrize(
+        ("planner_s", "driver_s", "told"),
+        [
+            (4.6, 4.9, None),
+            (4.9, 4.6, "`/planner` ended 300 ms after `/driver`"),
+            (4.6, 4.6, "`/planner` and `/driver` ended at the same moment"),
+        ],
+    )
+    def test_one_node_ends_before_another(self, planner_s, driver_s, told):
+        ends = {"planner": planner_s, "driver": driver_s}
+        run = recording(
+            nodes=tuple(node(f"/{name}") for name in ends),
+            processes=tuple(process(f"bot/{name}", exited_s=end) for name, end in ends.items()),
+            declarations=tuple(
+                declared("node", name=f"bot/{name}", node=f"/{name}") for name in ends
+            ),
+        )
+        order = {"within": "2 s", "node": "/planner", "before": "/driver"}
+        if told is None:
+            assert judge("node.ends", run, **order).status is Status.PASSED
+        else:
+            assert told in failing("node.ends", run, **order)
+
     def test_processes_that_survive_are_named(self):
         run = recording(processes=(process(survivors=("sleep 100", "python3 x.py")),))
         found = failing("node.ends", run, within="2 s")

@@ -59,6 +59,18 @@ def test_what_dies_after_sigint_was_stopped_by_it() -> None:
     begun = output(BEGUN, stream="stdout", name=FILE)
     (_, driver), _, _ = launched({FILE}, at(STOP_S), (process(FILE),), (*begun, *late), (NODE,))
     assert (driver.stopped_by, driver.stop_s) == ("SIGINT", 0.1)
+    assert driver.exited_ns == at(STOP_S + 0.05)
+
+
+def test_when_each_node_ended_after_sigint_is_told_by_launch() -> None:
+    clean = "[INFO] [driver-1]: process has finished cleanly [pid 7]"
+    late = output(clean, stream="stdout", name=FILE, time_s=STOP_S + 0.02)
+    begun = output(BEGUN, stream="stdout", name=FILE)
+    (launch, driver), _, _ = launched(
+        {FILE}, at(STOP_S), (process(FILE),), (*begun, *late), (NODE,)
+    )
+    assert (driver.exited_ns, driver.stopped_by) == (at(STOP_S + 0.02), "SIGINT")
+    assert launch.exited_ns != driver.exited_ns
 
 
 def test_other_processes_stay_as_they_are() -> None:

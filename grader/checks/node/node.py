@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.wrong_name import Named, misnamed
@@ -36,6 +36,11 @@ from grader.spec.name import QualifiedNodeName, TopicName
 from grader.spec.names import Thing
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
+
+_APART_S = 0.01
+"""Two looks for ended processes: what is nearer has no order."""
+_HELD_UP_S = 0.1
+"""As long as a wait on a quiet machine may make an order that nothing enforces."""
 
 
 class Starts(Parameters):
@@ -200,9 +205,22 @@ class Ends(Parameters):
     """Parameters of node.ends."""
 
     within: Duration = Field(description="Longest time from SIGINT to the end of the process.")
+    node: QualifiedNodeName | None = Field(
+        None, description="A node whose process ends before that of another; goes with `before`."
+    )
+    before: QualifiedNodeName | None = Field(None, description="The other node.")
+
+    @model_validator(mode="after")
+    def _is_an_order(self) -> Ends:
+        if (self.node is None) is not (self.before is None):
+            raise ValueError("'node' and 'before' go together")
+        return self
 
     def _asked(self) -> str:
-        return f"the process ends within {format_duration(self.within)} of SIGINT (Ctrl-C)"
+        within = f"within {format_duration(self.within)} of SIGINT (Ctrl-C)"
+        if self.node is None:
+            return f"the process ends {within}"
+        return f"all end {within}, and {code(self.node)} before {code(self.before or '')}"
 
 
 @check("node.ends", Subject.RECORDING, Ends, concept="nodes")
@@ -211,6 +229,7 @@ def ends(recording: Recording, parameters: Ends) -> Finding:
 
     Judged by the process: after SIGINT it must end in time and leave no process behind. Delays by
     the machine are taken off. Its exit status and a traceback of KeyboardInterrupt do not matter.
+    SIGINT goes to all at once, as in a terminal; with `before`, one has to wait for the other.
     """
     if not recording.processes:
         stop_if(why_no_node(recording) or Finding("nothing was launched"))
@@ -234,8 +253,32 @@ def ends(recording: Recording, parameters: Ends) -> Finding:
             )
     if not asked:
         return Finding.ours("a stimulus of the scenario had ended it before")
+    if parameters.node is not None and parameters.before is not None:
+        stop_if(_why_other_order(recording, parameters.node, parameters.before))
     observed = f"ended {format_duration(max(map(took_s, asked)))} after SIGINT"
     return Finding.as_asked(observed, Evidence(moments=(until_the_end(recording, "SIGINT"),)))
+
+
+def _why_other_order(recording: Recording, node: str, before: str) -> Finding | None:
+    """Why the process of a node did not end before that of another, or None if it did."""
+    ended_ns: dict[str, int] = {}
+    for name in (node, before):
+        stop_if(why_not_node(recording, name))
+        process = declarations.process_of(recording, name)
+        if process is None or process.exited_ns is None:
+            return Finding.ours(f"it is not known which process has the node {code(name)}")
+        ended_ns[name] = process.exited_ns
+    earlier_s = (ended_ns[before] - ended_ns[node]) / NS
+    if earlier_s >= _APART_S:
+        return None
+    seen = f"{code(node)} ended {format_duration(-earlier_s)} after {code(before)}"
+    if earlier_s > -_APART_S:
+        seen = f"{code(node)} and {code(before)} ended at the same moment"
+    ends = [moment(recording, f"{name} ended", at_ns) for name, at_ns in ended_ns.items()]
+    found = mistaken("ends_first", seen, Evidence(moments=tuple(ends)), node=code(node))
+    # One that waits for a fixed time may be overtaken on a busy machine.
+    took_s = recording.stolen_s(recording.stop_ns, max(ended_ns.values()))
+    return found.doubted(took_s > _HELD_UP_S)
 
 
 def _was_killed(recording: Recording, process: Process) -> bool:

@@ -15,6 +15,7 @@ _DIED = re.compile(
     rf"\[ERROR\] {_NAME}: process has died "
     r"\[pid (?P<pid>\d+), exit code (?P<code>-?\d+), cmd '(?P<command>.*)'\]\.?"
 )
+_FINISHED = re.compile(rf"\[INFO\] {_NAME}: process has finished cleanly \[pid (?P<pid>\d+)\]")
 _WRITTEN = re.compile(rf"{_NAME} ?(?P<text>.*)")
 # Of a package, as opposed to what ExecuteProcess starts, such as `ros2 service call`.
 _PROGRAM = re.compile(r"\S+/lib/[^/\s]+/[^/\s]+(\s|$)")
@@ -25,6 +26,7 @@ class _Child:
     name: str
     begun_ns: int
     died_ns: int | None = None
+    ended_ns: int | None = None
     exit_code: int = 0
     is_program: bool = False
     has_node: bool = False
@@ -74,8 +76,11 @@ def _read(line: LogLine, children: dict[int, _Child], stop_ns: int) -> LogLine:
     """Note what launch says of a process; a line that one of them wrote becomes its own."""
     if begun := _BEGUN.fullmatch(line.text):
         children[int(begun["pid"])] = _Child(begun["name"], line.time_ns)
-    died = _DIED.fullmatch(line.text) if line.time_ns < stop_ns else None
-    if died and (child := children.get(int(died["pid"]))):
+    died = _DIED.fullmatch(line.text)
+    ended = died or _FINISHED.fullmatch(line.text)
+    if ended and (child := children.get(int(ended["pid"]))):
+        child.ended_ns = line.time_ns
+    if died and line.time_ns < stop_ns and (child := children.get(int(died["pid"]))):
         child.died_ns, child.exit_code = line.time_ns, int(died["code"])
         child.is_program = bool(_PROGRAM.match(died["command"]))
     written = _WRITTEN.fullmatch(line.text)
@@ -88,6 +93,7 @@ def _read(line: LogLine, children: dict[int, _Child], stop_ns: int) -> LogLine:
 def _record(pid: int, child: _Child, launch: Process) -> Process:
     found = replace(launch, name=child.name, pid=pid, started_ns=child.begun_ns, survivors=())
     if child.died_ns is None:
-        return found
+        # As launch tells; how it had to be stopped is known of launch alone.
+        return replace(found, exited_ns=child.ended_ns or found.exited_ns)
     found = replace(found, exited_ns=child.died_ns, exit_code=child.exit_code)
     return replace(found, stopped_by="itself", stop_s=None)
