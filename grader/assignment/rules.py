@@ -300,6 +300,9 @@ def _(need: needs.SentOrOwn, user: _User) -> Iterator[_Lack]:
 def _(need: needs.OwnTransform, user: _User) -> Iterator[_Lack]:
     edge = user.value(need.parent), user.value(need.child)
     for scenario in user.scenarios:
+        if any(edge in one.frames for one in scenario.stimuli):
+            text = f"a stimulus of the scenario {scenario.id!r} publishes this transform itself"
+            yield ("with", need.child), text
         if scenario.world is not None and edge in scenario.simulator.transforms:
             text = (
                 f"the robot of the scenario {scenario.id!r} publishes this transform itself: write "

@@ -98,6 +98,27 @@ def test_what_the_robot_publishes_itself_is_not_asked_of_a_student(tmp_path: Pat
     assert "publishes this transform itself: write 'topics: {tf:" in refused(tmp_path, yaml)
 
 
+def test_the_author_s_transforms_stand_beside_those_of_the_robot_and_are_no_student_s(
+    tmp_path: Path,
+) -> None:
+    sent = """    stimuli:
+      - publish: /tf_static
+        type: tf2_msgs/msg/TFMessage
+        durability: transient_local
+        message: {transforms: [{header: {frame_id: map}, child_frame_id: odom}]}
+    timeout"""
+    tree = "tf.tree, with: {root: map, frames: [odom, base_scan]}"
+    yaml = with_transforms("{enabled: true}", tree).replace("    timeout", sent)
+    [scenario] = load_assignment(lesson(tmp_path, yaml)).assignment.scenarios
+    assert set(scenario.stimuli[0].frames) == {("map", "odom")}
+    (tmp_path / "asked").mkdir()
+    asked = "tf.static, with: {parent: map, child: odom, position: [0, 0, 0]}"
+    yaml = with_transforms("{enabled: true}", asked).replace("    timeout", sent)
+    assert "a stimulus of the scenario 'run' publishes this transform itself" in refused(
+        tmp_path / "asked", yaml
+    )
+
+
 def test_without_a_world_a_transform_needs_a_topic_to_follow(tmp_path: Path) -> None:
     topics = "[{topic: /tf, type: tf2_msgs/msg/TFMessage}]"
     edge = "parent: odom, child: base_footprint"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, TypeVar
@@ -101,6 +101,11 @@ class StimulusModel(Model):
     @property
     def given(self) -> Sequence[Mapping[str, Any]]:
         """Fields of the requests or goals that it sends, or the parameters that it sets."""
+        return ()
+
+    @property
+    def frames(self) -> Collection[tuple[str, str]]:
+        """Parent and child of each transform that it publishes."""
         return ()
 
     @property

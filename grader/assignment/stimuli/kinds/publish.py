@@ -21,6 +21,7 @@ from grader.assignment.stimuli.stimulus_model import (
     kind,
 )
 from grader.checks.need import Act
+from grader.findings.fields import each_field
 from grader.spec.document import Place
 from grader.spec.name import Durability, InterfaceName, Reliability, TopicName
 from grader.spec.nearest_name import did_you_mean
@@ -136,6 +137,16 @@ class Publish(StimulusModel):
         return self.message is None or self.every is None or self.count is not None
 
     @property
+    def frames(self) -> frozenset[tuple[str, str]]:
+        """Parent and child of each transform in the messages that stand in the YAML."""
+        messages = [*self.messages, *([] if self.message is None else [self.message])]
+        lists = (message.get("transforms") for message in messages)
+        sent = [one for each in lists if isinstance(each, list) for one in each]
+        fields = [dict(each_field(one)) for one in sent if isinstance(one, dict)]
+        found = ((one.get("header.frame_id"), one.get("child_frame_id")) for one in fields)
+        return frozenset((str(parent), str(child)) for parent, child in found if parent and child)
+
+    @property
     def due(self) -> tuple[Due, ...]:
         """What a cell publishes; a message that is repeated without end is there once."""
         return self._due
@@ -183,7 +194,8 @@ class Publish(StimulusModel):
     def mistakes(self, making: Making, scenario: ScenarioOfStimuli) -> Iterator[tuple[Place, str]]:
         """Its topic or its messages do not fit."""
         recorded = scenario.recorded_types
-        if self.publish in recorded:
+        # Transforms of the author's and of the student's are told apart by their frames.
+        if self.publish in recorded and not self.frames:
             text = f"{self.publish!r} is recorded: only the student may publish there"
             yield ("publish",), text
         if self.answer is not None and self.answer not in recorded:
