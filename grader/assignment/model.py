@@ -269,6 +269,12 @@ class Scenario(Model):
         "`drive` are called `drive_1`, `drive_2`, ... See `counts` of the checks.",
     )
     launch: tuple[Launch, ...] = Field(min_length=1, description="Processes of the student.")
+    companions: tuple[Launch, ...] = Field(
+        (),
+        description="Programs of the author's, each an executable of a package in `packages/` "
+        "beside assignment.yaml. They start before the student's and run as long, and nothing of "
+        "theirs is judged: a traffic light, another robot.",
+    )
     record: tuple[RecordedTopic, ...] = Field((), description="Topics to record.")
     stimuli: tuple[Stimulus, ...] = Field(
         (), description="What the probe sends or does during the run."

@@ -47,12 +47,14 @@ def problems(
         except ValueError as error:
             yield source.problem(("packages", index, "name"), str(error))
     ids = [scenario.id for scenario in assignment.scenarios]
-    shares = _shares(source, assignment)
+    beside = _packages_beside(source)
+    shares = {*(package.name for package in assignment.packages), *beside, *PACKAGES}
     for index, scenario in enumerate(assignment.scenarios):
         for run in sorted({*runs_of(scenario)} & {*ids} - {scenario.id}):
             text = f"a run of {scenario.id!r} would be called as the scenario {run!r}"
             yield source.problem(("scenarios", index, "repeat"), text)
-        for place, text in (*_scenario(assignment, scenario), *_no_share(scenario, shares)):
+        own = _no_companion(scenario, beside)
+        for place, text in (*_scenario(assignment, scenario), *_no_share(scenario, shares), *own):
             yield source.problem(("scenarios", index, *place), text)
     yield from _requirements(source, assignment.checks)
     yield from _points(source, assignment)
@@ -104,11 +106,21 @@ def _launch(assignment: Assignment, launch: Launch) -> Iterator[tuple[Place, str
         yield ("executable",), no_executable(launch.executable, package)
 
 
-def _shares(source: Source, assignment: Assignment) -> set[str]:
-    """The packages whose ``share`` a launch can name."""
-    beside = (file for name in FOLDERS for file in (source.file.parent / name).rglob("package.xml"))
-    handed_in = (package.name for package in assignment.packages)
-    return {*handed_in, *(file.parent.name for file in beside), *PACKAGES}
+def _packages_beside(source: Source) -> set[str]:
+    """The author's packages, by the names of their folders."""
+    folders = (source.file.parent / name for name in FOLDERS)
+    return {file.parent.name for folder in folders for file in folder.rglob("package.xml")}
+
+
+def _no_companion(scenario: Scenario, beside: Collection[str]) -> Iterator[tuple[Place, str]]:
+    for number, one in enumerate(scenario.companions):
+        if one.package not in beside:
+            text = f"there is no package {one.package!r} in packages/ beside assignment.yaml."
+            yield ("companions", number, "package"), text + nearest_or_all(str(one.package), beside)
+        elif one.executable is None or one.after:
+            key = "after" if one.after else "file"
+            text = "a companion is an executable that is started before the student's programs"
+            yield ("companions", number, key), text
 
 
 def _no_share(scenario: Scenario, shares: Collection[str]) -> Iterator[tuple[Place, str]]:

@@ -32,6 +32,8 @@ class Owner(str, Enum):
 
     STUDENT = "student"
     PROBE = "probe"
+    COMPANION = "companion"
+    """A program of the author's."""
     FOREIGN = "foreign"
 
 

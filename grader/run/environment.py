@@ -48,10 +48,13 @@ def cell_environment(ros: RosInstallation, *, sandboxed: bool = False) -> dict[s
 
 
 def student_environment(
-    ros: RosInstallation, install: Path, scratch: Path, compiled_tracer: Path | None = None
+    ros: RosInstallation,
+    installs: tuple[Path, ...],
+    scratch: Path,
+    compiled_tracer: Path | None = None,
 ) -> dict[str, str]:
     """Variables of a student's process: ROS, the packages handed in, and the tracers."""
-    environment = ros.environment(os.environ, (install,))
+    environment = ros.environment(os.environ, installs)
     temporary = scratch / "tmp"
     temporary.mkdir(exist_ok=True)
     environment.update(

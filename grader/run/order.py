@@ -91,6 +91,7 @@ class CellOrder:
     """One scenario for one cell.
 
     Attributes:
+        companions: Programs of the author's, and the environment variables that they have.
         student_environment: Environment variables of the student's processes.
         scratch: Folder of the student: working directory, home and temporary files.
         stimuli: With their values.
@@ -115,6 +116,8 @@ class CellOrder:
     limits: RunLimits
     scratch: str
     submission: str
+    companions: tuple[ProcessCommand, ...] = ()
+    companion_environment: dict[str, str] = field(default_factory=dict)
     simulator: SimulatorOrder | None = None
     values: dict[str, float] = field(default_factory=dict)
     environment: dict[str, str] = field(default_factory=dict)

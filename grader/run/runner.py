@@ -141,6 +141,21 @@ def process_command(
     )
 
 
+def companion(ros: RosInstallation, launch: Launch, values: dict[str, float]) -> ProcessCommand:
+    """What to execute of the author's.
+
+    Raises:
+        GraderFault: No install space has such an executable.
+    """
+    prefixes = (*ros.underlays, *ros.prefixes)
+    name = f"{launch.package}/{launch.executable}"
+    for prefix in prefixes:
+        if (file := prefix / "lib" / name).is_file():
+            arguments = with_shares(ros_arguments(launch, values), prefixes)
+            return ProcessCommand(name, (*_program(ros, file), *arguments))
+    raise GraderFault(f"the companion {name} is not there: its package installs no such executable")
+
+
 def _program(ros: RosInstallation, file: Path) -> tuple[str, ...]:
     """What `ros2 run` would execute.
 
@@ -394,6 +409,7 @@ class Runner:
             process_command(ros, launch, assignment, install, values, request.names)
             for launch in scenario.launch
         )
+        companions = tuple(companion(ros, one, values) for one in scenario.companions)
         compiled = has_compiled_programs(install)
         tracer = compiled_tracer(ros, cache_folder()) if compiled else None
         imported = {item.module for package in submission.packages for item in package.ros_imports}
@@ -403,7 +419,9 @@ class Runner:
             scenario=scenario.id,
             seed=seed,
             commands=commands,
-            student_environment=student_environment(ros, install, scratch, tracer),
+            companions=companions,
+            student_environment=student_environment(ros, (install,), scratch, tracer),
+            companion_environment=student_environment(ros, (), scratch),
             compiled_tracer=str(tracer) if tracer else None,
             prefixes=tuple(map(str, (*type_support, install, *ros.underlays, *ros.prefixes))),
             topics=_topics(scenario),

@@ -77,7 +77,9 @@ def sandboxed(
     return replace(
         order,
         commands=tuple(replace(one, argv=_moved(one.argv, seen)) for one in order.commands),
+        companions=tuple(replace(one, argv=_moved(one.argv, seen)) for one in order.companions),
         student_environment=sandboxed_environment(order.student_environment, places),
+        companion_environment=sandboxed_environment(order.companion_environment, places),
         prefixes=_moved(order.prefixes, in_cell),
         type_support=_moved(order.type_support, in_cell),
         scratch=str(CELL),

@@ -368,3 +368,12 @@ def test_the_hash_does_not_look_into_a_report_that_is_being_written(
 
     monkeypatch.setattr(os, "scandir", scan)
     assert folder_sha256(folder) == first
+
+
+def test_a_companion_is_an_executable_of_a_package_beside_the_yaml(
+    mistakes: Callable[..., list[str]],
+) -> None:
+    told = "[0].companions[0].package: there is no package 'course_nodes' in packages/"
+    one = "companions: [{package: course_nodes, executable: light}]"
+    found = mistakes(GOOD.replace("    launch:", f"    {one}\n    launch:", 1))
+    assert len(found) == 1 and told in found[0]

@@ -49,9 +49,9 @@ def assignment(**scenario: Any) -> Assignment:
     )
 
 
-def install(folder: Path, source: str) -> Path:
+def install(folder: Path, source: str, name: str = f"{PACKAGE}/{EXECUTABLE}") -> Path:
     """An install space (merged layout) with one executable."""
-    file = folder / "install" / "lib" / PACKAGE / EXECUTABLE
+    file = folder / "install" / "lib" / name
     file.parent.mkdir(parents=True)
     file.write_text(f"#!{sys.executable}\n{source}", encoding="utf-8")
     file.chmod(0o755)
@@ -83,6 +83,7 @@ def run_node(runner: Runner, tmp_path: Path) -> RunNode:
         pauses: bool = False,
         names: Names = NO_NAMES,
         mistakes: tuple[Mistake, ...] = (),
+        underlays: tuple[Path, ...] = (),
         **scenario: Any,
     ) -> Recording:
         folder = tmp_path / str(next(numbers))
@@ -99,6 +100,7 @@ def run_node(runner: Runner, tmp_path: Path) -> RunNode:
             pauses=pauses,
             names=names,
             mistakes=mistakes,
+            underlays=underlays,
         )
         runner.run(request, file)
         return read_recording(file)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from grader.recording.event import Pause, Wait
 from grader.recording.model import NS, Ending, Endpoint, Kind, Owner, Recording
 from grader.recording.submission import SubmissionRecord
+from grader.run.cell.companions import Companions
 from grader.run.cell.domain import joined_domains
 from grader.run.cell.ending import EndingConditions, ExitBarrier
 from grader.run.cell.graph import GraphObserver
@@ -80,10 +81,11 @@ class Cell:
             Family(os.getpid()).look, blocked=lambda pid: not self._has_node and is_blocked(pid)
         )
         self._students = StudentProcesses(self._output, self._meter, order.process_sandbox)
+        self._companions = Companions(order, self._meter) if order.companions else None
         self._other_domains: tuple[int, ...] = ()
         self._graph = GraphObserver(
             probe.node,
-            lambda: self._students.pids,
+            self._own_pids,
             self._students.refresh,
             private=order.process_sandbox is not None,
         )
@@ -116,8 +118,7 @@ class Cell:
         )
         self._player = Player(order.stimuli, self._context)
         self._ending = EndingConditions(probe, self._output, self._robot, self._player)
-        # Started later, the first to start last.
-        self._later = sorted(order.commands, key=lambda one: one.after_s)[::-1]
+        self._later: list[ProcessCommand] = []
         self._next_graph = 0.0
         self._launched_ns = 0
         self._matched_ns: int | None = None
@@ -130,7 +131,7 @@ class Cell:
         machine_faults = MachineFaults()
         self._launched_ns = time.time_ns()
         try:
-            ending = self._observe()
+            ending = self._start_companions() or self._observe()
             self._probe.recording = False
             stop_ns = time.time_ns()
             self._player.finish()
@@ -140,8 +141,12 @@ class Cell:
             pauses = self._pause() if self._order.pauses else ()
             tell("stopping")
             self._students.stop(self._order.limits)
+            if self._companions is not None:
+                self._faults += self._companions.stop()
         finally:
             self._students.clean_up()
+            if self._companions is not None:
+                self._companions.clean_up()
             self._faults += self._students.faults()
             breaches = self._watchdog.stop() if self._watchdog is not None else ()
         written = self._output.close(_PIPES_LIMIT_S)
@@ -188,7 +193,7 @@ class Cell:
             sent=dict.fromkeys(self._player.topics, ()),
             answers=self._player.answers,
             disturbance=disturbance,
-            faults=tuple(self._faults),
+            faults=tuple(dict.fromkeys(self._faults)),
             truth=tuple(self._robot.truth) if self._robot else (),
             incidents=tuple(self._robot.incidents) if self._robot else (),
             scene=self._robot.scene() if self._robot else None,
@@ -218,7 +223,30 @@ class Cell:
         if packets is not None and packets.malformed(self._ports) > _MOST_MALFORMED:
             yield "forbidden packets", _GARBAGE
 
+    def _own_pids(self) -> frozenset[int]:
+        companions = self._companions.pids if self._companions is not None else frozenset()
+        return self._students.pids | companions
+
+    def _start_companions(self) -> Ending | None:
+        """Start the author's programs, and know their nodes before any of the student's runs."""
+        if self._companions is None:
+            return None
+        self._graph.newcomers = Owner.COMPANION
+        self._companions.start(self._domain_id)
+        for watch in self._ticks():
+            nodes = [one for one in self._graph.nodes if one.owner is Owner.COMPANION]
+            if len(nodes) >= len(self._order.companions):
+                break
+            late = watch.elapsed_s > self._order.limits.discovery_s
+            self._faults += self._companions.faults(late=late)
+            if self._faults:
+                return Ending.FAULT
+        self._graph.newcomers = Owner.STUDENT
+        return None
+
     def _observe(self) -> Ending:
+        # The first to start is the last.
+        self._later = sorted(self._order.commands, key=lambda one: one.after_s)[::-1]
         ending = self._launch()
         ending = ending or self._await_sandboxes() or self._await_node() or self._await_match()
         if ending is None:

@@ -99,6 +99,8 @@ class GraphObserver:
         self._services: dict[tuple[str, str, str], Service] = {}
         self._clients: dict[tuple[str, str, str], Service] = {}
         self._private = private
+        self.newcomers = Owner.STUDENT
+        """Whose the programs are that are being started."""
         self.forbidden_names = False
         self.changed_ns = 0
         for topic, _ in node.get_topic_names_and_types() if private else ():
@@ -226,12 +228,12 @@ class GraphObserver:
 
     def _find_owner(self, bits: int) -> Owner:
         if self._private:
-            return Owner.STUDENT
+            return self.newcomers
         if bits == os.getpid() & 0xFFFF:
             return Owner.PROBE
         if not self._is_student(bits):
             self._rescan()
-        return Owner.STUDENT if self._is_student(bits) else Owner.FOREIGN
+        return self.newcomers if self._is_student(bits) else Owner.FOREIGN
 
     def _is_student(self, bits: int) -> bool:
         return any(pid & 0xFFFF == bits for pid in self._student_pids())
