@@ -6,6 +6,7 @@ import pytest
 
 from grader.findings.finding import Status
 from grader.recording.model import NS
+from grader.recording.simulated import Truth
 from tests.checks.builder import (
     NODE,
     at,
@@ -288,6 +289,11 @@ class TestLifecycle:
     def test_a_crash_in_a_transition_is_the_program_s_and_no_fault_of_the_scenario(self):
         run = states("unconfigured", processes=(died(1),), log=output(traceback("KeyError: 'x'")))
         assert "KeyError" in failing("lifecycle.state", run, **self.WANTED)
+
+    def test_a_contact_that_ended_the_run_is_no_fault_of_the_scenario(self):
+        driven = Truth(at(1.2), 0.9, 0.0, 0.0, 0.2, 0.0, 0.2, 0.0, "segments[0]")
+        run = states("unconfigured", truth=(replace(driven, contact=None), driven))
+        assert "drove into" in failing("lifecycle.state", run, **self.WANTED)
 
     def test_a_node_without_states_is_reported(self):
         run = states("unconfigured", services=())

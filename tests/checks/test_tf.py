@@ -281,6 +281,13 @@ class TestBroadcast:
         late = broadcasting(stamp=lambda t: t - 0.5)
         assert judge("tf.broadcast", late, **RIGHT).status is Status.PASSED
 
+    def test_the_stamp_of_a_message_that_came_later_is_none_of_its_source(self) -> None:
+        old = broadcasting(stamp=lambda _: None)
+        stamped = {"header": {"stamp": {"sec": 0, "nanosec": 0}}}
+        made = message(TIMES[0] + 0.01, stamped, topic="/at")
+        subject = replace(old, messages={**old.messages, "/at": (made,)})
+        assert "the stamp is 0" in failing("tf.broadcast", subject, **RIGHT)
+
     def test_a_best_effort_publisher_fails_as_tf2_gets_nothing_from_it(self) -> None:
         lossy = Qos("best_effort", "volatile", liveliness="automatic")
         subject = broadcasting(endpoints=(endpoint(TF, type=TYPE, qos=lossy),))

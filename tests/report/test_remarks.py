@@ -105,6 +105,11 @@ def test_a_topic_that_the_assignment_asks_for_is_no_robot_s() -> None:
     assert remarks(run(endpoints=(endpoint("/odom", Owner.STUDENT, Kind.SUBSCRIPTION),))) == ()
 
 
+def test_a_robot_is_not_the_only_one_to_publish_transforms() -> None:
+    own = endpoint("/tf", Owner.STUDENT, Kind.PUBLISHER)
+    assert remarks(run(endpoints=(replace(own, type="tf2_msgs/msg/TFMessage"),))) == ()
+
+
 def test_output_beyond_what_is_kept_and_another_domain_are_reported() -> None:
     process = Process("bot/bot", 7, 1, 2, 0, "SIGINT", 0.1, dropped_bytes=1)
     assert remarks(run(processes=(process,), environment={"other_domains": "5"})) == (

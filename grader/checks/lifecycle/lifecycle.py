@@ -9,6 +9,7 @@ from grader.checks.need import Act, Doubt, Stimulated
 from grader.checks.requests import timeline
 from grader.checks.service.service import judged_calls, why_slow
 from grader.diagnosis.explanation import mistaken
+from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.never_so import transition, why_not_managed
 from grader.diagnosis.process.not_called import ANSWER_S
 from grader.diagnosis.process.process_exit import why_ended
@@ -51,7 +52,8 @@ def state(recording: Recording, parameters: State) -> Finding:
     stop_if(why_slow(recording, calls, ANSWER_S))
     seen = [_state(call) for call in calls]
     if len(seen) < len(parameters.states):
-        stop_if(why_ended(recording))
+        # A contact ends the run, too.
+        stop_if(why_ended(recording) or why_touched(recording))
         text = f"the scenario asks for the state only {counted(len(seen), 'time')}"
         return Finding.ours(text)
     changes = [call for call in recording.calls if call.service == f"{node}/change_state"]

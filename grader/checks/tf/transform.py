@@ -5,6 +5,7 @@ The transforms between two frames are judged as the messages of a topic of their
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -67,9 +68,11 @@ class EdgeParameters(Parameters):
         symptom = NoTransform(recording, self.topic, self.parent, self.child)
         unheard = refused_by_tf2(symptom) or overwritten(symptom)
         stop_if(unheard if symptom.wanted else cause_of(symptom))
-        heard = (*recording.messages.values(), *recording.sent.values())
-        known = {stamp_of(one.value) for items in heard for one in items}
+        first_ns = _first_with(recording)
         for one in symptom.wanted:
+            # What came later, such as what is made of this transform, is no source of its stamp.
+            is_known = first_ns.get(one.stamp_ns, math.inf) <= one.message.stamp_ns
+            known = (one.stamp_ns,) if is_known else ()
             stop_if(explain(BadTransform(recording, one, known)))
         # Others may have come between: these are numbered anew.
         own = (
@@ -82,6 +85,13 @@ class EdgeParameters(Parameters):
     def words(self) -> str:
         """The transform in words."""
         return f"{edge(self.parent, self.child)} on {code(self.topic)}"
+
+
+def _first_with(recording: Recording) -> dict[int | None, int]:
+    """When the first message of each stamp was published, by the stamp."""
+    heard = (*recording.messages.values(), *recording.sent.values())
+    latest = sorted((one for items in heard for one in items), key=lambda one: -one.stamp_ns)
+    return {stamp_of(one.value): one.stamp_ns for one in latest}
 
 
 class Static(EdgeParameters):

@@ -157,12 +157,12 @@ def _posing(recording: Recording) -> Iterator[str]:
         if node.name.rpartition("/")[2] == PROBE_NODE:
             name = code(node.name)
             yield f"a node of the submission is called {name}, like the node that watches the run"
-    heard = [e for e in recording.endpoints if e.owner is Owner.PROBE]
-    # A robot is not the only one to publish transforms.
-    wanted = {e.topic for e in heard if recording.scene is None or e.type == TRANSFORMS}
+    heard = {e.topic for e in recording.endpoints if e.owner is Owner.PROBE}
+    posing = set(Untouched().topics) - (heard if recording.scene is None else set())
     taken: dict[str, set[str]] = {}
     for endpoint in recording.student_endpoints(Kind.PUBLISHER):
-        if endpoint.topic in set(Untouched().topics) - wanted:
+        # A robot is not the only one to publish transforms.
+        if endpoint.topic in posing and endpoint.type != TRANSFORMS:
             taken.setdefault(endpoint.node, set()).add(endpoint.topic)
     for node_name, topics in sorted(taken.items()):
         yield f"the node {code(node_name)} publishes on {codes(sorted(topics))}, which robots do"
