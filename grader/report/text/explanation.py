@@ -101,7 +101,7 @@ class Notes(NamedTuple):
 
 def notes_of_runs(result: Result) -> list[Notes]:
     """Names that were taken, limits of the sandbox, and what else is worth knowing."""
-    taken = tuple(f"{one.name} is `{one.value}`: {one.why}" for one in result.names)
+    taken = tuple(f"{one.name}: `{one.value}`, {one.why}" for one in result.names)
     reached = [(breach, run.id) for run in result.scenarios for breach in run.breaches]
     remarked = [(remark, run.id) for run in result.scenarios for remark in run.remarks]
     kinds = (("Limits of the sandbox that were reached", reached), ("Worth knowing", remarked))
