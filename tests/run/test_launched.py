@@ -76,3 +76,15 @@ def test_when_each_node_ended_after_sigint_is_told_by_launch() -> None:
 def test_other_processes_stay_as_they_are() -> None:
     given = ((died(1),), output(f"{BEGUN}\n[driver-1] a"), (declared("node", pid=7),))
     assert launched(set(), at(STOP_S), *given) == given
+
+
+def test_a_node_that_ends_cleanly_before_is_a_helper_and_no_early_end() -> None:
+    (launch, driver), _, _ = split(BEGUN, "[INFO] [driver-1]: process has finished cleanly [pid 7]")
+    assert (driver.exited_ns, driver.stopped_by) == (launch.exited_ns, "SIGINT")
+
+
+def test_an_id_that_a_program_makes_up_is_of_no_process() -> None:
+    forged = declared("node", name=FILE, node="/a", pid=[7])
+    log = output(BEGUN, stream="stdout", name=FILE)
+    processes, _, declarations = launched({FILE}, at(STOP_S), (process(FILE),), log, (forged,))
+    assert len(processes) == 1 and declarations == (forged,)
