@@ -7,7 +7,7 @@ verdict may depend on them.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
 
@@ -45,37 +45,57 @@ def with_origins(finding: Finding, parameters: Parameters, recording: Recording)
 
 
 def _places(seen: str, parameters: Parameters, recording: Recording) -> Iterator[SourceError]:
-    named = {value for _, value in parameters if isinstance(value, str)}
-    if recording.scene and "published" in parameters.about and not hasattr(parameters, "topic"):
-        # About the robot: it does what it is commanded.
-        named.add(recording.scene.command_topic)
-    kinds = tuple(kind for kind in parameters.about if kind in named) or parameters.about
-    published = {one.data.get("topic") for one in recording.declared("published")}
-    if "published" in kinds and named and not published & named:
-        # Nothing was published, and these are what should have done it.
-        kinds += ("timer", "publisher")
-    declared = {kind: recording.declared(kind) for kind in kinds}
-    timers = declared.pop("timer", ())
-    found = [
-        one
-        for items in declared.values()
-        for one in items
-        if (name := _name(one)) in named or f"`{name}`" in seen
-    ]
+    asked = _asked(parameters, recording)
+    kinds = _kinds(parameters, asked, recording)
+    declared = [one for kind in kinds if kind != "timer" for one in recording.declared(kind)]
+    observed = [one for one in declared if f"`{_name(one)}`" in seen]
     # What was observed, and only without that what was asked for.
-    found = [one for one in found if f"`{_name(one)}`" in seen] or found
+    found = observed or [one for one in declared if _name(one) in asked]
+    timers = recording.declared("timer") if "timer" in kinds else ()
+    for one in (*_timers_of(found, timers), *found):
+        place = _place(one, recording)
+        if place is not None:
+            yield place
+
+
+def _asked(parameters: Parameters, recording: Recording) -> set[str]:
+    """The names among the parameters of a check: its topic, its node."""
+    named = {value for _, value in parameters if isinstance(value, str)}
+    is_of_robot = "published" in parameters.about and not hasattr(parameters, "topic")
+    # The robot does what it is commanded.
+    command = {recording.scene.command_topic} if recording.scene and is_of_robot else set()
+    return named | command
+
+
+def _kinds(parameters: Parameters, asked: set[str], recording: Recording) -> tuple[str, ...]:
+    """The kinds of things that a check is about, such as its publisher and its timer."""
+    kinds = tuple(kind for kind in parameters.about if kind in asked) or parameters.about
+    published = {one.data.get("topic") for one in recording.declared("published")}
+    if "published" in kinds and asked and not published & asked:
+        # Nothing was published, and these are what should have done it.
+        return (*kinds, "timer", "publisher")
+    return kinds
+
+
+def _timers_of(found: Sequence[Declaration], timers: Sequence[Declaration]) -> list[Declaration]:
+    """The timers of the nodes that something else is of; of no other thing, all of them."""
     nodes = {one.data.get("node") for one in found}
     # A compiled process does not tell the node of a timer.
-    near = [one for one in timers if not nodes or one.data.get("node") in {*nodes, None}]
-    for one in [*near, *found]:
-        path = submission_path(str(one.data.get("file")), recording.submission)
-        words = _WORDS.get(one.kind, f"the {one.kind} {{}} is created here")
-        if path and isinstance(line := one.data.get("line"), int):
-            yield SourceError(path, line, words.format(_name(one)[:_LONGEST_NAME]))
-        elif "file" not in one.data and (call := _call_in_cpp(one, recording)):
-            name = one.data.get("topic", "")
-            text = words.format(str(name)[:_LONGEST_NAME]).replace("  ", " ")
-            yield SourceError(*call, text)
+    return [one for one in timers if not nodes or one.data.get("node") in {*nodes, None}]
+
+
+def _place(one: Declaration, recording: Recording) -> SourceError | None:
+    """Where something that a process declares is created: as it says itself, or by its source."""
+    words = _WORDS.get(one.kind, f"the {one.kind} {{}} is created here")
+    line = one.data.get("line")
+    path = submission_path(str(one.data.get("file")), recording.submission)
+    if path and isinstance(line, int):
+        return SourceError(path, line, words.format(_name(one)[:_LONGEST_NAME]))
+    call = _call_in_cpp(one, recording) if "file" not in one.data else None
+    if call is None:
+        return None
+    name = str(one.data.get("topic", ""))[:_LONGEST_NAME]
+    return SourceError(*call, words.format(name).replace("  ", " "))
 
 
 def _call_in_cpp(one: Declaration, recording: Recording) -> tuple[str, int] | None:
