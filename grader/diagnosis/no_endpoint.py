@@ -26,6 +26,7 @@ _OWN_SERVICE = re.compile(
 )
 _SEND_GOAL = "/_action/send_goal"
 _MOST_ROWS = 50
+_FUNCTION = re.compile(r"(\w+)(?:<\{full\}>)?\(")
 # The name becomes an argument, and a DDS participant that is not of ROS may use any.
 _NAME = re.compile(TOPIC)
 
@@ -44,6 +45,11 @@ class Word:
     does: str
     python: str
     cpp: str
+
+    @property
+    def functions(self) -> frozenset[str]:
+        """The functions of rclpy and rclcpp that make one."""
+        return frozenset(_FUNCTION.findall(f"{self.python} {self.cpp}"))
 
 
 PUBLISHER = Word(

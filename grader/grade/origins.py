@@ -6,12 +6,12 @@ verdict may depend on them.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
 
 from grader.checks.check import Parameters
+from grader.diagnosis.no_endpoint import PUBLISHER, SUBSCRIPTION
 from grader.diagnosis.process.raised import submission_path
 from grader.findings.finding import Finding
 from grader.recording.model import Declaration, Recording
@@ -23,8 +23,8 @@ _LONGEST_NAME = 200
 _NAMES = {"node": "node", "timer": "callback"}
 # Functions of rclcpp that create it.
 _CREATED_BY = {
-    "publisher": ("create_publisher",),
-    "subscription": ("create_subscription",),
+    "publisher": PUBLISHER.functions,
+    "subscription": SUBSCRIPTION.functions,
     "timer": ("create_wall_timer", "create_timer"),
 }
 _WORDS = {"published": "messages on {} are published here"}
@@ -108,8 +108,7 @@ def _call_in_cpp(one: Declaration, recording: Recording) -> tuple[str, int] | No
         for package in recording.submission.packages
         for file in package.sources
         for call in file.calls
-        if file.language == CPP
-        and re.split(r"\.|::", call.name)[-1] in _CREATED_BY.get(one.kind, ())
+        if file.language == CPP and call.short in _CREATED_BY.get(one.kind, ())
     ]
     topic = str(one.data.get("topic", ""))
     named = [(file, call) for file, call in calls if _is_named(topic, call.literal)]

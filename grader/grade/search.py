@@ -43,12 +43,6 @@ _DONE_BY = {
     "calls": ("has a client of {}", (CLIENT, ACTION_CLIENT)),
 }
 """How it is said that a node does something, and what it then has."""
-_CREATED_BY = {
-    "publishes": ("create_publisher",),
-    "subscribes": ("create_subscription",),
-    "serves": ("create_service", "ActionServer", "create_server"),
-    "calls": ("create_client", "ActionClient"),
-}
 _IN_SHARE = re.compile(r"(?:launch/)?[^/]*launch\.(?:py|xml|ya?ml)")
 _TYPE = re.compile(r"\w+/(?:msg|srv|action)/\w+")
 _MOST_PLACES = 10
@@ -315,7 +309,8 @@ def _does(recording: Recording, node: str, key: str, wanted: str) -> bool:
 
 def _creates(source: SourceFile, key: str, wanted: str) -> bool:
     """Whether a file creates what a role says, as far as its text shows."""
-    made = [one for one in source.calls if re.split(r"\.|::", one.name)[-1] in _CREATED_BY[key]]
+    functions = {name for word in _DONE_BY[key][1] for name in word.functions}
+    made = [one for one in source.calls if one.short in functions]
     if not _TYPE.fullmatch(wanted):
         return any(_is(wanted, f"/{one.literal.lstrip('/')}", "") for one in made)
     package, kind, name = wanted.split("/")

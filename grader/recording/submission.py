@@ -160,6 +160,11 @@ class SourceCall:
     line: int
     literal: str = ""
 
+    @property
+    def short(self) -> str:
+        """The name of the function alone."""
+        return _last(self.name)
+
 
 @dataclass(frozen=True)
 class SourceFile:
