@@ -167,32 +167,55 @@ def _too_few(right: Sequence[FoundClass], parameters: Class) -> Finding:
 
 def _why_not_as_asked(family: Family, item: FoundClass, parameters: Class) -> Finding | None:
     """What a class lacks of what is asked besides what it inherits; None if nothing."""
+    asks = (_why_not_so_abstract, _why_no_override, _why_not_declared, _why_declared_again)
+    return next(filter(None, (why(family, item, parameters) for why in asks)), None)
+
+
+def _why_not_so_abstract(family: Family, item: FoundClass, parameters: Class) -> Finding | None:
     name = code(item.found.name)
-    if parameters.abstract is not None and family.is_abstract(item) is not parameters.abstract:
-        if foreign := parameters.abstract and family.foreign(item):
-            seen = f"{name} inherits {codes(foreign)}, which was not handed in"
-            return Finding.ours(seen, "A person has to look whether the class is abstract.")
-        row = "not_abstract" if parameters.abstract else "abstract"
-        state = "is not abstract" if parameters.abstract else "is abstract"
-        return mistaken(row, f"{name} {state} ({_at(item)})", _shown([(item, state)]))
+    if parameters.abstract in (None, family.is_abstract(item)):
+        return None
+    if not parameters.abstract:
+        state = "is abstract"
+        return mistaken("abstract", f"{name} {state} ({_at(item)})", _shown([(item, state)]))
+    foreign = family.foreign(item)
+    if foreign:
+        seen = f"{name} inherits {codes(foreign)}, which was not handed in"
+        return Finding.ours(seen, "A person has to look whether the class is abstract.")
+    state = "is not abstract"
+    return mistaken("not_abstract", f"{name} {state} ({_at(item)})", _shown([(item, state)]))
+
+
+def _why_no_override(family: Family, item: FoundClass, parameters: Class) -> Finding | None:
     for method in parameters.overrides:
-        if lack := _why_not_overridden(family, item, method):
+        lack = _why_not_overridden(family, item, method)
+        if lack:
+            seen = f"{code(item.found.name)} {lack} ({_at(item)})"
             shown = _shown([(item, lack.replace("`", ""))])
-            return mistaken("not_overridden", f"{name} {lack} ({_at(item)})", shown, name=method)
+            return mistaken("not_overridden", seen, shown, name=method)
+    return None
+
+
+def _why_not_declared(_: Family, item: FoundClass, parameters: Class) -> Finding | None:
     declared = _members(item)
     for member in (*parameters.declares, *parameters.shares):
         if member not in declared:
             there = nearest(member, sorted(declared))
             near = f"; it has {code(there)}" if there else ""
-            seen = f"{name} does not declare {code(member)} ({_at(item)}){near}"
+            seen = f"{code(item.found.name)} does not declare {code(member)} ({_at(item)}){near}"
             shown = _shown([(item, f"{member} is not declared here")])
             return mistaken("declared_elsewhere", seen, shown, name=code(member))
+    return None
+
+
+def _why_declared_again(family: Family, item: FoundClass, parameters: Class) -> Finding | None:
+    name = code(item.found.name)
     for member in parameters.shares:
         for heir in family.heirs(item):
-            if (line := _members(heir).get(member)) is not None:
-                message = f"{member} is declared again"
+            line = _members(heir).get(member)
+            if line is not None:
+                place = SourceError(heir.file.path, line, f"{member} is declared again")
                 seen = f"{code(heir.found.name)}, which inherits {name}, declares {code(member)}"
-                place = SourceError(heir.file.path, line, message)
                 again = f"{seen} again ({place.file}:{line})"
                 shown = Evidence(places=(place,))
                 return mistaken("declared_again", again, shown, name=code(member), base=name)
