@@ -24,7 +24,7 @@ EXAMPLES = {
     file.parent.name: file.parent
     for file in (resources.root() / "docs" / "examples").glob("*/assignment.yaml")
 }
-COMPILED = ("custom_interface", "action_server", "group_project", "victim_report")
+COMPILED = ("custom_interface", "action_server", "group_project", "victim_report", "waypoints")
 NAMES = [
     pytest.param(name, marks=[pytest.mark.compiles] if name in COMPILED else [])
     for name in (*list_assignments(), *EXAMPLES)

@@ -38,6 +38,7 @@ from tests.checks.builder import (
     CHECKS,
     LAUNCH_NS,
     TWIST,
+    died,
     drive,
     judge,
     on_odometry,
@@ -67,6 +68,7 @@ PARAMETERS = {
     "node.exists": {"name": "bot_publisher"},
     "node.alive": {"name": "bot_publisher"},
     "node.ends": {"within": "2 s"},
+    "node.finishes": {},
     "topic.published": {"topic": "/cmd_vel"},
     "topic.subscribed": {"topic": "/cmd_vel"},
     "topic.type": {"topic": "/cmd_vel", "type": TWIST},
@@ -168,6 +170,8 @@ ABSENT = {
 def subject_of(name):
     if name.startswith("motion."):
         return ahead_to_the_goal()
+    if name == "node.finishes":
+        return recording(processes=(died(0),), ending=Ending.EXITED)
     return submission() if CHECKS[name].subject is Subject.SUBMISSION else recording()
 
 

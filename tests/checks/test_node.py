@@ -412,6 +412,25 @@ class TestAlive:
         assert judge("node.alive", run).status is Status.PASSED
 
 
+class TestFinishes:
+    def test_a_program_that_ends_by_itself_passes(self):
+        run = recording(processes=(died(0),), ending=Ending.EXITED)
+        assert judge("node.finishes", run).status is Status.PASSED
+
+    def test_one_that_runs_on_is_reported(self):
+        found = failing("node.finishes", recording())
+        assert "ran until SIGINT" in found
+        assert "Let spin return" in found
+
+    def test_one_that_runs_on_because_the_machine_was_busy_must_do_so_again(self):
+        run = recording(disturbance=taken(1.0, 4.0, waited_s=2.0))
+        assert judge("node.finishes", run).disturbed
+
+    def test_an_exception_is_no_end_of_its_work(self):
+        run = recording(processes=(died(1),), log=output(traceback("KeyError: 'x'")))
+        assert "KeyError" in failing("node.finishes", run)
+
+
 class TestEnds:
     def test_the_exit_status_does_not_matter(self):
         log = output(traceback("KeyboardInterrupt", source="rclpy.spin(node)"), time_s=4.55)

@@ -12,6 +12,7 @@ from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_node import meant_node, why_no_node, why_not_node
 from grader.diagnosis.process.not_called import left_s
 from grader.diagnosis.process.process_exit import (
+    crashed,
     ended_early,
     exited,
     offence,
@@ -199,6 +200,35 @@ def _vanished(recording: Recording, node: Node) -> bool:
         for message in recording.on(item.topic)[-1:]
     )
     return not (again or answered or published)
+
+
+class Finishes(Parameters):
+    """Parameters of node.finishes."""
+
+    asks = "the program ends by itself, with exit code 0"
+
+
+@check("node.finishes", Subject.RECORDING, Finishes, concept="nodes")
+def finishes(recording: Recording, parameters: Finishes) -> Finding:
+    """The program ends by itself when its work is done.
+
+    Judged by the process: it ended before the observation did, with exit code 0. The scenario has
+    to leave it the time, by its `timeout` or `until`.
+    """
+    stop_if(why_no_node(recording))
+    if not recording.processes:
+        return Finding("nothing was launched")
+    for process in crashed(recording):
+        stop_if(why_it_exited(recording, process))
+    stop_if(offence(recording))
+    running = [one for one in recording.processes if not ended_early(recording, one)]
+    if running:
+        seen = f"{codes(one.name for one in running)} ran until SIGINT (Ctrl-C)"
+        found = mistaken("never_ends", seen, Evidence(moments=(until_the_end(recording),)))
+        return found.doubted(declarations.was_held_up(recording))
+    ended = max(recording.processes, key=lambda one: one.exited_ns or 0)
+    shown = Evidence(moments=(_end(recording, ended),))
+    return Finding.as_asked("it ended by itself, with exit code 0", shown)
 
 
 class Ends(Parameters):
