@@ -12,13 +12,13 @@ from typing import Any
 
 from grader.assignment import rules, simulation
 from grader.assignment.binding import BoundCheck, bind
-from grader.assignment.contract.expand import expanded
+from grader.assignment.contract.expand import expanded, expanded_with
 from grader.assignment.group import ungrouped
 from grader.assignment.interfaces import Interfaces, field_problems, interface_problems
 from grader.assignment.model import NOTHING_WITHHELD, Assignment, Scenario, Withheld
 from grader.assignment.own_check import lesson_checks
 from grader.assignment.repeat import with_runs
-from grader.assignment.variable import Values, filled, read_variables
+from grader.assignment.variable import Values, read_variables
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.errors import AssignmentError, Problem, UsageError
@@ -115,7 +115,7 @@ def load_assignment(
     values = {name: str(one.example) for name, one in read_variables(written).items()}
     # A place that takes no variable is found here, and not when a submission is judged.
     expanded(written)
-    source = expanded(filled(written, values))
+    source = expanded_with(written, values)
     assignment, tried, found = bound_checks(source, catalogue)
     found += rules.problems(source, assignment, tried)
     for number, given in enumerate(assignment.underlays):

@@ -6,12 +6,12 @@ import dataclasses
 import math
 from collections.abc import Collection
 
-from grader.assignment.contract.expand import expanded
+from grader.assignment.contract.expand import expanded_with
 from grader.assignment.load import LoadedAssignment, bound_checks
 from grader.assignment.model import Visibility, Withheld
 from grader.assignment.mutant import required_by
 from grader.assignment.repeat import with_runs
-from grader.assignment.variable import Values, filled
+from grader.assignment.variable import Values
 from grader.checks.check import Subject
 from grader.errors import AssignmentError, UsageError
 from grader.spec.nearest_name import nearest_or_all
@@ -89,7 +89,7 @@ def with_values(loaded: LoadedAssignment, values: Values) -> LoadedAssignment:
     """
     if loaded.source is None or values == loaded.values:
         return loaded
-    source = expanded(filled(loaded.source, values))
+    source = expanded_with(loaded.source, values)
     assignment, bound, problems = bound_checks(source)
     if problems:
         raise AssignmentError(source.file, problems)

@@ -128,6 +128,10 @@ class Variable(Model):
         steps = str(self.example).split("/")
         return steps[1] if self.in_ == "interfaces" and len(steps) == _STEPS else ""
 
+    def whole(self, name: str) -> str:
+        """A name as it is in runs, where it begins with a slash."""
+        return f"/{name.lstrip('/')}" if self.is_of_runs and self.in_ != "parameters" else name
+
     @property
     def part(self) -> str:
         """Regular expression of its values; of `any` they are whole names."""
@@ -188,7 +192,7 @@ def alike(name: str, variables: Mapping[str, Variable]) -> list[str]:
         other
         for other, one in variables.items()
         if own.match == one.match == ANY
-        and (own.in_, own.of, own.where) == (one.in_, one.of, one.where)
+        and (own.in_, own.kind, own.of, own.where) == (one.in_, one.kind, one.of, one.where)
     ]
 
 
@@ -231,7 +235,8 @@ def read_variables(source: Source) -> dict[str, Variable]:
                 text = f"{said!r} may have only variables in it that stand above {name!r}"
                 problems.append(source.problem((KEY, name, key), text))
         for other, one in found.items():
-            same = (variable.in_, variable.of, variable.where) == (one.in_, one.of, None)
+            mine = (variable.in_, variable.kind, variable.of, variable.where)
+            same = mine == (one.in_, one.kind, one.of, None)
             if same and variable.match == one.match == ANY:
                 text = f"{other!r} takes any name of the {variable.in_} already: give one a form"
                 text += ", another 'of', or both the same 'where'"

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from grader.assignment.contract.expand import expanded
+from grader.assignment.contract.expand import expanded_with
 from grader.assignment.contract.table import with_table
 from grader.assignment.load import ASSIGNMENT_FILE, LoadedAssignment
 from grader.assignment.model import Assignment, Visibility
@@ -15,7 +15,6 @@ from grader.assignment.mutant import LANGUAGES
 from grader.assignment.own_check import FOLDER, lesson_checks
 from grader.assignment.repeat import runs_of
 from grader.assignment.selection import visible_part
-from grader.assignment.variable import filled
 from grader.grading.reference_run import REFERENCE_FILE, only_scenarios
 from grader.report.html.handout import HANDOUT_FILE
 from grader.spec.document import write_yaml
@@ -74,7 +73,7 @@ def _visible_data(loaded: LoadedAssignment, part: LoadedAssignment) -> dict[str,
     assert loaded.source is not None
     data = loaded.source.data
     shown = {scenario.id for scenario in part.assignment.scenarios}
-    scenarios = expanded(filled(loaded.source, loaded.values)).read(Assignment).scenarios
+    scenarios = expanded_with(loaded.source, loaded.values).read(Assignment).scenarios
     # Those of a contract come first, and none of them is hidden.
     written = data.get("checks") or []
     bounds = loaded.checks[len(loaded.checks) - len(written) :]

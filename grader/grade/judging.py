@@ -205,10 +205,13 @@ class _Known:
 
 
 def _with_reason(item: ScenarioFinding, unnamed: Unnamed | None) -> ScenarioFinding:
-    """A failure to find the author's example, as what it is: nothing has the role."""
-    if unnamed is None or item.finding.status is not Status.FAILED:
+    """What was judged under the author's example, as what it is: nothing has the role."""
+    if unnamed is None or item.finding.status not in (Status.FAILED, Status.PASSED):
         return item
     why = unnamed.finding
+    if item.finding.status is Status.PASSED:
+        # Only its name is that of the example.
+        return replace(item, finding=why)
     finding = replace(item.finding, expected=why.expected, observed=why.observed, hint=why.hint)
     return replace(item, finding=finding)
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 
+from grader.assignment.contract.expand import expanded
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.selection import with_values
-from grader.assignment.variable import Variable
+from grader.assignment.variable import Variable, alike
 from grader.checks.interface.interface import Found as InterfaceFound
 from grader.checks.interface.interface import OfInterface
 from grader.checks.package.package import PackageFound
@@ -89,8 +91,10 @@ def _with_chosen(
     wrong = _wrong_answer(variables, submission)
     if wrong is not None:
         return loaded, (Unnamed(wrong, frozenset(variables)),), ()
-    given, answers, values = dict(submission.given), dict(submission.answers), dict[str, str]()
+    given, values = dict(submission.given), dict[str, str]()
+    answers = {name: variables[name].whole(value) for name, value in submission.answers}
     unnamed: list[Unnamed] = []
+    absent: list[Unnamed] = []
     chosen: list[Chosen] = []
     for name, variable in variables.items():
         told = given.get(name)
@@ -99,11 +103,20 @@ def _with_chosen(
             continue
         if told or variable.match is None:
             raise UsageError(_not_given(name, variable, told))
+        lost = next((one for one in absent if _is_of(variable, one.variables)), None)
+        if lost is not None and name not in answers:
+            values[name] = str(variable.example)
+            can_run = lost.can_run and not _is_used_in_runs(name, loaded)
+            absent[absent.index(lost)] = Unnamed(lost.finding, lost.variables | {name}, can_run)
+            continue
         search = Search(loaded, submission, recordings, name, variable, {**answers, **values})
         found = answers.get(name) or search.chosen()
         if found is not None:
             values[name] = found
-            if name in answers:
+            why_wrong = search.why_wrong(found) if name in answers else None
+            if why_wrong is not None:
+                unnamed.append(Unnamed(why_wrong, frozenset((name,)), can_run=True))
+            elif name in answers:
                 chosen.append(Chosen(name, found, f"as {code(ANSWERS_FILE)} says"))
             elif variable.where is not None:
                 chosen.append(Chosen(name, found, search.reason))
@@ -116,12 +129,11 @@ def _with_chosen(
             if why_not is not None:
                 unnamed.append(Unnamed(why_not, frozenset((name,)), can_run=True))
             continue
-        unknown = frozenset(variables.keys() - values.keys())
-        unnamed.append(Unnamed(why_not or search.why_none(), unknown))
-        values = {**loaded.values, **values}
-        break
+        values[name] = str(variable.example)
+        why_not = why_not or search.why_none()
+        absent.append(Unnamed(why_not, frozenset((name,)), not _is_used_in_runs(name, loaded)))
     try:
-        return with_values(loaded, values), tuple(unnamed), tuple(chosen)
+        return with_values(loaded, values), (*absent, *unnamed), tuple(chosen)
     except AssignmentError as error:
         names = codes(f"{name}: {value}" for name, value in values.items())
         seen = f"with {names}, {error.problems[0].message}"
@@ -129,11 +141,23 @@ def _with_chosen(
         return loaded, (Unnamed(why, frozenset(variables)),), ()
 
 
+def _is_used_in_runs(name: str, loaded: LoadedAssignment) -> bool:
+    """Whether no run can be made without a name: a launch file needs none of an executable."""
+    source = expanded(loaded.source) if loaded.source else None
+    return source is not None and f"{{{name}}}" in json.dumps(source.data.get("scenarios"))
+
+
+def _is_of(variable: Variable, names: Collection[str]) -> bool:
+    """Whether what is looked for is described by one of some names."""
+    said = f"{variable.match} {variable.of} {variable.where}"
+    return any(f"{{{name}}}" in said for name in names)
+
+
 def _wrong_answer(
     variables: Mapping[str, Variable], submission: SubmissionRecord
 ) -> Finding | None:
     """What is wrong with the file in which a submission says what is meant, or None."""
-    wrong = submission.answers_problem
+    wrong, answers = submission.answers_problem, dict(submission.answers)
     for name, value in () if wrong else submission.answers:
         variable = variables.get(name)
         if variable is None:
@@ -142,6 +166,11 @@ def _wrong_answer(
             wrong = f"{name!r} is not yours to choose: it is given"
         elif not re.fullmatch(variable.part, value):
             wrong = f"{name!r} cannot be {value!r}: its form is {variable.match}"
+        else:
+            same = [one for one in alike(name, variables) if one != name and one in answers]
+            whole = variable.whole(value)
+            if other := next((one for one in same if variable.whole(answers[one]) == whole), None):
+                wrong = f"{name!r} and {other!r} cannot both be {whole!r}"
     if not wrong:
         return None
     asked = f"a line such as `name: value` for each name in {code(ANSWERS_FILE)}"

@@ -73,7 +73,7 @@ class Search:
     def role(self) -> Role:
         """What is looked for does this, with the names that are known."""
         written = self.variable.where or Role()
-        return Role(**fill(written.model_dump(exclude_defaults=True), self.values))
+        return Role(**fill(written.model_dump(mode="json", exclude_defaults=True), self.values))
 
     @property
     def noun(self) -> str:
@@ -90,7 +90,8 @@ class Search:
         """The only one; of several of one role, each has the next in the order of their names."""
         found = self._free()
         same = [one for one in self._same if one == self.name or one not in self.values]
-        return found[same.index(self.name)] if len(found) == len(same) else None
+        place = same.index(self.name)
+        return found[place] if place < len(found) <= len(same) else None
 
     @property
     def is_open(self) -> bool:
@@ -103,16 +104,20 @@ class Search:
         if self.variable.where is None:
             return []
         plain = self.variable.model_copy(update={"where": None})
-        return sorted(replace(self, variable=plain).found())
+        return sorted(replace(self, variable=plain).found().keys() - self._taken)
 
     @property
     def _same(self) -> list[str]:
         return alike(self.name, self.loaded.assignment.variables) or [self.name]
 
     def _free(self) -> list[str]:
-        """The names that no other variable of the same role has."""
-        taken = {self.values[one] for one in self._same if one in self.values}
-        return sorted(self.found().keys() - taken)
+        """The names of its form that no other variable of the same role has."""
+        return sorted(self.found().keys() - self._taken)
+
+    @property
+    def _taken(self) -> set[str]:
+        """The names that other variables of the same role have."""
+        return {self.values[one] for one in self._same if one in self.values and one != self.name}
 
     def is_of_what_was_not_built(self) -> bool:
         """Whether it is of what a build makes, and the package was not built."""
@@ -219,7 +224,7 @@ class Search:
     @property
     def reason(self) -> str:
         """Why a name is taken for it."""
-        found = self._free()
+        found = sorted(self.found())
         return f"the only {self.asked}" if len(found) == 1 else f"one {self.asked}: {codes(found)}"
 
     def why_open(self) -> Finding:
@@ -229,6 +234,20 @@ class Search:
         return Finding(
             f"there are {codes(found)}, and it cannot be seen which of them is meant",
             f"Say which one: hand in a file {code(ANSWERS_FILE)} too, with a line such as {line}.",
+            verdict=Verdict.ASKS,
+            expected=f"one {self.asked}",
+        )
+
+    def why_wrong(self, answer: str) -> Finding | None:
+        """Why what the submission says is not what is looked for, as far as runs show it."""
+        found = self.found() if self.variable.is_of_runs else {}
+        if answer in found or not (found or self.others):
+            return None
+        if not found:
+            return self.why_none()
+        return Finding(
+            f"{code(ANSWERS_FILE)} says {code(answer)}, and there is {codes(sorted(found))}",
+            f"Correct the line of {code(self.name)} in it.",
             verdict=Verdict.ASKS,
             expected=f"one {self.asked}",
         )
@@ -247,7 +266,8 @@ class Search:
                 best = min(lacks, key=lambda node: len(lacks[node]))
                 seen += f"; {code(best)} comes nearest, and lacks this: {_said(lacks[best])}"
                 hint = f"{code(f'ros2 node info {best}')} lists what a node has."
-            return Finding.failed(f"one {self.asked}, under any name", seen, hint)
+            beside = f" beside {codes(sorted(self._taken))}" if self._taken else ""
+            return Finding.failed(f"one {self.asked}{beside}, under any name", seen, hint)
         offered, fitting = list(self.offered()), self.found().values()
         shape = fill_text(str(variable.match), self.values)
         like = code(str(variable.example) if shape == ANY else fill_text(shape, self.loaded.values))

@@ -24,7 +24,14 @@ EXAMPLES = {
     file.parent.name: file.parent
     for file in (resources.root() / "docs" / "examples").glob("*/assignment.yaml")
 }
-COMPILED = ("custom_interface", "action_server", "group_project", "victim_report", "waypoints")
+COMPILED = (
+    "action_server",
+    "custom_interface",
+    "group_project",
+    "rescue_team",
+    "victim_report",
+    "waypoints",
+)
 NAMES = [
     pytest.param(name, marks=[pytest.mark.compiles] if name in COMPILED else [])
     for name in (*list_assignments(), *EXAMPLES)

@@ -129,7 +129,7 @@ def test_two_names_that_fit_are_both_told(loaded: LoadedAssignment) -> None:
 
 
 def test_which_of_two_is_meant_is_a_question_and_costs_nothing(loaded: LoadedAssignment) -> None:
-    record = submission("group7_gp2", scripts=("bot", "test"))
+    record = submission("group7_gp2", "red_maps", scripts=("bot", "test"))
     (why,) = with_chosen_names(loaded, record).unnamed
     assert why.finding.expected == "one executable of `group7_gp2`"
     assert why.finding.observed.startswith("there are `bot` and `test`")

@@ -10,8 +10,15 @@ import pytest
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.findings.finding import Status
 from grader.grade import Grade, judge_all
+from grader.grade.naming import with_chosen_names
 from grader.recording.model import Kind, Node, Owner, Recording
-from grader.recording.submission import PackageRecord, SourceCall, SourceFile, SubmissionRecord
+from grader.recording.submission import (
+    Definition,
+    PackageRecord,
+    SourceCall,
+    SourceFile,
+    SubmissionRecord,
+)
 from tests.checks.builder import TWIST, endpoint, node, package, recording, submission
 
 SCAN, FLOAT = "sensor_msgs/msg/LaserScan", "std_msgs/msg/Float32"
@@ -178,6 +185,10 @@ def test_where_there_is_no_node_the_check_itself_says_why(loaded: LoadedAssignme
     [
         ((("naer", "/eyes"),), "there is no name 'naer' to choose. Did you mean 'near'?"),
         ((("near", ""),), "'near' cannot be '': its form is any"),
+        (
+            (("first", "one/brain"), ("second", "/one/brain")),
+            "'second' and 'first' cannot both be '/one/brain'",
+        ),
     ],
 )
 def test_a_wrong_line_of_the_file_is_told_and_costs_nothing(
@@ -186,3 +197,129 @@ def test_a_wrong_line_of_the_file_is_told_and_costs_nothing(
     grade = graded(loaded, own(answers=answers), *RIGHT)
     assert not grade.graded
     assert {one.decisive.finding.observed for one in grade.results} == {told}
+
+
+def test_of_two_of_one_role_one_is_found_where_only_one_is_there(loaded: LoadedAssignment) -> None:
+    grade = graded(loaded, own(), *RIGHT[:2])
+    assert values(grade)["first"] == "/one/brain"
+    assert grade.result("one").status is Status.PASSED
+    finding = grade.result("two").decisive.finding
+    assert finding.expected == (
+        "one node that publishes on `cmd_vel` beside `/one/brain`, under any name"
+    )
+    assert finding.observed == (
+        "found only `/eyes`; `/eyes` comes nearest, and lacks this: publishes on `cmd_vel`"
+    )
+
+
+def test_a_node_that_has_only_the_name_of_the_example_has_no_role(loaded: LoadedAssignment) -> None:
+    same = ends("/perception", {"/scan": SCAN}, {"/near": FLOAT})
+    result = graded(loaded, own(), same, *RIGHT[1:]).result("sees")
+    assert result.status is Status.FAILED
+    assert "`/perception` comes nearest, and lacks this" in result.decisive.finding.observed
+
+
+FREE = """\
+rosgrade: 1
+id: free
+title: A team
+variables:
+  talk: {match: any, in: interfaces, example: team_msgs/msg/Talk}
+  ask: {match: any, in: interfaces, example: team_msgs/srv/Ask}
+  talker: {match: any, in: executables, where: {publishes: ["{talk}"]}, example: talker}
+  asker: {match: any, in: executables, where: {serves: ["{ask}"]}, example: asker}
+  node: {match: any, in: nodes, where: {publishes: ["{talk}"]}, example: /talker}
+contract:
+  packages:
+    bot_publisher:
+      executables:
+        "{talker}": {ids: talker, publishes: {/talk: {type: "{talk}"}}}
+        "{asker}": {ids: asker, serves: {/ask: {type: "{ask}"}}}
+  points: {package: 1, talker_executable: 1, asker_executable: 1, talker_topic: 1, asker_service: 1}
+scenarios:
+  - id: main
+    launch: [{file: team.launch.py}]
+    record: [{topic: /talk, type: "{talk}"}]
+    timeout: 5 s
+checks:
+  - {id: fields, uses: interface.fields, with: {interface: "{ask}", definition: "---"}, points: 1}
+  - {id: node, uses: node.exists, with: {name: "{node}"}, points: 1}
+"""
+
+
+@pytest.fixture
+def free(tmp_path: Path) -> LoadedAssignment:
+    folder = tmp_path / "free"
+    folder.mkdir()
+    (folder / "assignment.yaml").write_text(FREE, encoding="utf-8")
+    return load_assignment(folder)
+
+
+def team(*definitions: Definition, **programs: tuple[str, ...]) -> SubmissionRecord:
+    """A package with interfaces, and one with programs of these types."""
+    interfaces = PackageRecord("own", "own", "ament_cmake", generated=definitions)
+    mine: PackageRecord = package(
+        entry_points=tuple((name, f"bot_publisher.{name}:main") for name in programs),
+        executables=tuple(programs),
+        sources=tuple(
+            dataclasses.replace(
+                source(name, *types),
+                calls=(SourceCall("create_publisher", 7), SourceCall("create_service", 8)),
+            )
+            for name, types in programs.items()
+        ),
+    )
+    return dataclasses.replace(submission(mine), packages=(mine, interfaces))
+
+
+WORD = Definition("msg/Word.msg", "string text\n")
+QUESTION = Definition("srv/Question.srv", "---\n")
+
+
+def test_a_message_and_a_service_of_any_name_are_told_apart_by_their_kind(
+    free: LoadedAssignment,
+) -> None:
+    record = team(WORD, QUESTION, say=("own.msg.Word",), hear=("own.srv.Question",))
+    found = values(graded(free, record, ends("/me", {}, {"/talk": "own/msg/Word"})))
+    assert (found["talk"], found["ask"]) == ("own/msg/Word", "own/srv/Question")
+    # Also what a list says may be a variable.
+    assert (found["talker"], found["asker"], found["node"]) == ("say", "hear", "/me")
+
+
+def test_one_program_may_have_two_roles_of_the_contract(free: LoadedAssignment) -> None:
+    record = team(WORD, QUESTION, all=("own.msg.Word", "own.srv.Question"))
+    grade = graded(free, record, ends("/me", {}, {"/talk": "own/msg/Word"}))
+    assert (values(grade)["talker"], values(grade)["asker"]) == ("all", "all")
+    passed = {one.id for one in grade.results if one.status is Status.PASSED}
+    assert passed >= {"package", "talker_executable", "asker_executable", "node"}
+
+
+def test_what_is_not_there_is_lost_with_what_is_described_by_it_and_nothing_else(
+    free: LoadedAssignment,
+) -> None:
+    # Without a message no run can be recorded.
+    named = with_chosen_names(free, team(QUESTION, hear=("own.srv.Question",)))
+    assert {one for why in named.unnamed for one in why.variables} == {"talk", "talker", "node"}
+    assert not any(why.can_run for why in named.unnamed)
+    assert named.loaded.values["ask"] == "own/srv/Question"
+    # An executable that no launch names is not needed for a run.
+    named = with_chosen_names(free, team(WORD, QUESTION, say=("own.msg.Word",)))
+    assert [(why.variables, why.can_run) for why in named.unnamed] == [(frozenset({"asker"}), True)]
+
+
+def test_the_submission_cannot_say_what_has_not_the_role(loaded: LoadedAssignment) -> None:
+    grade = graded(loaded, own(answers=(("second", "/eyes"),)), *RIGHT)
+    finding = grade.result("two").decisive.finding
+    assert finding.asks and not grade.graded
+    assert finding.observed == (
+        "`rosgrade.yaml` says `/eyes`, and there is `/one/brain` and `/two/brain`"
+    )
+    # Where nothing has it, this is no question.
+    grade = graded(loaded, own(answers=(("near", "/eyes"),)), ends("/eyes", {"/scan": SCAN}, {}))
+    assert grade.result("sees").status is Status.FAILED
+
+
+def test_the_submission_may_leave_out_the_slash(loaded: LoadedAssignment) -> None:
+    grade = graded(loaded, own(answers=(("first", "two/brain"),)), *RIGHT)
+    assert grade.full_points
+    assert (values(grade)["first"], values(grade)["second"]) == ("/two/brain", "/one/brain")

@@ -8,6 +8,7 @@ from typing import Any
 
 from grader.assignment.contract.derive import Derivation, Derived
 from grader.assignment.contract.model import Contract
+from grader.assignment.variable import Values, filled
 from grader.errors import AssignmentError
 from grader.spec.document import Place
 from grader.spec.rewriting import Rewriting
@@ -92,6 +93,17 @@ def _note(written: Rewriting, place: Place, made: _Made) -> None:
         for step in inside:
             value = value[step]
         written.made(value, origin, (*place, *inside))
+
+
+def expanded_with(source: Source, values: Values) -> Source:
+    """The same with values in the places of its variables.
+
+    Two variables may have one value, such as a program that runs both robots. As keys of the
+    contract they would be one part of it, and so they are filled in last.
+    """
+    if len({*values.values()}) < len(values):
+        return filled(expanded(source), values)
+    return expanded(filled(source, values))
 
 
 _ORDER = ("rosgrade", "id", "title", "variables", "packages")

@@ -1,0 +1,28 @@
+"""Builds and installs the package."""
+
+from setuptools import find_packages, setup
+
+package_name = 'red_rescue'
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    packages=find_packages(exclude=['test']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
+        ('share/' + package_name, ['package.xml']),
+        ('share/' + package_name + '/launch', ['launch/team.launch.py']),
+    ],
+    install_requires=['setuptools'],
+    zip_safe=True,
+    maintainer='Student',
+    maintainer_email='student@example.com',
+    description='A team of robots that rescues victims.',
+    license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            'scout = red_rescue.scout:main',
+            'medic = red_rescue.medic:main',
+        ],
+    },
+)
