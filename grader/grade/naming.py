@@ -115,7 +115,8 @@ def _with_chosen(
             values[name] = found
             why_wrong = search.why_wrong(found) if name in answers else None
             if why_wrong is not None:
-                unnamed.append(Unnamed(why_wrong, frozenset((name,)), can_run=True))
+                can_run = variable.is_of_runs or not _is_used_in_runs(name, loaded)
+                unnamed.append(Unnamed(why_wrong, frozenset((name,)), can_run))
             elif name in answers:
                 chosen.append(Chosen(name, found, f"as {code(ANSWERS_FILE)} says"))
             elif variable.where is not None:
@@ -138,6 +139,8 @@ def _with_chosen(
         names = codes(f"{name}: {value}" for name, value in values.items())
         seen = f"with {names}, {error.problems[0].message}"
         why = Finding.failed("names that ROS allows", seen, "Choose another name.")
+        if answers:
+            why = replace(why, verdict=Verdict.ASKS, hint=f"Look at {code(ANSWERS_FILE)}.")
         return loaded, (Unnamed(why, frozenset(variables)),), ()
 
 

@@ -239,8 +239,11 @@ class Search:
         )
 
     def why_wrong(self, answer: str) -> Finding | None:
-        """Why what the submission says is not what is looked for, as far as runs show it."""
-        found = self.found() if self.variable.is_of_runs else {}
+        """Why what the submission says is not what is looked for, as far as that is known."""
+        found = {*self.found()}
+        if not self.variable.is_of_runs:
+            # The source shows roughly what a program does, and surely whether it is there.
+            found |= {*self.others}
         if answer in found or not (found or self.others):
             return None
         if not found:

@@ -199,6 +199,22 @@ def test_a_wrong_line_of_the_file_is_told_and_costs_nothing(
     assert {one.decisive.finding.observed for one in grade.results} == {told}
 
 
+@pytest.mark.parametrize(
+    ("answers", "told"),
+    [
+        ((("driver", "nosuch"),), "`rosgrade.yaml` says `nosuch`, and there is `go` and `look`"),
+        ((("near", "two words"),), "'/two words' is not"),
+    ],
+)
+def test_an_answer_that_names_nothing_is_asked_again_and_costs_nothing(
+    loaded: LoadedAssignment, answers: tuple[tuple[str, str], ...], told: str
+) -> None:
+    grade = graded(loaded, own(answers=answers), *RIGHT)
+    assert not grade.graded
+    assert any(told in one.decisive.finding.observed for one in grade.results)
+    assert all(one.status is not Status.FAILED for one in grade.results)
+
+
 def test_of_two_of_one_role_one_is_found_where_only_one_is_there(loaded: LoadedAssignment) -> None:
     grade = graded(loaded, own(), *RIGHT[:2])
     assert values(grade)["first"] == "/one/brain"
