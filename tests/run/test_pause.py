@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from grader.findings.finding import Finding, Status
+from grader.grading.next_runs import MOST_ROUNDS
 from tests.checks.builder import CHECKS
 from tests.run.conftest import RunNode
 from tests.run.nodes import HEADER
@@ -170,11 +171,14 @@ WRONG = {
 
 
 def judged(run_node: RunNode, main: str) -> Finding:
-    """executor.timer of a node."""
-    recording = run_node(NODE % main, pauses=True, until={"messages": 6})
+    """executor.timer of a node, in a run that is repeated as a grade repeats it."""
     check = CHECKS["executor.timer"]
-    finding = check.judge(recording, check.parameters.model_validate({"topic": "/cmd_vel"}))
-    assert recording.pauses, recording.ending
+    for _ in range(MOST_ROUNDS):
+        recording = run_node(NODE % main, pauses=True, until={"messages": 6})
+        finding = check.judge(recording, check.parameters.model_validate({"topic": "/cmd_vel"}))
+        assert recording.pauses, recording.ending
+        if not finding.disturbed:
+            break
     return finding
 
 
