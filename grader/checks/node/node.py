@@ -7,6 +7,7 @@ from functools import partial
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
+from grader.checks.doubt import HELD_UP_S
 from grader.checks.wrong_name import Named, misnamed
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_node import meant_node, why_no_node, why_not_node
@@ -40,8 +41,6 @@ from grader.spec.unit import format_duration
 
 _APART_S = 0.01
 """Two looks for ended processes: what is nearer has no order."""
-_HELD_UP_S = 0.1
-"""As long as a wait on a quiet machine may make an order that nothing enforces."""
 
 
 class Starts(Parameters):
@@ -308,7 +307,7 @@ def _why_other_order(recording: Recording, node: str, before: str) -> Finding | 
     found = mistaken("ends_first", seen, Evidence(moments=tuple(ends)), node=code(node))
     # One that waits for a fixed time may be overtaken on a busy machine.
     took_s = recording.stolen_s(recording.stop_ns, max(ended_ns.values()))
-    return found.doubted(took_s > _HELD_UP_S)
+    return found.doubted(took_s > HELD_UP_S)
 
 
 def _was_killed(recording: Recording, process: Process) -> bool:

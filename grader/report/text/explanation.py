@@ -99,14 +99,18 @@ class Notes(NamedTuple):
     lines: tuple[str, ...]
 
 
+def names_taken(result: Result) -> list[Notes]:
+    """What was taken for names that the assignment leaves free, and why."""
+    taken = tuple(f"{one.name}: `{one.value}`, {one.why}" for one in result.names)
+    return [Notes("Names that were taken", taken)] if taken else []
+
+
 def notes_of_runs(result: Result) -> list[Notes]:
     """Names that were taken, limits of the sandbox, and what else is worth knowing."""
-    taken = tuple(f"{one.name}: `{one.value}`, {one.why}" for one in result.names)
     reached = [(breach, run.id) for run in result.scenarios for breach in run.breaches]
     remarked = [(remark, run.id) for run in result.scenarios for remark in run.remarks]
     kinds = (("Limits of the sandbox that were reached", reached), ("Worth knowing", remarked))
-    names = [Notes("Names that were taken", taken)] if taken else []
-    return names + [Notes(title, _lines(found)) for title, found in kinds if found]
+    return names_taken(result) + [Notes(title, _lines(found)) for title, found in kinds if found]
 
 
 def _lines(found: Sequence[tuple[str, str]]) -> tuple[str, ...]:
