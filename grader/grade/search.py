@@ -268,7 +268,7 @@ class Search:
                 }
                 best = min(lacks, key=lambda node: len(lacks[node]))
                 seen += f"; {code(best)} comes nearest, and lacks this: {_said(lacks[best])}"
-                hint = f"{code(f'ros2 node info {best}')} lists what a node has."
+                hint = f"Add it there. {code(f'ros2 node info {best}')} lists what the node has."
             beside = f" beside {codes(sorted(self._taken))}" if self._taken else ""
             return Finding.failed(f"one {self.asked}{beside}, under any name", seen, hint)
         offered, fitting = list(self.offered()), self.found().values()
