@@ -13,11 +13,12 @@ Defaults are those of TurtleBot3 in Gazebo, or the text says why not:
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
 from grader.spec.name import topic_name
 from grader.spec.quantity import (
@@ -280,13 +281,14 @@ class SimulatorOptions(Model):
     lidar: LidarOptions = Field(default_factory=LidarOptions)
     odometry: OdometryOptions = Field(default_factory=OdometryOptions)
     topics: Topics = Field(default_factory=Topics)
+    _prefix: str = PrivateAttr("")
 
     @property
     def fixed_frames(self) -> list[tuple[str, str, Pose, float]]:
         """What /tf_static says: parent, child, pose and height of the child, in metres."""
-        base, robot = self.odometry.child_frame, self.robot.model
-        scan = ("base_link", self.lidar.frame, self.lidar.pose, _SCAN_Z_M[robot])
-        return [(base, "base_link", ORIGIN, _BASE_Z_M), scan] if base != "base_link" else [scan]
+        base, link = self.odometry.child_frame, f"{self._prefix}base_link"
+        scan = (link, self.lidar.frame, self.lidar.pose, _SCAN_Z_M[self.robot.model])
+        return [(base, link, ORIGIN, _BASE_Z_M), scan] if base != link else [scan]
 
     @property
     def transforms(self) -> set[tuple[str, str]]:
@@ -295,6 +297,34 @@ class SimulatorOptions(Model):
             return set()
         fixed = {(parent, child) for parent, child, _, _ in self.fixed_frames}
         return {(self.odometry.frame, self.odometry.child_frame), *fixed}
+
+    def each(self, robots: Mapping[str, RobotOptions]) -> dict[str, SimulatorOptions]:
+        """The same for each of several robots, by their names; without any for the only one."""
+        return {name: self._named(name, one) for name, one in robots.items()} or {"": self}
+
+    def _named(self, name: str, robot: RobotOptions) -> SimulatorOptions:
+        """Its topics and its frames begin with its name.
+
+        The transforms of all robots are on the same two topics, as with the ``frame_prefix`` of
+        robot_state_publisher, and there is one clock.
+        """
+        topics = {
+            key: topic.model_copy(update={"topic": f"/{name}{topic.topic}"})
+            for key, topic in self.topics
+            if key not in ("tf", "clock")
+        }
+        frames = {
+            "frame": f"{name}/{self.odometry.frame}",
+            "child_frame": f"{name}/{self.odometry.child_frame}",
+        }
+        found = SimulatorOptions(
+            robot=robot,
+            lidar=self.lidar.model_copy(update={"frame": f"{name}/{self.lidar.frame}"}),
+            odometry=self.odometry.model_copy(update=frames),
+            topics=self.topics.model_copy(update=topics),
+        )
+        found._prefix = f"{name}/"
+        return found
 
     def start(self, world_start: Pose) -> Pose:
         """Where the robot starts in a world with this ``start``."""

@@ -65,9 +65,10 @@ def run(
     try:
         node: Any = make_node("rosgrade_sim", context)
         screen = Screen(simulation)
-        screen.simulator = RosSimulator(node, simulation, screen)
+        simulator = RosSimulator(node, {"": simulation}, screen)
+        screen.robot = simulator.robots[""]
         with suppress(KeyboardInterrupt):
-            _loop(screen.simulator, screen, None if duration is None else round(duration * NS))
+            _loop(simulator, screen, None if duration is None else round(duration * NS))
         node.destroy_node()
     finally:
         signal.signal(signal.SIGTERM, before)

@@ -17,10 +17,13 @@ Sources of the figures:
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from sim.description import RobotOptions
+from sim.description import RobotOptions, SimulatorOptions
 from sim.motion import Twist
+from sim.shapes import Body
+from sim.world import World
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +66,26 @@ def robot_model(options: RobotOptions) -> RobotModel:
         options.max_angular_acceleration or model.limits.angular_acceleration_rad_s2,
     )
     return replace(model, limits=limits, radius_m=options.radius or model.radius_m)
+
+
+def starting(world: World, robots: Mapping[str, SimulatorOptions]) -> dict[str, Body]:
+    """The footprints of robots where they start, by their names.
+
+    Raises:
+        AssignmentError: One starts inside a wall or another robot.
+    """
+    found = {
+        name: Body(name, one.start(world.start), robot_model(one.robot).radius_m)
+        for name, one in robots.items()
+    }
+    for name, body in found.items():
+        replace(world, bodies=others(found, name)).check_start(body.pose, body.radius_m)
+    return found
+
+
+def others(bodies: Mapping[str, Body], name: str) -> tuple[Body, ...]:
+    """All robots but one."""
+    return tuple(body for other, body in bodies.items() if other != name)
 
 
 def next_velocity(twist: Twist, command: Twist, dt_s: float, limits: RobotLimits) -> Twist:

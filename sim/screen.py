@@ -23,7 +23,7 @@ from sim.simulation import EventKind, Simulation, Step
 from sim.world import World
 
 if TYPE_CHECKING:
-    from sim.node import RosSimulator
+    from sim.robot_topics import RobotTopics
 
 ARROWS = "→↗↑↖←↙↓↘"
 _DOTS = np.array(((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80)))
@@ -44,7 +44,7 @@ class Screen:
 
     def __init__(self, simulation: Simulation) -> None:
         """Begin with nothing to show."""
-        self.simulator: RosSimulator | None = None
+        self.robot: RobotTopics | None = None
         self._simulation = simulation
         self._step: Step | None = None
         self._scan: tuple[Scan, Pose] | None = None
@@ -57,7 +57,7 @@ class Screen:
         """Simulated time of what is shown."""
         return self._step.time_ns if self._step else 0
 
-    def on_step(self, step: Step, stamp_ns: int) -> None:
+    def on_step(self, step: Step, stamp_ns: int, robot: str) -> None:
         """Keep the newest step and the newest scan."""
         self._step = step
         self._rejected += sum(event.kind is EventKind.COMMAND_REJECTED for event in step.events)
@@ -120,15 +120,15 @@ class Screen:
         return rows
 
     def _topics(self) -> list[tuple[str, ...]]:
-        simulator, topics = self.simulator, self._simulation.options.topics
-        if simulator is None:
+        robot, topics = self.robot, self._simulation.options.topics
+        if robot is None:
             return []
-        publishers = simulator.command.get_publisher_count()
-        odometry = simulator.odometry.publisher.get_subscription_count()
-        scan = simulator.scan.publisher.get_subscription_count()
+        publishers = robot.command.get_publisher_count()
+        odometry = robot.odometry.publisher.get_subscription_count()
+        scan = robot.scan.publisher.get_subscription_count()
         command = f"{topics.command.topic} ({publishers} publishers)"
         return [
-            ("from", command, f"{simulator.commands} commands", *self._complaints()),
+            ("from", command, f"{robot.commands} commands", *self._complaints()),
             (
                 "to",
                 f"{topics.odometry.topic} ({odometry} subscriptions)",
@@ -141,7 +141,7 @@ class Screen:
         found = []
         if self._rejected:
             found.append(f"{self._rejected} commands not finite: the robot stops instead")
-        unheard = self.simulator.unheard if self.simulator is not None else ()
+        unheard = self.robot.unheard if self.robot is not None else ()
         if unheard:
             wanted = self._simulation.options.topics.command.type
             found.append(f"{', '.join(unheard)} is not heard: the robot takes {wanted}")

@@ -8,8 +8,9 @@ formula serves contact with any shape.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from dataclasses import dataclass
-from itertools import pairwise
+from operator import attrgetter
 
 from sim.motion import Pose, wrap_angle
 
@@ -21,6 +22,7 @@ MAX_SPEED_M_S = 5.0
 5 cm in one, less than half of any robot, so that it cannot jump over one."""
 
 
+ROBOTS = "robots"
 _WORDS = {
     "bounds": "the wall around the world",
     "segments": "a wall",
@@ -33,7 +35,8 @@ _WORDS = {
 
 def obstacle_words(label: str) -> str:
     """What stands under a label of a world file, in words: ``segments[0]`` is a wall."""
-    return _WORDS.get(label.partition("[")[0], "something")
+    kind, _, name = label.rstrip("]").partition("[")
+    return f"the robot {name}" if kind == ROBOTS else _WORDS.get(kind, "something")
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +99,20 @@ def box(label: str, pose: Pose, size_m: tuple[float, float], line: int | None = 
     return polygon(label, corners, line)
 
 
+@dataclass(slots=True)
+class Body:
+    """The footprint of a robot, which the others see and touch; it moves as the robot does."""
+
+    name: str
+    pose: Pose
+    radius_m: float
+
+    @property
+    def shape(self) -> Shape:
+        """Where it is now."""
+        return circle(f"{ROBOTS}[{self.name}]", self.pose.x_m, self.pose.y_m, self.radius_m)
+
+
 @dataclass(frozen=True, slots=True)
 class Waypoint:
     """A pose in the world's frame at a simulated time."""
@@ -148,7 +165,8 @@ class MovingObstacle:
             return first.pose
         if time_ns >= last.at_ns:
             return last.pose
-        before, after = next(pair for pair in pairwise(path) if time_ns < pair[1].at_ns)
+        index = bisect_right(path, time_ns, key=attrgetter("at_ns"))
+        before, after = path[index - 1 : index + 1]
         share = (time_ns - before.at_ns) / (after.at_ns - before.at_ns)
         a, b = before.pose, after.pose
         return Pose(

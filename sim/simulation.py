@@ -1,13 +1,15 @@
-"""The simulation: one robot in one world, step by step, without ROS and without a clock.
+"""The simulation: a robot in its world, step by step, without ROS and without a clock.
 
-The same world, options, seed and commands give the same steps, bit by bit.
+The same world, options, seed and commands give the same steps, bit by bit. Several robots are
+several simulations in one world, each of which does its step in turn.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
 
@@ -18,7 +20,8 @@ from sim.description import LidarOptions, OdometryOptions, SimulatorOptions
 from sim.lidar import Lidar, Scan
 from sim.motion import NS, REST, Pose, Twist, integrate
 from sim.odometry import OdometrySample, WheelOdometry
-from sim.robot import next_velocity, robot_model
+from sim.robot import next_velocity, others, robot_model, starting
+from sim.shapes import Body
 from sim.world import World
 
 STEP_NS = 10_000_000
@@ -98,17 +101,24 @@ class Schedule:
 class Simulation:
     """The stepping core, with the true pose of its robot."""
 
-    def __init__(self, world: World, options: SimulatorOptions, seed: int = 0) -> None:
+    def __init__(
+        self,
+        world: World,
+        options: SimulatorOptions,
+        seed: tuple[int, ...],
+        body: Body,
+    ) -> None:
         """Begin at simulated time 0, at rest.
 
         Args:
+            body: Its footprint, by which others know where it is.
             seed: Of the noise of the LiDAR and the drift of odometry, which are drawn
                 independently of each other.
         """
         self.world, self.options = world, options
         self.model = robot_model(options.robot)
         self.lidar = Lidar(world, options.lidar)
-        self.pose = options.start(world.start)
+        self.body = body
         lidar_seed, odometry_seed = np.random.SeedSequence(seed).spawn(2)
         self._noise = np.random.default_rng(lidar_seed)
         self._odometry = WheelOdometry(
@@ -130,6 +140,11 @@ class Simulation:
         self._command = REST
         self._commanded_ns: int | None = None
         self._contact: str | None = None
+
+    @property
+    def pose(self) -> Pose:
+        """Where the robot is, in the world's frame."""
+        return self.body.pose
 
     @property
     def time_ns(self) -> int:
@@ -219,21 +234,31 @@ class Simulation:
         contact = self._contacts.find(pose, linear, angular, STEP_S, time_ns)
         if self._motion == REST:
             return contact.label
-        self.pose = integrate(pose, linear, angular, STEP_S)
+        self.body.pose = integrate(pose, linear, angular, STEP_S)
         if contact.share < 1.0:
             # Turning goes on: a circle can turn where it touches.
             self._wheels = Twist(0.0, self._wheels.angular_rad_s)
             self._motion = Twist(0.0, angular)
             reached = integrate(pose, linear, angular, STEP_S * contact.share)
-            self.pose = Pose(reached.x_m, reached.y_m, self.pose.yaw_rad)
+            self.body.pose = Pose(reached.x_m, reached.y_m, self.pose.yaw_rad)
         way_m = linear * STEP_S * contact.share
         self._way_m += abs(way_m)
         self._odometry.move(way_m, angular * STEP_S)
         return contact.label
 
 
+def make_simulations(
+    world: World, robots: Mapping[str, SimulatorOptions], seed: int = 0
+) -> dict[str, Simulation]:
+    """Put together what the YAML describes; a robot inside a wall or another one is refused."""
+    found = {}
+    bodies = starting(world, robots)
+    for number, (name, options) in enumerate(robots.items()):
+        around = replace(world, bodies=others(bodies, name))
+        found[name] = Simulation(around, options, (seed, number), bodies[name])
+    return found
+
+
 def make_simulation(world: World, options: SimulatorOptions, seed: int = 0) -> Simulation:
-    """Put together what the YAML describes; a robot inside a wall is refused."""
-    simulation = Simulation(world, options, seed)
-    world.check_start(simulation.pose, simulation.model.radius_m)
-    return simulation
+    """The same for a robot that is alone."""
+    return make_simulations(world, {"": options}, seed)[""]

@@ -33,7 +33,7 @@ from grader.spec.document import Place
 from grader.spec.nearest_name import did_you_mean
 from grader.spec.source import Source, parse_source, read_source
 from sim.motion import ORIGIN, Pose
-from sim.shapes import MovingObstacle, Shape, polygon, wall
+from sim.shapes import Body, MovingObstacle, Shape, polygon, wall
 from sim.world_model import WorldModel
 
 MAX_SEGMENTS = 3_000
@@ -50,6 +50,7 @@ class World:
     Attributes:
         bounds: x_min, y_min, x_max, y_max of the wall around it, or None for an open world.
             Its four walls are among the shapes.
+        bodies: Other robots in it.
     """
 
     shapes: tuple[Shape, ...] = ()
@@ -57,6 +58,7 @@ class World:
     bounds: tuple[float, float, float, float] | None = None
     start: Pose = ORIGIN
     file: Path = Path("world.yaml")
+    bodies: tuple[Body, ...] = ()
 
     def extent(self, *points: tuple[float, float]) -> tuple[float, float, float, float]:
         """The smallest upright rectangle around everything, as x_min, y_min, x_max, y_max."""
@@ -74,9 +76,10 @@ class World:
         return (min(xs), min(ys), max(xs), max(ys))
 
     def moving_at(self, time_ns: int) -> list[Shape]:
-        """The moving obstacles that are there at a simulated time, each where it is then."""
+        """What moves and is there at a simulated time, each where it is then; robots as of now."""
         poses = ((obstacle, obstacle.pose_at(time_ns)) for obstacle in self.moving)
-        return [obstacle.shape_at(pose) for obstacle, pose in poses if pose is not None]
+        found = [obstacle.shape_at(pose) for obstacle, pose in poses if pose is not None]
+        return [*found, *(body.shape for body in self.bodies)]
 
     def obstruction(self, pose: Pose, radius_m: float) -> Problem | None:
         """The shape that keeps a circular robot from a pose at simulated time 0, or None."""

@@ -30,7 +30,8 @@ class BoundCheck:
     @property
     def title(self) -> str:
         """One line for the student: the author's, or the check's own."""
-        return self.spec.title or self.check.title
+        own = f"{self.check.title} ({self.spec.robot})" if self.spec.robot else self.check.title
+        return self.spec.title or own
 
 
 def bind(

@@ -286,6 +286,15 @@ class Scenario(Model):
         "the first match. The run ends 1 s after a contact.",
     )
     robot: RobotOptions = Field(default_factory=RobotOptions, description="The simulated robot.")
+    robots: dict[NodeName, RobotOptions] = Field(
+        default_factory=dict,
+        max_length=8,
+        description="Several robots instead of one: name -> what `robot` has, such as `{tb1: "
+        "{pose: [0, 0, 0]}, tb2: {pose: [1, 0, 0]}}`. The topics and frames of each begin with its "
+        "name: `/tb1/cmd_vel`, `tb1/odom`; all transforms are on `/tf`. They see and touch each "
+        "other. Sensors and topics are the same for all. Checks of motion say which `robot` they "
+        "judge.",
+    )
     lidar: LidarOptions = Field(default_factory=LidarOptions, description="Its LiDAR.")
     odometry: OdometryOptions = Field(
         default_factory=OdometryOptions, description="Its wheel odometry."
@@ -324,21 +333,26 @@ class Scenario(Model):
 
     @property
     def simulator(self) -> SimulatorOptions:
-        """Everything about the simulator but the world."""
+        """Everything about the simulator but the world and the names of several robots."""
         return SimulatorOptions(
             robot=self.robot, lidar=self.lidar, odometry=self.odometry, topics=self.topics
         )
 
     @property
+    def simulated(self) -> dict[str, SimulatorOptions]:
+        """The robots in its world by their names, which is empty for the only one."""
+        return {} if self.world is None else self.simulator.each(self.robots)
+
+    @property
     def recorded_types(self) -> dict[str, str]:
         """Topic -> type of all that is recorded: `record`, and the simulated robot's topics."""
         found = {one.topic: one.type for one in self.record}
-        if self.world is not None:
-            found.setdefault(self.topics.command.topic, self.topics.command.type)
-            if self.odometry.enabled:
-                found[self.topics.odometry.topic] = ODOMETRY
-            if self.lidar.enabled:
-                found[self.topics.scan.topic] = LASER_SCAN
+        for robot in self.simulated.values():
+            found.setdefault(robot.topics.command.topic, robot.topics.command.type)
+            if robot.odometry.enabled:
+                found[robot.topics.odometry.topic] = ODOMETRY
+            if robot.lidar.enabled:
+                found[robot.topics.scan.topic] = LASER_SCAN
         return {**dict.fromkeys(self.transform_topics, TRANSFORMS), **found}
 
 
@@ -410,6 +424,9 @@ class CheckSpec(Model):
     )
     to: Duration | None = Field(
         None, description="Judge only what is observed until then, counted from the same."
+    )
+    robot: NodeName | None = Field(
+        None, description="Judge this one of the `robots` of the scenario; others are obstacles."
     )
     points: float = Field(ge=0, description="Points for passing.")
     partial: tuple[Partial, ...] = Field(

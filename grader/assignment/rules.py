@@ -83,13 +83,16 @@ def _scenario(assignment: Assignment, scenario: Scenario) -> Iterator[tuple[Plac
         if not topics and getattr(until, key) is not None:
             yield ("until", key), "no topic is recorded: 'record' is missing"
     if scenario.world is None:
-        for key in ("robot", "lidar", "odometry", "topics"):
+        for key in ("robot", "robots", "lidar", "odometry", "topics"):
             if key in scenario.model_fields_set:
                 yield (key,), "a simulated robot needs a 'world', which is missing"
         for key in ("at_rest", "travelled"):
             if any(getattr(one, key) is not None for one in (until, *until.any)):
                 text = f"{key!r} is about the simulated robot: 'world' is missing"
                 yield ("until",), text
+
+    elif scenario.robots and "robot" in scenario.model_fields_set:
+        yield ("robot",), "give either one 'robot' or several 'robots'"
 
 
 def _launch(assignment: Assignment, launch: Launch) -> Iterator[tuple[Place, str]]:
@@ -185,6 +188,7 @@ def _check(assignment: Assignment, bound: BoundCheck) -> Iterator[tuple[Place, s
                 yield ("scenarios", number), f"there is no scenario {scenario!r}.{advice}"
         if not spec.scenarios:
             yield from _other_programs(judged)
+    yield from _robots(bound, judged)
     yield from need_problems(assignment, bound, judged)
     for key, phase in spec.window.phases.items() if spec.window else ():
         for place, text in need_problems(assignment, replace(bound, parameters=phase), judged):
@@ -196,6 +200,14 @@ def _check(assignment: Assignment, bound: BoundCheck) -> Iterator[tuple[Place, s
                 f"the scenario {one.id!r} ends after {format_duration(one.timeout)} at the latest"
             )
             yield ("from",), text
+
+
+def _robots(bound: BoundCheck, judged: Sequence[Scenario]) -> Iterator[tuple[Place, str]]:
+    """A robot that a scenario does not have, or none where it has several."""
+    for one in judged:
+        if bound.spec.robot is not None and bound.spec.robot not in one.robots:
+            advice = nearest_or_all(bound.spec.robot, one.robots, "Its 'robots' are")
+            yield ("robot",), f"the scenario {one.id!r} has no robot {bound.spec.robot!r}.{advice}"
 
 
 def _unknown_values(bound: BoundCheck, judged: Sequence[Scenario]) -> Iterator[tuple[Place, str]]:
@@ -263,8 +275,13 @@ def _(need: needs.Bags, user: _User) -> Iterator[_Lack]:
 @_lacks.register
 def _(need: needs.SimulatedRobot, user: _User) -> Iterator[_Lack]:
     for scenario in user.scenarios:
-        needless = need.about and user.value(need.about) is None
-        if scenario.world is None and not needless and user.value(need.unless) is None:
+        if (need.about and user.value(need.about) is None) or user.value(need.unless) is not None:
+            continue
+        if scenario.robots and user.bound.spec.robot is None:
+            names = ", ".join(scenario.robots)
+            text = f"the scenario {scenario.id!r} has several robots: say which 'robot' it judges"
+            yield (), f"{text} ({names})"
+        if scenario.world is None:
             text = f"the scenario {scenario.id!r} has no 'world', and so no simulated robot"
             yield ("uses",), text
 
@@ -293,9 +310,8 @@ def _(need: needs.SentOrOwn, user: _User) -> Iterator[_Lack]:
     topic, own = user.value(need.topic), user.value(need.own)
     for scenario in user.scenarios:
         given = {one.subject for one in _doing(needs.Act.PUBLISH, scenario)}
-        if scenario.world is not None:
-            robot = scenario.model_copy(update={"record": ()})
-            given |= {*robot.recorded_types} - {scenario.topics.command.topic}
+        commands = {one.topics.command.topic for one in scenario.simulated.values()}
+        given |= {*scenario.model_copy(update={"record": ()}).recorded_types} - commands
         recorded = {*scenario.recorded_types} - given
         if own and topic not in recorded:
             text = f"the scenario {scenario.id!r} records no {topic!r} of the student."
@@ -315,7 +331,7 @@ def _(need: needs.OwnTransform, user: _User) -> Iterator[_Lack]:
         if any(edge in one.frames for one in scenario.stimuli):
             text = f"a stimulus of the scenario {scenario.id!r} publishes this transform itself"
             yield ("with", need.child), text
-        if scenario.world is not None and edge in scenario.simulator.transforms:
+        if any(edge in robot.transforms for robot in scenario.simulated.values()):
             text = (
                 f"the robot of the scenario {scenario.id!r} publishes this transform itself: write "
                 "'topics: {tf: {enabled: false}}' there"

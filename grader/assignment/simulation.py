@@ -13,7 +13,7 @@ from grader.errors import AssignmentError, Problem, UsageError
 from grader.spec.document import Place
 from grader.spec.source import Source, read_source
 from grader.spec.unit import format_duration
-from sim.robot import MODELS
+from sim.robot import starting
 from sim.world import World, world_of
 
 _TRIED_SEEDS = range(20)
@@ -79,8 +79,7 @@ def _world(source: Source, place: Place, scenario: Scenario) -> Iterator[Problem
         for seed in _TRIED_SEEDS if scenario.random else (0,):
             values = draw_values(scenario, seed)
             world = _scenario_world(written, world_values(scenario, values))
-            start = scenario.robot.pose if scenario.robot.pose is not None else world.start
-            world.check_start(start, scenario.robot.radius or MODELS[scenario.robot.model].radius_m)
+            starting(world, scenario.simulated)
     except (AssignmentError, UsageError) as error:
         drawn = ", ".join(f"{name} = {value:g}" for name, value in values.items())
         yield source.problem((*place, "world"), f"{error}{f' (with {drawn})' if drawn else ''}")

@@ -26,6 +26,7 @@ from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, po
 from grader.grade.naming import Unnamed, with_chosen_names
 from grader.grade.runtime_imports import with_runtime_imports
 from grader.recording.model import Ending, Recording
+from grader.recording.one_robot import of_robot
 from grader.recording.submission import CPP, SubmissionRecord
 
 _CREDIT: Mapping[Counts, Callable[[Sequence[float]], float]] = {
@@ -192,8 +193,11 @@ class _Known:
             finding = finding or why_not_run(self.submission, packages) or fault(lost)
         elif why := _why_unusable(recording, scenario, self.submission):
             finding = fault(why)
+        elif (robot := bound.spec.robot) and robot not in recording.scenes:
+            finding = fault(f"the recording has no robot {robot!r}")
         else:
-            return judged(Case(bound, self.submission, recording, scenario, launched))
+            shown = of_robot(recording, robot) if robot else recording
+            return judged(Case(bound, self.submission, shown, scenario, launched))
         return ScenarioFinding(scenario, finding)
 
     def _is_put_right(self, item: ScenarioFinding) -> bool:

@@ -195,8 +195,8 @@ def read_topic(file: Path, topic: str) -> tuple[tuple[Message, ...], tuple[str, 
 
 def read_inputs(file: Path, recording: Recording) -> tuple[RawMessage, ...]:
     """The messages that the probe or the simulator published, in that order."""
-    scene = recording.scene
-    simulated = {scene.odometry_topic, scene.scan_topic} if scene else set()
+    scenes = recording.scenes.values()
+    simulated = {topic for one in scenes for topic in (one.odometry_topic, one.scan_topic)}
     found: list[RawMessage] = []
     try:
         with file.open("rb") as stream:
@@ -216,6 +216,9 @@ def _frame(record: Metadata) -> dict[str, Any]:
     frame = {key: json.loads(value) for key, value in record.metadata.items()}
     if frame.pop("format", None) not in ("2", FORMAT):
         raise _NotARecording(f"made by another version of rosgrade (not format {FORMAT})")
+    if scene := frame.pop("scene", None):
+        # From when there was one robot in a simulation.
+        frame["scenes"] = {"": scene}
     if "names" not in frame:
         frame["names"] = old_names(frame["environment"])
     return frame

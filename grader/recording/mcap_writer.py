@@ -135,6 +135,6 @@ def _write_messages(
 def _frame(recording: Recording) -> dict[str, str]:
     frame = {name: getattr(recording, name) for name in _FRAME}
     frame |= {"format": FORMAT, "ending": recording.ending.value, "sent": sorted(recording.sent)}
-    frame["scene"] = dataclasses.asdict(recording.scene) if recording.scene else None
+    frame["scenes"] = {name: dataclasses.asdict(scene) for name, scene in recording.scenes.items()}
     frame["names"] = dataclasses.asdict(recording.names)
     return {key: json.dumps(value, sort_keys=True, default=dict) for key, value in frame.items()}

@@ -314,9 +314,9 @@ class Recording:
         breaches: Limits of the sandbox that were reached.
         disturbance: Delays of the machine, sample by sample.
         faults: Faults of rosgrade or of the machine, one sentence each.
-        truth: The simulated robot, step by step; empty in a scenario without a world.
+        truth: The simulated robots, step by step; empty in a scenario without a world.
         incidents: What the simulator noted.
-        scene: World and robot, or None in a scenario without a world.
+        scenes: World and robot by the name of the robot, which is empty for the only one.
         values: Values of the scenario by name, fixed and random ones, in SI units.
         environment: ``ros_distro``, ``rmw``, ``python``, ``domain_id``, ``sandbox``, ...; the
             ``ros_imports`` that are installed; the ``parameters`` of the launch, by name;
@@ -357,10 +357,20 @@ class Recording:
     faults: tuple[str, ...] = ()
     truth: tuple[Truth, ...] = ()
     incidents: tuple[Incident, ...] = ()
-    scene: Scene | None = None
+    scenes: Mapping[str, Scene] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
     environment: Mapping[str, str] = field(default_factory=dict)
     names: Names = NO_NAMES
+
+    @property
+    def scene(self) -> Scene | None:
+        """World and robot, where there is just one robot."""
+        return next(iter(self.scenes.values())) if len(self.scenes) == 1 else None
+
+    @property
+    def robot(self) -> str:
+        """Name of the robot, where there is just one: empty, if it was alone."""
+        return next(iter(self.scenes)) if len(self.scenes) == 1 else ""
 
     @property
     def given_parameters(self) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ class Truth:
         command_m_s: Active commanded speed, before any limit.
         command_rad_s: Active commanded rate of turn, before any limit.
         contact: What the robot touches, such as ``boxes[2]``, or None.
+        robot: Name of the robot, which is empty for the only one.
     """
 
     time_ns: int
@@ -34,6 +35,7 @@ class Truth:
     command_m_s: float
     command_rad_s: float
     contact: str | None = None
+    robot: str = ""
 
 
 @dataclass(frozen=True)
@@ -47,12 +49,14 @@ class Incident:
             up).
         text: For people.
         value: For ``late`` how late in seconds, else None.
+        robot: Name of the robot, which is empty for the only one.
     """
 
     time_ns: int
     kind: str
     text: str
     value: float | None = None
+    robot: str = ""
 
 
 @dataclass(frozen=True)

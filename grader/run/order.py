@@ -78,12 +78,17 @@ class UntilOrder:
 
 @dataclass(frozen=True)
 class SimulatorOrder:
-    """The simulated robot of a scenario; ``values`` stand for ``$name`` in its world."""
+    """The simulated robots of a scenario; ``values`` stand for ``$name`` in its world.
+
+    Attributes:
+        robots: Name -> its own options, as JSON; empty for one robot without a name.
+    """
 
     world: str
     values: dict[str, str]
     options: str
     seed: int
+    robots: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

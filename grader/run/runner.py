@@ -177,16 +177,16 @@ def _topics(scenario: Scenario) -> tuple[Topic, ...]:
         one.topic: Topic(one.topic, one.type, one.reliability, one.durability, one.depth)
         for one in scenario.record
     }
-    if scenario.world is None:
-        return tuple(found.values())
-    command = scenario.topics.command
-    found.setdefault(command.topic, Topic(command.topic, command.type, "reliable", "volatile", 100))
-    for options in (scenario.topics.odometry, scenario.topics.scan):
-        name = options.topic
-        if name in scenario.recorded_types:
-            type = scenario.recorded_types[name]
-            qos = (options.reliability, options.durability, 100)
-            found[name] = Topic(name, type, *qos, ours=True)
+    for robot in scenario.simulated.values():
+        command = robot.topics.command
+        commands = Topic(command.topic, command.type, "reliable", "volatile", 100)
+        found.setdefault(command.topic, commands)
+        for options in (robot.topics.odometry, robot.topics.scan):
+            name = options.topic
+            if name in scenario.recorded_types:
+                type = scenario.recorded_types[name]
+                qos = (options.reliability, options.durability, 100)
+                found[name] = Topic(name, type, *qos, ours=True)
     for name, durability in scenario.transform_topics.items():
         qos = (scenario.topics.tf.reliability, durability, 100)
         found.setdefault(name, Topic(name, scenario.recorded_types[name], *qos, ours=True))
@@ -216,6 +216,7 @@ def _simulator(
         world=str((worlds / scenario.world).resolve()),
         values=world_values(scenario, values),
         options=scenario.simulator.model_dump_json(),
+        robots={name: one.model_dump_json() for name, one in scenario.robots.items()},
         seed=seed,
     )
 

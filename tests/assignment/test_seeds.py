@@ -14,7 +14,7 @@ from grader.assignment.random_values import draw_values, world_values
 from grader.assignment.simulation import read_scenario_world
 from grader.checks.messages.following import Follows
 from sim.description import SimulatorOptions
-from sim.simulation import STEP_S, Simulation
+from sim.simulation import STEP_S, make_simulation
 
 SEEDS = range(200)
 WRONG = 0.2
@@ -32,7 +32,7 @@ def _odometry(scenario: Scenario, seed: int) -> Row:
     options = SimulatorOptions(
         robot=scenario.robot, lidar=scenario.lidar, odometry=scenario.odometry
     )
-    simulation = Simulation(world, options, seed)
+    simulation = make_simulation(world, options, seed)
     samples = []
     for _ in range(round((scenario.until.elapsed or 0.0) / STEP_S)):
         sample = simulation.advance().odometry

@@ -257,3 +257,45 @@ def test_values_that_make_no_sense_are_refused(
     yaml = FIXED + REACHES % "[x, 0, 0 deg]"
     assert yaml.count(old) == 1
     assert f"assignment.yaml:{said}" in refused(tmp_path, yaml.replace(old, new))
+
+
+PAIR = YAML.replace("topic: /cmd", "topic: /tb1/cmd").replace(
+    "    timeout", "    robots: {tb1: {}, tb2: {pose: [-1, 0, 0 deg]}}\n    timeout"
+)
+STOPS = "  - {id: stops, uses: motion.no_contact, points: 1ROBOT}\n"
+
+
+def test_the_topics_of_several_robots_begin_with_their_names(tmp_path: Path) -> None:
+    yaml = PAIR + STOPS.replace("ROBOT", ", robot: tb2")
+    loaded = load_assignment(lesson(tmp_path, yaml))
+    assert [*loaded.assignment.scenarios[0].recorded_types] == [
+        *("/tb1/cmd_vel", "/tb1/odom", "/tb1/scan"),
+        *("/tb2/cmd_vel", "/tb2/odom", "/tb2/scan"),
+    ]
+    assert loaded.checks[-1].title.endswith("(tb2)")
+
+
+@pytest.mark.parametrize(
+    ("robot", "reason"),
+    [
+        ("", "has several robots: say which 'robot' it judges (tb1, tb2)"),
+        (", robot: tb3", "'run' has no robot 'tb3'. Did you mean 'tb2'?"),
+    ],
+)
+def test_a_check_of_motion_says_which_of_several_robots(
+    tmp_path: Path, robot: str, reason: str
+) -> None:
+    assert reason in refused(tmp_path, PAIR + STOPS.replace("ROBOT", robot))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ("robots: {", "robot: {}\n    robots: {", "give either one 'robot' or several 'robots'"),
+        ("pose: [-1, 0, 0 deg]", "pose: [0.1, 0, 0 deg]", "robots[tb2]"),
+        ("    world: world.yaml\n", "", "a simulated robot needs a 'world'"),
+        ("tb2", "2nd", "'2nd' is not a node name"),
+    ],
+)
+def test_robots_that_cannot_be_are_refused(tmp_path: Path, old: str, new: str, reason: str) -> None:
+    assert reason in refused(tmp_path, PAIR.replace(old, new))

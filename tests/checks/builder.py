@@ -523,7 +523,7 @@ def simulated(truth: Sequence[Truth], scene: Scene, **changes: Any) -> Recording
     end_s = (truth[-1].time_ns - LAUNCH_NS) / NS
     defaults: dict[str, Any] = {
         "truth": tuple(truth),
-        "scene": scene,
+        "scenes": {"": scene},
         "stop_s": end_s,
         "end_s": end_s + 0.1,
         "matched_s": BEGAN_S,

@@ -388,7 +388,7 @@ RECORDINGS = st.builds(
         st.lists(SENSED, max_size=2),
     ),
     truth=TRUTH,
-    scene=st.one_of(st.none(), SCENES),
+    scenes=st.dictionaries(st.sampled_from(["", "tb1"]), SCENES, max_size=2),
     incidents=st.lists(INCIDENTS, max_size=2).map(tuple),
     nodes=st.lists(
         st.builds(Node, NAMES, st.sampled_from(list(Owner)), TIMES, MAYBE), max_size=3

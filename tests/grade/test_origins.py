@@ -75,7 +75,7 @@ def test_where_nothing_was_published_the_timer_and_the_publisher_are_shown():
 
 
 def test_a_check_of_the_robot_shows_where_it_is_commanded():
-    assert lines(FAILED, KeepsDriving(distance="1 m"), run(scene=ahead_until(0.2).scene)) == [21]
+    assert lines(FAILED, KeepsDriving(distance="1 m"), run(scenes=ahead_until(0.2).scenes)) == [21]
 
 
 def test_a_wrong_name_that_was_observed_is_shown_too():

@@ -292,7 +292,7 @@ def test_all_that_happens_outside_of_a_window_is_cut_and_facts_stay() -> None:
     stays = {"scenario", "seed", "launched_ns", "end_ns", "submission", "answers", "joined"}
     stays |= {"joins", "pauses", "unreadable", "nodes", "endpoints", "processes", "declarations"}
     stays |= {"services", "clients", "waits", "interventions", "breaches", "disturbance"}
-    stays |= {"faults", "scene", "values", "environment", "names"}
+    stays |= {"faults", "scenes", "values", "environment", "names"}
     moment = SimpleNamespace(
         time_ns=at(1), stamp_ns=at(1), requested_ns=at(1), sent_ns=at(1), asked_ns=at(1), text=""
     )

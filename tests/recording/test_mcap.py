@@ -110,7 +110,10 @@ def a_recording(**changes: object) -> Recording:
             Incident(2_010, "contact_began", "moving[0]"),
             Incident(2_020, "late", "3 steps done 25 ms late", 0.025),
         ),
-        scene=Scene(0.1, 0.22, 2.84, {"boxes[0]": ((1.0, -1.0, 1.0, 1.0, 0.0),)}, (BOX,), 2_000),
+        scenes={
+            name: Scene(0.1, 0.22, 2.84, {"boxes[0]": ((1.0, -1.0, 1.0, 1.0, 0.0),)}, (BOX,), 2_000)
+            for name in ("tb1", "tb2")
+        },
         environment={"rmw": "rmw_fastrtps_cpp"},
     )
     return dataclasses.replace(recording, **changes)  # type: ignore[arg-type]
@@ -297,7 +300,9 @@ def test_a_recording_of_before_is_read_as_before(tmp_path: Path) -> None:
     old = read_recording(Path(__file__).with_name("format_2.mcap"))
     file = with_every_channel(tmp_path)
     new = read_recording(file)
-    assert dataclasses.replace(new, sent={**new.sent, "/cmd_vel": ()}) == dataclasses.replace(
+    # It had one robot, without a name.
+    of_before = {"sent": {**new.sent, "/cmd_vel": ()}, "scenes": {"": new.scenes["tb1"]}}
+    assert dataclasses.replace(new, **of_before) == dataclasses.replace(
         old, sent={**old.sent, "/cmd_vel": ()}
     )
     assert [sent.is_sent for sent in read_inputs(file, new)] == [True, True]

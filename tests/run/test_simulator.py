@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader.recording.model import NS, Ending, Kind
+from grader.recording.one_robot import of_robot
 from sim.motion import Pose
 from tests.run import nodes
 from tests.run.conftest import RunNode
@@ -136,3 +137,47 @@ def test_random_values_reach_the_world_and_the_parameters(
     assert recording.on("/scan")[0].value["ranges"][0] == pytest.approx(recording.values["x"])
     printed = [line.text for line in recording.log if line.stream == "stdout"]
     assert printed == [str(recording.values["far"])]
+
+
+LEADER = (
+    nodes.HEADER
+    + """
+from sensor_msgs.msg import LaserScan
+
+class Leader(Node):
+    def __init__(self):
+        super().__init__("leader")
+        self.drive = self.create_publisher(Twist, "/tb2/cmd_vel", 10)
+        self.create_subscription(LaserScan, "/tb1/scan", self.scanned, 10)
+
+    def scanned(self, scan):
+        message = Twist()
+        message.linear.x = 0.2 if scan.ranges[0] < 0.8 else 0.0
+        self.drive.publish(message)
+
+rclpy.init()
+rclpy.spin(Leader())
+"""
+)
+
+
+def test_one_node_drives_a_robot_by_what_another_sees_of_it(run_node: RunNode, world: str) -> None:
+    """The second drives away from the first until the first sees it 0.8 m ahead."""
+    recording = run_node(
+        LEADER,
+        record=[],
+        world=world,
+        robots={"tb1": {"pose": [-2, 0, "0 deg"]}, "tb2": {"pose": [-1.5, 0, "0 deg"]}},
+        until={"any": [{"elapsed": "6 s"}]},
+        timeout="15 s",
+    )
+    assert [*recording.scenes] == ["tb1", "tb2"]
+    stood, drove = (of_robot(recording, name) for name in recording.scenes)
+    assert {step.x_m for step in stood.truth} == {-2.0}
+    # It sees the back of the other robot, whose radius is 0.1 m, 5 times a second.
+    assert -1.1 <= drove.truth[-1].x_m < -1.0
+    assert len(stood.truth) == len(drove.truth)
+    assert stood.scene is not None
+    assert stood.scene.command_topic == "/tb1/cmd_vel"
+    assert stood.scene.moving[0].pose_at(10**12) == Pose(drove.truth[-1].x_m, 0.0, 0.0)
+    assert len(recording.on("/tb1/scan")) == len(recording.on("/tb2/scan")) > 10

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from sim.contact import RESOLUTION_M, TOUCH_M, ContactFinder
 from sim.description import SimulatorOptions
 from sim.motion import Pose, Twist, integrate
-from sim.shapes import Shape, box, circle, wall
+from sim.shapes import Body, Shape, box, circle, wall
 from sim.simulation import Simulation, Step
 from sim.world import World, parse_world
 
@@ -100,7 +100,8 @@ def test_what_the_finder_remembers_never_changes_a_result(
 
 def standing(world: World, start: Pose) -> Simulation:
     pose = [start.x_m, start.y_m, f"{start.yaw_rad} rad"]
-    return Simulation(world, SimulatorOptions.model_validate({"robot": {"pose": pose}}))
+    options = SimulatorOptions.model_validate({"robot": {"pose": pose}})
+    return Simulation(world, options, (0,), Body("", start, RADIUS_M))
 
 
 def drive(world: World, command: Twist, steps: int, start: Pose) -> Simulation:

@@ -50,7 +50,7 @@ class Truth:
         self.stamps: list[int] = []
         self.late: list[Lateness] = []
 
-    def on_step(self, step: Step, stamp_ns: int) -> None:
+    def on_step(self, step: Step, stamp_ns: int, robot: str) -> None:
         self.steps.append(step)
         self.stamps.append(stamp_ns)
 
@@ -80,7 +80,7 @@ class Bench:
 
     def simulator(self, *, recorders: int = -1, **options: object) -> RosSimulator:
         simulation = make_simulation(ROOM, SimulatorOptions.model_validate(options))
-        return RosSimulator(self.node, simulation, self.truth, lambda: self.now_ns, recorders)
+        return RosSimulator(self.node, {"": simulation}, self.truth, lambda: self.now_ns, recorders)
 
     def wait(self, condition: Callable[[], bool], what: str) -> None:
         """Serve the student's node until something holds."""
@@ -128,7 +128,7 @@ def test_odometry_is_published_on_time_as_soon_as_another_than_the_recorder_hear
 ) -> None:
     simulator = bench.simulator(recorders=1, lidar={"enabled": False})
     recorded = bench.listen(Odometry, "/odom", 100)
-    count = simulator.odometry.publisher.get_subscription_count
+    count = simulator.robots[""].odometry.publisher.get_subscription_count
     bench.wait(lambda: count() == 1, "match")
     simulator.start()
     bench.now_ns = STEP_NS
@@ -153,7 +153,9 @@ def test_beyond_half_a_turn_the_quaternion_goes_on_or_has_no_negative_w(
         odometry={"continuous": continuous},
     )
     odometry = bench.listen(Odometry, "/odom")
-    bench.wait(lambda: simulator.odometry.publisher.get_subscription_count() == 1, "match")
+    bench.wait(
+        lambda: simulator.robots[""].odometry.publisher.get_subscription_count() == 1, "match"
+    )
     for _ in range(20):
         bench.step(simulator, 10)
         number = sum(step.odometry is not None for step in bench.truth.steps)
@@ -169,15 +171,17 @@ def test_beyond_half_a_turn_the_quaternion_goes_on_or_has_no_negative_w(
 
 def test_a_student_drives_and_sees(bench: Bench) -> None:
     """In real time: commands in, odometry and scans out, with the truth beside them."""
-    simulator = RosSimulator(bench.node, make_simulation(ROOM, SimulatorOptions()), bench.truth)
+    simulator = RosSimulator(
+        bench.node, {"": make_simulation(ROOM, SimulatorOptions())}, bench.truth
+    )
     odometry = bench.listen(Odometry, "/odom")
     scans = bench.listen(LaserScan, "/scan")
     publisher = bench.student.create_publisher(TwistMessage, "/cmd_vel", 10)
     bench.wait(
         lambda: (
             publisher.get_subscription_count() == 1
-            and simulator.odometry.publisher.get_subscription_count() == 1
-            and simulator.scan.publisher.get_subscription_count() == 1
+            and simulator.robots[""].odometry.publisher.get_subscription_count() == 1
+            and simulator.robots[""].scan.publisher.get_subscription_count() == 1
         ),
         "match",
     )
@@ -264,7 +268,7 @@ def test_a_command_acts_from_the_first_step_that_begins_after_it_arrived(bench: 
         bench.wait(lambda at=acked_ns: time.time_ns() > at + 3 * STEP_NS, "time")
     bench.now_ns = time.time_ns() - sent[0][0] + 3 * STEP_NS
     simulator.catch_up()
-    assert simulator.commands == 3
+    assert simulator.robots[""].commands == 3
     speeds = [step.command.linear_m_s for step in bench.truth.steps]
     for speed, (began_ns, acked_ns) in zip((0.1, 0.15, 0.2), sent, strict=True):
         begins_ns = bench.truth.stamps[speeds.index(speed)] - STEP_NS
@@ -300,9 +304,9 @@ def test_a_flood_of_commands_does_not_hold_it_up(bench: Bench) -> None:
         message.linear.x = 1e-6 * i
         publisher.publish(message)
         if i % 100 == 0:
-            before = simulator.commands
+            before = simulator.robots[""].commands
             bench.step(simulator)
-            assert simulator.commands - before <= 100
+            assert simulator.robots[""].commands - before <= 100
     message.linear.x = 0.2
     bench.wait(
         lambda: (
@@ -323,10 +327,10 @@ def test_a_command_of_the_other_type_does_not_match(bench: Bench) -> None:
     bench.wait(lambda: right.get_subscription_count() == 1, "match")
     bench.wait(lambda: len(bench.node.get_publishers_info_by_topic("/cmd_vel")) == 2, "discovery")
     assert wrong.get_subscription_count() == 0
-    assert simulator.unheard == ("geometry_msgs/msg/TwistStamped",)
+    assert simulator.robots[""].unheard == ("geometry_msgs/msg/TwistStamped",)
     wrong.publish(TwistStamped())
     right.publish(command(0.1, 0.0))
-    bench.wait(lambda: bench.step(simulator) or simulator.commands == 1, "command")
+    bench.wait(lambda: bench.step(simulator) or simulator.robots[""].commands == 1, "command")
     node.destroy_node()
     third.try_shutdown()
 
@@ -338,7 +342,7 @@ def test_stamped_commands_are_obeyed_where_the_yaml_says_so(bench: Bench) -> Non
     message = TwistStamped()
     message.twist = command(0.1, 0.2)
     publisher.publish(message)
-    bench.wait(lambda: bench.step(simulator) or simulator.commands == 1, "command")
+    bench.wait(lambda: bench.step(simulator) or simulator.robots[""].commands == 1, "command")
     bench.step(simulator)
     assert bench.truth.steps[-1].command == Twist(0.1, 0.2)
 
@@ -352,7 +356,7 @@ def test_an_executor_that_spins_its_node_takes_no_commands(bench: Bench) -> None
     publisher.publish(command(0.1, 0.0))
     for _ in range(10):
         executor.spin_once(timeout_sec=0.02)
-    bench.wait(lambda: bench.step(simulator) or simulator.commands == 1, "command")
+    bench.wait(lambda: bench.step(simulator) or simulator.robots[""].commands == 1, "command")
     executor.shutdown()
 
 
@@ -376,7 +380,9 @@ def test_its_node_offers_nothing_that_could_disturb_it(bench: Bench) -> None:
 
 
 def test_the_loop_ends_with_its_context(bench: Bench) -> None:
-    simulator = RosSimulator(bench.node, make_simulation(ROOM, SimulatorOptions()), bench.truth)
+    simulator = RosSimulator(
+        bench.node, {"": make_simulation(ROOM, SimulatorOptions())}, bench.truth
+    )
     loop = threading.Thread(target=simulator.run, args=(threading.Event(),))
     loop.start()
     bench.wait(lambda: bool(bench.truth.steps), "step")

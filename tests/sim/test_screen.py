@@ -27,7 +27,7 @@ def test_the_screen_shows_everything() -> None:
     assert "→" in screen.picture(80, 30).plain  # before the first step
     assert screen.line() == "starting"
     for index in range(300):
-        screen.on_step(simulation.advance(Twist(0.2, 0.0) if index == 0 else None), 0)
+        screen.on_step(simulation.advance(Twist(0.2, 0.0) if index == 0 else None), 0, "")
     screen.on_late(Lateness(7, 3, 40_000_000))
     line = screen.line()
     assert "3.00 s  x +0.200 m" in line
@@ -48,7 +48,7 @@ def test_commands_that_are_not_finite_are_counted() -> None:
     simulation = make_simulation(read_world(WORLDS / "empty.yaml"), SimulatorOptions())
     screen = Screen(simulation)
     for speed in (math.nan, 0.1, math.inf):
-        screen.on_step(simulation.advance(Twist(speed, 0.0)), 0)
+        screen.on_step(simulation.advance(Twist(speed, 0.0)), 0, "")
     assert screen.line().endswith("2 commands not finite: the robot stops instead")
 
 

@@ -25,8 +25,8 @@ class ScenarioOfStimuli(Protocol):
         """All stimuli, itself among them."""
 
     @property
-    def world(self) -> str | None:
-        """The world file, if there is a simulated robot."""
+    def simulated(self) -> Mapping[str, Any]:
+        """The simulated robots by their names, which is empty for the only one."""
 
     @property
     def recorded_types(self) -> Mapping[str, str]:

@@ -58,7 +58,8 @@ def draw_motion(recording: Recording, name: str) -> svg.Figure | None:
     described = "; ".join(
         f"{phase.kind} from {phase.begin_s:.1f} to {phase.end_s:.1f} s" for phase in found[:20]
     )
-    title = f"Commands and true speeds in the scenario {recording.scenario}"
+    of = f" of the robot {recording.robot}" if recording.robot else ""
+    title = f"Commands and true speeds{of} in the scenario {recording.scenario}"
     return svg.figure(name, title, caption, draw, f"{caption} The robot {described}.")
 
 

@@ -34,15 +34,16 @@ DEFAULT_M = 0.1
 
 
 def targets(
-    assignment: Assignment, scenario: str, values: Mapping[str, float]
+    assignment: Assignment, scenario: str, values: Mapping[str, float], robot: str = ""
 ) -> tuple[Target, ...]:
-    """The goals and places that visible checks name for a scenario, each once."""
+    """The goals and places that visible checks name for a robot in a scenario, each once."""
     found: dict[tuple[Pose, str], Target] = {}
     fixed = next((fixed_values(one) for one in assignment.scenarios if one.id == scenario), {})
     values = {**fixed, **values}
     # A check that says how near goes before one that leaves it to the default.
     for check in sorted(assignment.checks, key=lambda check: "position" not in check.with_):
         judged = not check.scenarios or scenario in check.scenarios
+        judged &= check.robot in (None, robot)
         if not judged or check.visibility is not Visibility.VISIBLE:
             continue
         # An author's own check may call something else a goal, or a place.
@@ -118,6 +119,7 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> svg
     stopped = _stopped(truth, scene)
     shown = [*outline, *(corner for one in targets for corner in one.corners)]
     goals = [one for one in targets if one.is_goal]
+    robot = f"robot {recording.robot}".rstrip()
 
     def draw(width: float) -> tuple[float, list[Markup]]:
         view = ground_plan.fit(shown, scene, width, 150.0, 340.0 if width > svg.NARROW else 300.0)
@@ -154,11 +156,12 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> svg
     if len(goals) < len(targets):
         goal += " The numbers are the places to visit, in the order of the assignment."
     if has_moved(truth):
-        caption = f"{_went(gone_m[-1], stopped, touched)}.{goal} Arrow heads show where it looked, "
+        went = _went(gone_m[-1], stopped, touched)
+        caption = f"The {robot} {went}.{goal} Arrow heads show where it looked, "
         caption += "the dashed outline where it started."
     else:
-        caption = f"The robot did not move.{goal}"
-    title = f"Path of the robot in the scenario {recording.scenario}"
+        caption = f"The {robot} did not move.{goal}"
+    title = f"Path of the {robot} in the scenario {recording.scenario}"
     return svg.figure(name, title, caption, draw)
 
 
@@ -218,7 +221,7 @@ def _stop(step: Truth, distance_m: float, scene: Scene, view: View) -> list[Mark
 
 
 def _went(way_m: float, stopped: tuple[Truth, float] | None, touched: Sequence[Truth]) -> str:
-    text = f"The robot went {metres(way_m)}"
+    text = f"went {metres(way_m)}"
     if stopped is not None:
         text += f" and stopped with an obstacle {metres(stopped[1])} ahead of its LiDAR"
     if touched:

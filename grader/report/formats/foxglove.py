@@ -24,10 +24,12 @@ def render_layout(recordings: Iterable[Recording]) -> str:
     """Render the layout for all recordings of one submission, as JSON that Foxglove imports."""
     panels: dict[str, dict[str, Any]] = {}
     runs = tuple(recordings)
-    for topic in {run.scene.odometry_topic for run in runs if run.scene}:
+    scenes = (scene for run in runs for scene in run.scenes.values())
+    for topic in dict.fromkeys(scene.odometry_topic for scene in scenes):
         if any(run.on(topic) for run in runs):
             place = f"{topic}.pose.pose.position"
-            panels["Plot!path"] = _plot("Path of the robot (m)", [f"{place}.y"], f"{place}.x")
+            title = f"Path by {topic} (m)"
+            panels[f"Plot!path {topic}"] = _plot(title, [f"{place}.y"], f"{place}.x")
     for topic, (kind, paths) in _topics(runs).items():
         if kind == LASER_SCAN:
             panels[f"3D!{topic}"] = {"topics": {topic: {"visible": True}}, "layers": {}}

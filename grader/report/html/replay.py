@@ -16,6 +16,7 @@ from markupsafe import Markup
 from grader.assignment.model import Assignment, Scenario
 from grader.findings.words import metres
 from grader.recording.model import NS, Recording
+from grader.recording.one_robot import each_robot
 from grader.recording.simulated import Scene, Truth
 from grader.report.drawing.ground_plan import places
 from grader.report.drawing.path import targets
@@ -41,7 +42,11 @@ _NUMBERS = tuple(high + low for high in DIGITS for low in DIGITS)
 
 
 def make_replay(recording: Recording, scenario: Scenario) -> Replay | None:
-    """Make the replay of a run, or None in a scenario without a simulated robot."""
+    """Make the replay of a run, or None in a scenario without a simulated robot.
+
+    Of several robots it shows the first as the one that is followed.
+    """
+    recording = next(each_robot(recording))
     scene, truth = recording.scene, recording.truth
     if scene is None or len(truth) < 2:
         return None
@@ -54,6 +59,7 @@ def make_replay(recording: Recording, scenario: Scenario) -> Replay | None:
     return {
         "began": round(since(samples[0].time_ns), 3),
         "step": round((samples[1].time_ns - samples[0].time_ns) / NS, 3) if samples[1:] else 0.1,
+        "robot": recording.robot,
         "radius": _milli(scene.radius_m),
         "limits": _millis(scene.max_linear_m_s, scene.max_angular_rad_s),
         "walls": [_millis(*one) for capsules in scene.outlines.values() for one in capsules],
@@ -87,7 +93,7 @@ def with_goals(replay: Replay, assignment: Assignment, scenario: str) -> Replay:
             *_millis(one.pose.x_m, one.pose.y_m, one.pose.yaw_rad, one.radius_m),
             metres(one.radius_m),
         ]
-        for one in targets(assignment, scenario, replay.get("given", {}))
+        for one in targets(assignment, scenario, replay.get("given", {}), replay.get("robot", ""))
     ]
     return {**replay, "goals": goals}
 

@@ -13,6 +13,7 @@ from grader.assignment.model import Scenario
 from grader.findings.finding import Plot, Status
 from grader.grade.model import Grade
 from grader.recording.model import Recording
+from grader.recording.one_robot import each_robot
 from grader.recording.submission import BuildRecord
 from grader.report.concepts import SCRIPT, STYLE, concepts
 from grader.report.drawing.callbacks import draw_callbacks
@@ -164,6 +165,7 @@ def render_report(
         draw_motion=draw_motion,
         draw_path=draw_path,
         draw_timeline=draw_timeline,
+        each_robot=each_robot,
         pairs=pairs,
         targets=partial(targets, assignment),
         shorten=shorten,

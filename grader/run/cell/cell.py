@@ -33,7 +33,7 @@ from grader.sandbox.packet_monitor import PacketMonitor, bound_ports
 from grader.spec.unit import format_duration
 
 if TYPE_CHECKING:
-    from grader.run.cell.simulator import SimulatedRobot
+    from grader.run.cell.simulator import Simulator
 
 _TICK_S = 0.05
 _CALM_TICK_S = 0.1
@@ -99,11 +99,11 @@ class Cell:
             )
         self._exit_barrier = ExitBarrier(self._output, self._graph, self._students)
         self._waits: list[Wait] = []
-        self._robot: SimulatedRobot | None = None
+        self._simulator: Simulator | None = None
         if order.simulator is not None:
-            from grader.run.cell.simulator import SimulatedRobot
+            from grader.run.cell.simulator import Simulator
 
-            self._robot = SimulatedRobot(probe.node, order.simulator)
+            self._simulator = Simulator(probe.node, order.simulator)
         self._faults: list[str] = []
         self._context = StimulusContext(
             probe,
@@ -114,10 +114,10 @@ class Cell:
             self._start_again,
             self._waits,
             self._faults,
-            self._robot,
+            self._simulator.robots if self._simulator is not None else {},
         )
         self._player = Player(order.stimuli, self._context)
-        self._ending = EndingConditions(probe, self._output, self._robot, self._player)
+        self._ending = EndingConditions(probe, self._output, self._context.robots, self._player)
         self._later: list[ProcessCommand] = []
         self._next_graph = 0.0
         self._launched_ns = 0
@@ -135,9 +135,9 @@ class Cell:
             self._probe.recording = False
             stop_ns = time.time_ns()
             self._player.finish()
-            if self._robot is not None:
+            if self._simulator is not None:
                 # With its last command it would drive on while nothing steers it.
-                self._robot.stop()
+                self._simulator.stop()
             pauses = self._pause() if self._order.pauses else ()
             tell("stopping")
             self._students.stop(self._order.limits)
@@ -194,9 +194,9 @@ class Cell:
             answers=self._player.answers,
             disturbance=disturbance,
             faults=tuple(dict.fromkeys(self._faults)),
-            truth=tuple(self._robot.truth) if self._robot else (),
-            incidents=tuple(self._robot.incidents) if self._robot else (),
-            scene=self._robot.scene() if self._robot else None,
+            truth=self._simulator.truth if self._simulator else (),
+            incidents=self._simulator.incidents if self._simulator else (),
+            scenes=self._simulator.scenes if self._simulator else {},
             values=self._order.values,
             names=self._order.names,
             environment={
@@ -252,8 +252,8 @@ class Cell:
         if ending is None:
             tell("matched", limit_s=self._order.limits.timeout_s)
             self._player.begin()
-            if self._robot is not None:
-                self._robot.start()
+            if self._simulator is not None:
+                self._simulator.start()
             ending = self._await_until()
         if self._order.process_sandbox is not None:
             self._other_domains = tuple(d for d in joined_domains() if d != self._domain_id)

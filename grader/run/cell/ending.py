@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from grader.recording.model import NS, Owner
@@ -24,16 +25,20 @@ class EndingConditions:
     """Looks at what has been observed so far."""
 
     def __init__(
-        self, probe: Probe, output: OutputReader, robot: SimulatedRobot | None, player: Player
+        self,
+        probe: Probe,
+        output: OutputReader,
+        robots: Mapping[str, SimulatedRobot],
+        player: Player,
     ) -> None:
         self._player = player
         self._probe = probe
         self._output = output
-        self._robot = robot
+        self._robots = tuple(robots.values())
 
     def is_over(self) -> bool:
-        """Whether the robot has touched something: no verdict can change any more."""
-        return self._robot is not None and self._robot.in_contact_s > _AFTER_CONTACT_S
+        """Whether a robot has touched something: no verdict can change any more."""
+        return any(robot.in_contact_s > _AFTER_CONTACT_S for robot in self._robots)
 
     def met(self, until: UntilOrder, watch: Stopwatch) -> bool:
         """Whether everything that an ``until`` names holds; one without conditions is never met."""
@@ -44,10 +49,11 @@ class EndingConditions:
             conditions.append(self._quiet_s(watch) >= self._longest_quiet_s(until.quiet_s))
         if until.elapsed_s is not None:
             conditions.append(watch.elapsed_s >= until.elapsed_s)
-        if until.at_rest_s is not None and self._robot is not None:
-            conditions.append(self._robot.at_rest_s >= until.at_rest_s)
-        if until.travelled_m is not None and self._robot is not None:
-            conditions.append(self._robot.travelled_m >= until.travelled_m)
+        for robot in self._robots:
+            if until.at_rest_s is not None:
+                conditions.append(robot.at_rest_s >= until.at_rest_s)
+            if until.travelled_m is not None:
+                conditions.append(robot.travelled_m >= until.travelled_m)
         if until.stimuli_done:
             conditions.append(self._player.is_done)
         if until.any:

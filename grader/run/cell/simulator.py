@@ -1,4 +1,4 @@
-"""The simulated robot of a cell: runs the simulator and keeps its ground truth.
+"""The simulated robots of a cell: runs the simulator and keeps its ground truth.
 
 The truth comes from the simulator's memory and never from a topic that a student could fake.
 """
@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 import threading
+from itertools import chain
+from operator import attrgetter
 from pathlib import Path
 
 from rclpy.node import Node
@@ -15,16 +17,17 @@ from grader.assignment.simulation import read_scenario_world
 from grader.recording.model import NS
 from grader.recording.simulated import Incident, Scene, Truth
 from grader.run.order import SimulatorOrder
-from sim.description import SimulatorOptions
+from sim.description import RobotOptions, SimulatorOptions
 from sim.motion import Pose, Twist
 from sim.node import RosSimulator
 from sim.pacing import Lateness
-from sim.simulation import Simulation, Step, make_simulation
+from sim.simulation import Simulation, Step, make_simulations
+from sim.world import World
 from sim.world_model import WorldModel
 
 # By itself pydantic makes what validates a model when it is first used: in each cell, instead of
 # once in the process that cells are forked from.
-for _model in (SimulatorOptions, WorldModel):
+for _model in (SimulatorOptions, RobotOptions, WorldModel):
     _model.model_rebuild()
 
 _REST_M_S = 1e-3
@@ -35,34 +38,19 @@ _MOVED_RAD = 1e-2
 
 
 class SimulatedRobot:
-    """A robot in its world, driven by what the student publishes; keeps every step so far."""
+    """One robot of a run: every step so far, and what the end of the run depends on."""
 
-    def __init__(self, node: Node, order: SimulatorOrder) -> None:
-        options = self._options = SimulatorOptions.model_validate_json(order.options)
-        self._world = read_scenario_world(Path(order.world), order.values)
-        self._simulation: Simulation = make_simulation(self._world, options, order.seed)
-        self._ros = RosSimulator(node, self._simulation, self, recorders=1)
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._ros.run, args=(self._stop,), daemon=True)
-        self._start = self._simulation.pose
+    def __init__(self, name: str, simulation: Simulation, ros: RosSimulator) -> None:
+        self._name, self._simulation, self._ros = name, simulation, ros
+        self._start = simulation.pose
         self.truth: list[Truth] = []
         self.incidents: list[Incident] = []
         self._stamp_ns = 0
-        self._began_ns = 0
+        self.began_ns = 0
         self.travelled_m = 0.0
         self._has_moved = False
         self._rest_since_ns = 0
         self._contact_ns: int | None = None
-
-    def start(self) -> None:
-        """Let simulated time run, in a thread of its own."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Stop simulated time; the truth ends here."""
-        self._stop.set()
-        if self._thread.is_alive():
-            self._thread.join()
 
     @property
     def pose(self) -> Pose:
@@ -72,7 +60,7 @@ class SimulatedRobot:
 
     def drive(self, twist: Twist) -> None:
         """Command it from here, and not by a topic that the student publishes on too."""
-        self._ros.drive(twist)
+        self._ros.drive(twist, self._name)
 
     @property
     def at_rest_s(self) -> float:
@@ -84,27 +72,27 @@ class SimulatedRobot:
         """Simulated seconds since the first contact; 0 before."""
         return 0.0 if self._contact_ns is None else (self._stamp_ns - self._contact_ns) / NS
 
-    def scene(self) -> Scene:
+    def scene(self, world: World) -> Scene:
         """World and robot."""
-        robot = self._simulation.model
+        robot, options = self._simulation.model, self._simulation.options
         return Scene(
             radius_m=robot.radius_m,
             max_linear_m_s=robot.limits.speed_m_s,
             max_angular_rad_s=robot.limits.angular_speed_rad_s,
-            outlines={shape.label: tuple(shape.capsules) for shape in self._world.shapes},
-            moving=self._world.moving,
-            began_ns=self._began_ns,
-            lidar=self._options.lidar.pose,
-            command_topic=self._options.topics.command.topic,
-            odometry_topic=self._options.topics.odometry.topic,
-            scan_topic=self._options.topics.scan.topic,
+            outlines={shape.label: tuple(shape.capsules) for shape in world.shapes},
+            moving=world.moving,
+            began_ns=self.began_ns,
+            lidar=options.lidar.pose,
+            command_topic=options.topics.command.topic,
+            odometry_topic=options.topics.odometry.topic,
+            scan_topic=options.topics.scan.topic,
             acceleration_m_s2=robot.limits.acceleration_m_s2,
         )
 
-    def on_step(self, step: Step, stamp_ns: int) -> None:
-        """Keep the truth; called by the simulator."""
-        if not self._began_ns:
-            self._began_ns = stamp_ns - step.time_ns
+    def keep(self, step: Step, stamp_ns: int) -> None:
+        """Keep the truth of a step."""
+        if not self.began_ns:
+            self.began_ns = stamp_ns - step.time_ns
         self._follow(step, stamp_ns)
         self._stamp_ns = stamp_ns
         pose, twist, command = step.pose, step.twist, step.command
@@ -113,17 +101,17 @@ class SimulatedRobot:
                 *(stamp_ns, pose.x_m, pose.y_m, pose.yaw_rad),
                 *(twist.linear_m_s, twist.angular_rad_s),
                 *(command.linear_m_s, command.angular_rad_s),
-                step.contact,
+                *(step.contact, self._name),
             )
         )
         for event in step.events:
-            self.incidents.append(Incident(stamp_ns, event.kind.value, event.text))
+            incident = Incident(stamp_ns, event.kind.value, event.text, robot=self._name)
+            self.incidents.append(incident)
 
-    def on_late(self, lateness: Lateness) -> None:
-        """Note steps that are late because of the host; called by the simulator."""
-        late_ms = lateness.late_ns / 1e6
-        text = f"{lateness.steps} steps done {late_ms:.0f} ms late"
-        self.incidents.append(Incident(self._stamp_ns, "late", text, lateness.late_ns / NS))
+    def note_late(self, text: str, late_s: float) -> None:
+        """Note steps that are late because of the host."""
+        incident = Incident(self._stamp_ns, "late", text, late_s, robot=self._name)
+        self.incidents.append(incident)
 
     def _follow(self, step: Step, stamp_ns: int) -> None:
         if self.truth:
@@ -140,3 +128,57 @@ class SimulatedRobot:
             self._rest_since_ns = stamp_ns
         if step.contact is not None and self._contact_ns is None:
             self._contact_ns = stamp_ns
+
+
+class Simulator:
+    """The robots of a run in their world, driven by what the student publishes."""
+
+    def __init__(self, node: Node, order: SimulatorOrder) -> None:
+        options = SimulatorOptions.model_validate_json(order.options)
+        own = {name: RobotOptions.model_validate_json(text) for name, text in order.robots.items()}
+        self._world = read_scenario_world(Path(order.world), order.values)
+        simulations = make_simulations(self._world, options.each(own), order.seed)
+        self._ros = RosSimulator(node, simulations, self, recorders=1)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._ros.run, args=(self._stop,), daemon=True)
+        self.robots = {
+            name: SimulatedRobot(name, one, self._ros) for name, one in simulations.items()
+        }
+
+    def start(self) -> None:
+        """Let simulated time run, in a thread of its own."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop simulated time; the truth ends here."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    @property
+    def truth(self) -> tuple[Truth, ...]:
+        """Every step so far of all robots, oldest first."""
+        steps = zip(*(robot.truth for robot in self.robots.values()), strict=False)
+        return tuple(chain.from_iterable(steps))
+
+    @property
+    def incidents(self) -> tuple[Incident, ...]:
+        """What happened so far, oldest first."""
+        found = (robot.incidents for robot in self.robots.values())
+        return tuple(sorted(chain.from_iterable(found), key=attrgetter("time_ns")))
+
+    @property
+    def scenes(self) -> dict[str, Scene]:
+        """World and robot, by the names of the robots."""
+        return {name: robot.scene(self._world) for name, robot in self.robots.items()}
+
+    def on_step(self, step: Step, stamp_ns: int, robot: str) -> None:
+        """Keep the truth; called by the simulator."""
+        self.robots[robot].keep(step, stamp_ns)
+
+    def on_late(self, lateness: Lateness) -> None:
+        """Note steps that are late because of the host; called by the simulator."""
+        late_ms = lateness.late_ns / 1e6
+        text = f"{lateness.steps} steps done {late_ms:.0f} ms late"
+        for robot in self.robots.values():
+            robot.note_late(text, lateness.late_ns / NS)

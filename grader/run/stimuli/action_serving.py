@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rclpy.action.server import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -17,6 +17,9 @@ from grader.run.stimuli.driving import Target, command, distance_m, target
 from grader.run.stimuli.filling import filled, plain
 from grader.run.stimuli.serving import Serving
 from sim.motion import Twist
+
+if TYPE_CHECKING:
+    from grader.run.cell.simulator import SimulatedRobot
 
 _STEP_S = 0.02
 _MOST_FEEDBACK = 5000
@@ -76,8 +79,8 @@ class ServingAction(Serving):
         return CancelResponse.ACCEPT if accepts else CancelResponse.REJECT
 
     def _execute(self, handle: Any) -> Any:
-        goal, began_s, robot = self._of(handle), time.monotonic(), self._context.robot
-        answer, drive = goal.answer, goal.answer.drive
+        goal, began_s = self._of(handle), time.monotonic()
+        answer, drive, robot = goal.answer, goal.answer.drive, self._robot(goal)
         if drive is not None and robot is not None:
             goal.target, self._driven = target(plain(handle.request), drive.to), goal
         status = ""
@@ -99,10 +102,15 @@ class ServingAction(Serving):
         self.note(goal.number, ends=True, status=status, answer=plain(result))
         return result
 
+    def _robot(self, goal: _Goal) -> SimulatedRobot | None:
+        """The robot that a goal drives, if it drives one."""
+        drive = goal.answer.drive
+        return None if drive is None else self._context.robots[drive.robot]
+
     def _drive(self, goal: _Goal, elapsed_s: float) -> str:
         """Drive on to the pose of a goal; how the goal has ended, or nothing."""
-        robot, takes_s = self._context.robot, goal.answer.takes_s
-        assert robot is not None and goal.target is not None
+        robot, takes_s = self._robot(goal), goal.answer.takes_s
+        assert robot is not None and goal.target is not None and goal.answer.drive is not None
         # A newer goal takes the robot over.
         if self._driven is not goal or 0.0 < takes_s <= elapsed_s:
             return "aborted"
@@ -118,7 +126,7 @@ class ServingAction(Serving):
         message, now_ns = self._interface.Feedback(), time.time_ns()
         if values:
             filled(message, values[min(len(goal.feedback), len(values) - 1)], now_ns)
-        robot, path = self._context.robot, drive.distance if drive is not None else None
+        robot, path = self._robot(goal), drive.distance if drive is not None else None
         if path is not None and robot is not None and goal.target is not None:
             left: Any = distance_m(robot.pose, goal.target)
             nested = reduce(lambda value, name: {name: value}, reversed(path.split(".")), left)

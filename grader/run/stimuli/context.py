@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
@@ -49,7 +49,7 @@ class StimulusContext:
     start: Callable[[str], None]
     waits: list[Wait]
     faults: list[str]
-    robot: SimulatedRobot | None = None
+    robots: Mapping[str, SimulatedRobot] = field(default_factory=dict)
     asked: list[Asked] = field(default_factory=list)
     joins: dict[str, Join] = field(default_factory=dict)
     interventions: list[Intervention] = field(default_factory=list)

@@ -19,6 +19,7 @@ from grader.assignment.stimuli.stimulus_model import (
 from grader.checks.need import Act
 from grader.spec.document import Place
 from grader.spec.name import InterfaceName, TopicName
+from grader.spec.nearest_name import nearest_or_all
 from grader.spec.quantity import Duration, DurationOrZero, Speed
 from grader.spec.source import Model
 
@@ -68,6 +69,7 @@ class DriveTo(Model):
         None, description="Field of the feedback that gets the distance that remains."
     )
     speed: Speed = Field(0.2, description="How fast it drives.")
+    robot: str = Field("", description="Which of the scenario's `robots`, if it has several.")
 
 
 class GoalAnswer(Answer):
@@ -178,8 +180,12 @@ class Serve(StimulusModel):
         if next(one for one in alike if one.serve == self.serve) is not self:
             yield ("serve",), f"{self.serve!r} stands twice: give one server several 'answers'"
         for number, answer in enumerate(self.answers):
-            if getattr(answer, "drive", None) is not None and scenario.world is None:
+            drive = getattr(answer, "drive", None)
+            if drive is not None and drive.robot not in scenario.simulated:
                 text = "there is a simulated robot only in a 'world', which is missing"
+                if scenario.simulated:
+                    text = f"there is no robot {drive.robot!r}"
+                    text += nearest_or_all(drive.robot, scenario.simulated, "The robots are")
                 yield ("answers", number, "drive"), text
         yield from super().mistakes(making, scenario)
 
