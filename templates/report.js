@@ -76,10 +76,11 @@
           [bottom, top] = [Math.min(bottom, nearY - 0.05), Math.max(top, nearY + 0.05)];
         }
       }
-      for (const { radius, size, places } of this.data.moving) {
+      for (const { radius, size, places, robot } of this.data.moving) {
         const half = (radius ?? Math.hypot(...size) / 2) / 1000 + 0.05;
         for (const [x, y] of places.filter(Boolean).map((place) => [place[0] / 1000, place[1] / 1000])) {
-          if (x < far.left || x > far.right || y < far.bottom || y > far.top) continue;
+          // Another robot is what the run is about; an obstacle may be far away.
+          if (!robot && (x < far.left || x > far.right || y < far.bottom || y > far.top)) continue;
           [left, right] = [Math.min(left, x - half), Math.max(right, x + half)];
           [bottom, top] = [Math.min(bottom, y - half), Math.max(top, y + half)];
         }

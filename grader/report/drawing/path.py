@@ -25,7 +25,7 @@ from grader.report.drawing import ground_plan, svg
 from grader.report.drawing.ground_plan import View, disc, track
 from grader.spec.quantity import PositiveLength
 from sim.motion import Pose, compose
-from sim.shapes import obstacle_words
+from sim.shapes import ROBOTS, obstacle_words
 
 _GOAL: TypeAdapter[Goal] = TypeAdapter(GoalPose)
 _PLACES: TypeAdapter[tuple[Place, ...]] = TypeAdapter(tuple[Place, ...])
@@ -117,7 +117,11 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> svg
     gone_m = [*accumulate(steps_m, initial=0.0)]
     touched = [b for a, b in pairwise([None, *truth]) if b and b.contact and not (a and a.contact)]
     stopped = _stopped(truth, scene)
+    until_ns = truth[-1].time_ns - scene.began_ns
+    # Another robot is what the run is about; an obstacle may be far away.
+    others = [one.pose_at(until_ns) for one in scene.moving if one.label.startswith(ROBOTS)]
     shown = [*outline, *(corner for one in targets for corner in one.corners)]
+    shown += [(other.x_m, other.y_m) for other in others if other is not None]
     goals = [one for one in targets if one.is_goal]
     robot = f"robot {recording.robot}".rstrip()
 
@@ -125,7 +129,7 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> svg
         view = ground_plan.fit(shown, scene, width, 150.0, 340.0 if width > svg.NARROW else 300.0)
         in_world = [
             *ground_plan.world(scene, view),
-            *ground_plan.moving(scene, (truth[-1].time_ns - scene.began_ns) / NS),
+            *ground_plan.moving(scene, until_ns / NS),
             *(one.outline for one in targets),
             *(_needle(one.pose, 2.0 * scene.radius_m, "target-heading") for one in goals),
             track(outline, "way"),

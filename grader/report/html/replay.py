@@ -22,6 +22,7 @@ from grader.report.drawing.ground_plan import places
 from grader.report.drawing.path import targets
 from grader.report.model.excerpt import printed
 from grader.spec.safe_text import one_line
+from sim.shapes import ROBOTS
 
 Replay = Mapping[str, Any]
 """One run, ready for JSON; templates/report.js reads it."""
@@ -136,6 +137,7 @@ def _moving(scene: Scene, until_s: float) -> list[dict[str, Any]]:
         {
             "radius": _milli(obstacle.radius_m) if obstacle.radius_m is not None else None,
             "size": _millis(*(obstacle.size_m or ())),
+            "robot": obstacle.label.startswith(ROBOTS),
             "places": [
                 _millis(place.x_m, place.y_m, place.yaw_rad) if place else 0
                 for place in places(obstacle, until_s)
