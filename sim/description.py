@@ -18,15 +18,13 @@ from enum import Enum
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
-from grader.spec.name import topic_name
 from grader.spec.quantity import (
     Angle,
     AngularSpeed,
     Duration,
     DurationOrZero,
-    Frequency,
     QuantityOf,
     Ratio,
     Speed,
@@ -35,10 +33,14 @@ from grader.spec.source import Model, read_source
 from grader.spec.unit import Dimension
 from sim.coordinates import Metres, PoseInPlane, PositiveMetres
 from sim.motion import ORIGIN, Pose
-
-TopicName = Annotated[str, AfterValidator(topic_name)]
-Rate = Annotated[Frequency, Field(le=100.0)]
-LengthOrZero = Annotated[float, QuantityOf(Dimension.LENGTH, minimum=0.0)]
+from sim.sensor_options import (
+    BatteryOptions,
+    ImuOptions,
+    JointOptions,
+    RangeOptions,
+    SensorOptions,
+)
+from sim.topic_options import LengthOrZero, Rate, TopicName, TopicOptions
 
 _SPEED = QuantityOf(Dimension.SPEED, minimum=0.0, exclusive=True)
 _ANGULAR_SPEED = QuantityOf(Dimension.ANGULAR_SPEED, minimum=0.0, exclusive=True)
@@ -207,15 +209,6 @@ class OdometryOptions(Model):
     stops: DurationOrZero | None = Field(None, description="No odometry from this time on.")
 
 
-class TopicOptions(Model):
-    """A topic with its QoS."""
-
-    topic: TopicName = Field(description="Fully qualified name.")
-    reliability: Literal["reliable", "best_effort"] = Field("reliable")
-    durability: Literal["volatile", "transient_local"] = Field("volatile")
-    depth: int = Field(10, ge=1, le=10_000)
-
-
 class CommandTopic(TopicOptions):
     """The topic of velocity commands."""
 
@@ -280,6 +273,10 @@ class SimulatorOptions(Model):
     robot: RobotOptions = Field(default_factory=RobotOptions)
     lidar: LidarOptions = Field(default_factory=LidarOptions)
     odometry: OdometryOptions = Field(default_factory=OdometryOptions)
+    imu: ImuOptions | None = Field(None)
+    joint_states: JointOptions | None = Field(None)
+    battery: BatteryOptions | None = Field(None)
+    ranges: tuple[RangeOptions, ...] = Field(())
     topics: Topics = Field(default_factory=Topics)
     _prefix: str = PrivateAttr("")
 
@@ -288,7 +285,15 @@ class SimulatorOptions(Model):
         """What /tf_static says: parent, child, pose and height of the child, in metres."""
         base, link = self.odometry.child_frame, f"{self._prefix}base_link"
         scan = (link, self.lidar.frame, self.lidar.pose, _SCAN_Z_M[self.robot.model])
-        return [(base, link, ORIGIN, _BASE_Z_M), scan] if base != link else [scan]
+        found = [(base, link, ORIGIN, _BASE_Z_M)] if base != link else []
+        own = (one for one in self.sensors if one.frame != link)
+        return [*found, scan, *((link, one.frame, one.pose, one.height_m) for one in own)]
+
+    @property
+    def sensors(self) -> tuple[SensorOptions, ...]:
+        """What it has besides LiDAR and odometry."""
+        others = (self.imu, self.joint_states, self.battery)
+        return (*(one for one in others if one is not None), *self.ranges)
 
     @property
     def transforms(self) -> set[tuple[str, str]]:
@@ -317,10 +322,15 @@ class SimulatorOptions(Model):
             "frame": f"{name}/{self.odometry.frame}",
             "child_frame": f"{name}/{self.odometry.child_frame}",
         }
+
         found = SimulatorOptions(
             robot=robot,
             lidar=self.lidar.model_copy(update={"frame": f"{name}/{self.lidar.frame}"}),
             odometry=self.odometry.model_copy(update=frames),
+            imu=self.imu and self.imu.of(name),
+            joint_states=self.joint_states and self.joint_states.of(name),
+            battery=self.battery and self.battery.of(name),
+            ranges=tuple(one.of(name) for one in self.ranges),
             topics=self.topics.model_copy(update=topics),
         )
         found._prefix = f"{name}/"

@@ -45,52 +45,36 @@ class Scan:
         return np.where(self.ranges_m == 0.0, 0.0, falling).astype(np.float32)
 
 
-class Lidar:
-    """A LiDAR in a world."""
+class Rays:
+    """Rays from a sensor on a robot into a world."""
 
-    def __init__(self, world: World, options: LidarOptions) -> None:
-        """Prepare the world's walls."""
-        self.options = options
-        self.angle_min_rad = 0.0 if options.layout is Layout.FROM_ZERO else -math.pi
-        self.angle_increment_rad = math.tau / options.beams
-        self.angle_max_rad = self.angle_min_rad + (options.beams - 1) * self.angle_increment_rad
-        self._world = world
+    def __init__(self, world: World, pose: Pose, angles_rad: Floats, range_max_m: float) -> None:
+        """Prepare the world's walls.
+
+        Args:
+            pose: Of the sensor on the robot.
+            angles_rad: Of the rays, counter-clockwise from the sensor's x axis, shape (rays,).
+        """
+        self._world, self._pose, self.angles_rad = world, pose, angles_rad
+        self._range_max_m = range_max_m
         self._capsules = _capsules(world.shapes)
-        self.angles_rad = self.angle_min_rad + np.arange(options.beams) * self.angle_increment_rad
 
     def cast(self, pose: Pose, time_ns: int) -> Floats:
         """True distances from a robot at a pose in the world's frame.
 
         Returns:
-            Shape (beams,), metres, in the order of the beams; inf where nothing is within
-            ``range_max``.
+            Shape (rays,), metres, in the order of the rays; inf where nothing is within range.
         """
-        sensor = compose(pose, self.options.pose)
-        ranges = np.full(self.options.beams, np.inf)
+        sensor, rays = compose(pose, self._pose), len(self.angles_rad)
+        ranges = np.full(rays, np.inf)
         for capsules in (self._capsules, _capsules(self._world.moving_at(time_ns))):
-            parts = 1 + self.options.beams * len(capsules) // _AT_ONCE
+            parts = 1 + rays * len(capsules) // _AT_ONCE
             for part in np.array_split(capsules, parts):
                 is_wall = part[:, 4] == 0.0
                 np.minimum(ranges, self._to_walls(part[is_wall], sensor), out=ranges)
                 np.minimum(ranges, self._to_circles(part[~is_wall], sensor), out=ranges)
-        ranges[ranges > self.options.range_max] = np.inf
+        ranges[ranges > self._range_max_m] = np.inf
         return ranges
-
-    def scan(self, pose: Pose, time_ns: int, noise: np.random.Generator) -> Scan:
-        """Take a scan.
-
-        Args:
-            noise: One number is drawn for each beam in every scan, so that a scan does not
-                change the noise of the next; none without noise.
-        """
-        options = self.options
-        ranges = self.cast(pose, time_ns)
-        if options.noise:
-            ranges += options.noise * noise.standard_normal(options.beams)
-        is_zero = options.no_return is NoReturn.ZERO
-        ranges[ranges > options.range_max] = 0.0 if is_zero else np.inf
-        ranges[ranges < options.range_min] = 0.0 if is_zero else -np.inf
-        return Scan(time_ns, ranges.astype(np.float32))
 
     def _to_walls(self, walls: Floats, sensor: Pose) -> Floats:
         """How far each beam goes until it meets one of some walls; inf where it meets none."""
@@ -119,6 +103,39 @@ class Lidar:
         cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
         dx, dy = x_m - sensor.x_m, y_m - sensor.y_m
         return cos * dx + sin * dy, cos * dy - sin * dx
+
+
+class Lidar:
+    """A LiDAR in a world."""
+
+    def __init__(self, world: World, options: LidarOptions) -> None:
+        """Prepare its beams."""
+        self.options = options
+        self.angle_min_rad = 0.0 if options.layout is Layout.FROM_ZERO else -math.pi
+        self.angle_increment_rad = math.tau / options.beams
+        self.angle_max_rad = self.angle_min_rad + (options.beams - 1) * self.angle_increment_rad
+        self.angles_rad = self.angle_min_rad + np.arange(options.beams) * self.angle_increment_rad
+        self._rays = Rays(world, options.pose, self.angles_rad, options.range_max)
+
+    def cast(self, pose: Pose, time_ns: int) -> Floats:
+        """True distances from a robot at a pose, in the order of the beams; see :class:`Rays`."""
+        return self._rays.cast(pose, time_ns)
+
+    def scan(self, pose: Pose, time_ns: int, noise: np.random.Generator) -> Scan:
+        """Take a scan.
+
+        Args:
+            noise: One number is drawn for each beam in every scan, so that a scan does not
+                change the noise of the next; none without noise.
+        """
+        options = self.options
+        ranges = self.cast(pose, time_ns)
+        if options.noise:
+            ranges += options.noise * noise.standard_normal(options.beams)
+        is_zero = options.no_return is NoReturn.ZERO
+        ranges[ranges > options.range_max] = 0.0 if is_zero else np.inf
+        ranges[ranges < options.range_min] = 0.0 if is_zero else -np.inf
+        return Scan(time_ns, ranges.astype(np.float32))
 
 
 def _nearest(distance: Floats, meets: NDArray[np.bool_]) -> Floats:

@@ -19,10 +19,11 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 
-from sim.description import OdometryOptions, SimulatorOptions, TopicOptions
+from sim.description import OdometryOptions, SimulatorOptions
 from sim.lidar import Lidar, Scan
 from sim.motion import NS, Pose
 from sim.odometry import OdometrySample
+from sim.topic_options import TopicOptions
 
 UNKNOWN_VARIANCE = 1e12
 """Variance of what wheels cannot measure (z, roll, pitch), as Gazebo Classic's diff drive."""
@@ -55,17 +56,17 @@ class OdometryPublisher:
         for index, variance in enumerate(diagonal):
             self._message.pose.covariance[7 * index] = variance
             self._message.twist.covariance[7 * index] = variance
-        self.publisher = _publisher(node, Odometry, topic.topic, topic)
+        self.publisher = make_publisher(node, Odometry, topic.topic, topic)
 
     def publish(self, sample: OdometrySample, stamp_ns: int) -> None:
         """Publish a sample."""
         message = self._message
-        _set_time(message.header.stamp, stamp_ns)
+        set_time(message.header.stamp, stamp_ns)
         message.pose.pose.position.x = sample.pose.x_m
         message.pose.pose.position.y = sample.pose.y_m
         quaternion = message.pose.pose.orientation
         z, w = quaternion.z, quaternion.w
-        _set_yaw(quaternion, sample.pose.yaw_rad)
+        set_yaw(quaternion, sample.pose.yaw_rad)
         # It still held the one before: of the two that say the same, take the nearer.
         if self._is_continuous and z * quaternion.z + w * quaternion.w < 0.0:
             quaternion.z, quaternion.w = -quaternion.z, -quaternion.w
@@ -89,11 +90,11 @@ class ScanPublisher:
             range_max=lidar.options.range_max,
         )
         self._message.header.frame_id = lidar.options.frame
-        self.publisher = _publisher(node, LaserScan, topic.topic, topic)
+        self.publisher = make_publisher(node, LaserScan, topic.topic, topic)
 
     def publish(self, scan: Scan, stamp_ns: int) -> None:
         """Publish a scan."""
-        _set_time(self._message.header.stamp, stamp_ns)
+        set_time(self._message.header.stamp, stamp_ns)
         # An array('f') is taken over as it is; a list would be checked number by number.
         self._message.ranges = array("f", scan.ranges_m.tobytes())
         if self._has_intensities:
@@ -106,12 +107,12 @@ class ClockPublisher:
 
     def __init__(self, node: Node, topic: TopicOptions) -> None:
         """Create the publisher."""
-        self.publisher = _publisher(node, Clock, topic.topic, topic)
+        self.publisher = make_publisher(node, Clock, topic.topic, topic)
 
     def publish(self, stamp_ns: int) -> None:
         """Publish a ROS time."""
         message = Clock()
-        _set_time(message.clock, stamp_ns)
+        set_time(message.clock, stamp_ns)
         self.publisher.publish(message)
 
 
@@ -126,9 +127,9 @@ class TransformPublisher:
         self._fixed = options.fixed_frames
         self._type = tf
         self._message = tf(transforms=[self._moving])
-        self.publisher = _publisher(node, tf, topic.topic, topic)
+        self.publisher = make_publisher(node, tf, topic.topic, topic)
         latched = topic.model_copy(update={"durability": "transient_local", "depth": 1})
-        self.static_publisher = _publisher(node, tf, topic.static_topic, latched)
+        self.static_publisher = make_publisher(node, tf, topic.static_topic, latched)
 
     def publish_static(self, stamp_ns: int) -> None:
         """Publish what is fixed to the robot, all in one message; late joiners get it too."""
@@ -155,7 +156,8 @@ def transform_type() -> Any | None:
         return None
 
 
-def _publisher(node: Node, message_type: Any, name: str, options: TopicOptions) -> Any:
+def make_publisher(node: Node, message_type: Any, name: str, options: TopicOptions) -> Any:
+    """A publisher with the QoS of the options."""
     # Without event callbacks the publisher needs no executor.
     callbacks = PublisherEventCallbacks(use_default_callbacks=False)
     return node.create_publisher(
@@ -164,16 +166,18 @@ def _publisher(node: Node, message_type: Any, name: str, options: TopicOptions) 
 
 
 def _set_transform(transform: TransformStamped, pose: Pose, stamp_ns: int) -> None:
-    _set_time(transform.header.stamp, stamp_ns)
+    set_time(transform.header.stamp, stamp_ns)
     transform.transform.translation.x = pose.x_m
     transform.transform.translation.y = pose.y_m
-    _set_yaw(transform.transform.rotation, pose.yaw_rad)
+    set_yaw(transform.transform.rotation, pose.yaw_rad)
 
 
-def _set_time(time: Time, stamp_ns: int) -> None:
+def set_time(time: Time, stamp_ns: int) -> None:
+    """Write a time into a message."""
     time.sec, time.nanosec = divmod(stamp_ns, NS)
 
 
-def _set_yaw(quaternion: Quaternion, yaw_rad: float) -> None:
+def set_yaw(quaternion: Quaternion, yaw_rad: float) -> None:
+    """Write a turn around the z axis into a message."""
     quaternion.z = math.sin(0.5 * yaw_rad)
     quaternion.w = math.cos(0.5 * yaw_rad)

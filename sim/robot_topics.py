@@ -18,6 +18,7 @@ from sim.publishers import (
     qos_profile,
     transform_type,
 )
+from sim.sensor_publishers import SensorPublisher
 from sim.simulation import Simulation, Step
 
 _LEAST_QUEUE = 100
@@ -47,6 +48,7 @@ class RobotTopics:
         topics = options.topics
         self.odometry = OdometryPublisher(node, topics.odometry, options.odometry)
         self.scan = ScanPublisher(node, topics.scan, simulation.lidar)
+        self.sensors = {one: SensorPublisher(node, one) for one in simulation.sensors}
         tf = transform_type() if topics.tf.enabled else None
         self._transforms = tf and TransformPublisher(node, options, tf)
         package, _, name = topics.command.type.split("/")
@@ -73,9 +75,10 @@ class RobotTopics:
         return self.simulation.next_output_ns(
             scans=self._is_heard(self.scan),
             odometry=self._transforms is not None or self._is_heard(self.odometry),
+            others=[one for one, publisher in self.sensors.items() if self._is_heard(publisher)],
         )
 
-    def _is_heard(self, sensor: OdometryPublisher | ScanPublisher) -> bool:
+    def _is_heard(self, sensor: OdometryPublisher | ScanPublisher | SensorPublisher) -> bool:
         return bool(sensor.publisher.get_subscription_count() > self._recorders)
 
     def command_at(self, arrived_ns: int, twist: Twist) -> None:
@@ -122,6 +125,8 @@ class RobotTopics:
                 self._transforms.publish(step.odometry, stamp_ns)
         if step.scan is not None:
             self.scan.publish(step.scan, stamp_ns)
+        for sensor, reading in step.readings:
+            self.sensors[sensor].publish(reading, stamp_ns)
 
     @property
     def unheard(self) -> tuple[str, ...]:

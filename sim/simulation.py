@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,9 @@ from sim.lidar import Lidar, Scan
 from sim.motion import NS, REST, Pose, Twist, integrate
 from sim.odometry import OdometrySample, WheelOdometry
 from sim.robot import next_velocity, others, robot_model, starting
+from sim.sensors import Sensor, sensors_of
 from sim.shapes import Body
+from sim.topic_options import Timed
 from sim.world import World
 
 STEP_NS = 10_000_000
@@ -57,6 +60,7 @@ class Step:
         pose: In the world's frame.
         command: What was asked for, before any limit; zero after a rejected command.
         contact: What the robot touches, such as ``boxes[2]``, or None.
+        readings: Of the other sensors, those that are due.
     """
 
     index: int
@@ -68,6 +72,7 @@ class Step:
     events: tuple[Event, ...] = ()
     scan: Scan | None = None
     odometry: OdometrySample | None = None
+    readings: tuple[tuple[Sensor, Any], ...] = ()
 
 
 class Schedule:
@@ -77,7 +82,7 @@ class Schedule:
     after 40, 30, 30, 40, ... ms, 300 times in every 10 s.
     """
 
-    def __init__(self, options: LidarOptions | OdometryOptions) -> None:
+    def __init__(self, options: LidarOptions | OdometryOptions | Timed) -> None:
         """Begin at simulated time 0."""
         rate = Fraction(options.rate).limit_denominator(1_000_000)
         # Whole numbers are computed with several times as fast as fractions.
@@ -119,7 +124,9 @@ class Simulation:
         self.model = robot_model(options.robot)
         self.lidar = Lidar(world, options.lidar)
         self.body = body
-        lidar_seed, odometry_seed = np.random.SeedSequence(seed).spawn(2)
+        lidar_seed, odometry_seed, *seeds = np.random.SeedSequence(seed).spawn(
+            3 + len(options.ranges)
+        )
         self._noise = np.random.default_rng(lidar_seed)
         self._odometry = WheelOdometry(
             options.odometry,
@@ -130,6 +137,8 @@ class Simulation:
         self._contacts = ContactFinder(world, self.model.radius_m)
         self._scans = Schedule(options.lidar) if options.lidar.enabled else None
         self._samples = Schedule(options.odometry) if options.odometry.enabled else None
+        sensors = sensors_of(world, options, self.model.wheel_separation_m, seeds)
+        self.sensors = {sensor: Schedule(sensor.options) for sensor in sensors}
         self._drives = deque(sorted(options.robot.drives, key=lambda drive: drive.at))
         self._pushes = deque(sorted(options.robot.pushes, key=lambda push: push.after))
         self._pushed: tuple[int, Twist] = (0, REST)
@@ -151,9 +160,12 @@ class Simulation:
         """Simulated time."""
         return self._index * STEP_NS
 
-    def next_output_ns(self, *, scans: bool = True, odometry: bool = True) -> int | None:
+    def next_output_ns(
+        self, *, scans: bool = True, odometry: bool = True, others: Iterable[Sensor] = ()
+    ) -> int | None:
         """Simulated time of the next step that brings data of these sensors, or None for never."""
-        wanted = (scans and self._scans, odometry and self._samples)
+        wanted = [scans and self._scans, odometry and self._samples]
+        wanted += [self.sensors[one] for one in others]
         return min((one.next_ns for one in wanted if one), default=None)
 
     def advance(self, command: Twist | None = None) -> Step:
@@ -187,6 +199,9 @@ class Simulation:
             scan = self.lidar.scan(self.pose, time_ns, self._noise)
         if self._samples is not None and self._samples.is_due(time_ns):
             sample = self._odometry.sample(time_ns, self.pose, self._motion)
+        for sensor in self.sensors:
+            sensor.take_part(self._motion, STEP_S)
+        due = tuple(one for one, schedule in self.sensors.items() if schedule.is_due(time_ns))
         return Step(
             self._index,
             time_ns,
@@ -197,6 +212,7 @@ class Simulation:
             tuple(events),
             scan,
             sample,
+            tuple((one, one.read(self.pose, time_ns)) for one in due),
         )
 
     def _obey(self, command: Twist | None, events: list[Event]) -> None:

@@ -33,6 +33,7 @@ from grader.spec.quantity import Duration, DurationOrZero, PositiveLength, Ratio
 from grader.spec.source import Model
 from grader.spec.unit import parse_any
 from sim.description import LidarOptions, OdometryOptions, RobotOptions, SimulatorOptions, Topics
+from sim.sensor_options import BatteryOptions, ImuOptions, JointOptions, RangeOptions
 
 
 class RandomRange(Model):
@@ -299,6 +300,16 @@ class Scenario(Model):
     odometry: OdometryOptions = Field(
         default_factory=OdometryOptions, description="Its wheel odometry."
     )
+    imu: ImuOptions | None = Field(
+        None, description="Its IMU. By default it has none; `imu: {}` is one."
+    )
+    joint_states: JointOptions | None = Field(
+        None, description="Its wheel joints; `joint_states: {}` publishes them."
+    )
+    battery: BatteryOptions | None = Field(None, description="Its battery; `battery: {}` is one.")
+    ranges: tuple[RangeOptions, ...] = Field(
+        (), description="Its distance sensors, such as sonars."
+    )
     topics: Topics = Field(default_factory=Topics, description="Its topics with their QoS.")
     random: dict[Id, RandomRange] = Field(
         default_factory=dict,
@@ -334,9 +345,8 @@ class Scenario(Model):
     @property
     def simulator(self) -> SimulatorOptions:
         """Everything about the simulator but the world and the names of several robots."""
-        return SimulatorOptions(
-            robot=self.robot, lidar=self.lidar, odometry=self.odometry, topics=self.topics
-        )
+        own = {key: getattr(self, key) for key in SimulatorOptions.model_fields}
+        return SimulatorOptions(**own)
 
     @property
     def simulated(self) -> dict[str, SimulatorOptions]:
@@ -353,6 +363,7 @@ class Scenario(Model):
                 found[robot.topics.odometry.topic] = ODOMETRY
             if robot.lidar.enabled:
                 found[robot.topics.scan.topic] = LASER_SCAN
+            found |= {sensor.topic: sensor.interface for sensor in robot.sensors}
         return {**dict.fromkeys(self.transform_topics, TRANSFORMS), **found}
 
 

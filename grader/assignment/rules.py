@@ -30,6 +30,7 @@ from grader.spec.source import Source
 from grader.spec.unit import format_duration
 from grader.submission.read.lint import find_ruff, known_rules
 from grader.submission.read.rosdistro import PACKAGES
+from sim.description import SimulatorOptions
 
 _Lack = tuple[Place, str]
 """A place below the entry of a check, and what is wrong there."""
@@ -83,7 +84,7 @@ def _scenario(assignment: Assignment, scenario: Scenario) -> Iterator[tuple[Plac
         if not topics and getattr(until, key) is not None:
             yield ("until", key), "no topic is recorded: 'record' is missing"
     if scenario.world is None:
-        for key in ("robot", "robots", "lidar", "odometry", "topics"):
+        for key in ("robots", *SimulatorOptions.model_fields):
             if key in scenario.model_fields_set:
                 yield (key,), "a simulated robot needs a 'world', which is missing"
         for key in ("at_rest", "travelled"):

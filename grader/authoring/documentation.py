@@ -34,7 +34,7 @@ from grader.recording import model as recording
 from grader.recording.mcap_writer import FACTS
 from grader.report.concepts import concepts
 from grader.spec.unit import UNITS, Dimension, format_duration
-from sim import description, world_model
+from sim import description, sensor_options, world_model
 from sim.motion import Pose
 
 _MADE = "<!-- Made by `python -m grader.dev.docs` from the code: change it there. -->"
@@ -77,6 +77,11 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "robot: drives": description.Drive,
         "lidar": description.LidarOptions,
         "odometry": description.OdometryOptions,
+        "imu": sensor_options.ImuOptions,
+        "imu: noise": sensor_options.ImuNoise,
+        "joint_states": sensor_options.JointOptions,
+        "battery": sensor_options.BatteryOptions,
+        "ranges": sensor_options.RangeOptions,
         "odometry: drift": description.DriftOptions,
         "odometry: covariance": description.CovarianceOptions,
         "topics": description.Topics,

@@ -196,7 +196,7 @@ def read_topic(file: Path, topic: str) -> tuple[tuple[Message, ...], tuple[str, 
 def read_inputs(file: Path, recording: Recording) -> tuple[RawMessage, ...]:
     """The messages that the probe or the simulator published, in that order."""
     scenes = recording.scenes.values()
-    simulated = {topic for one in scenes for topic in (one.odometry_topic, one.scan_topic)}
+    simulated = {topic for one in scenes for topic in one.published}
     found: list[RawMessage] = []
     try:
         with file.open("rb") as stream:

@@ -76,6 +76,7 @@ class Scene:
         odometry_topic: Topic of its odometry.
         scan_topic: Topic of its scans.
         acceleration_m_s2: Limit of the robot, speeding up or braking.
+        sensor_topics: Topics of its other sensors.
     """
 
     radius_m: float
@@ -89,3 +90,9 @@ class Scene:
     odometry_topic: str = "/odom"
     scan_topic: str = "/scan"
     acceleration_m_s2: float = 1.0
+    sensor_topics: tuple[str, ...] = ()
+
+    @property
+    def published(self) -> tuple[str, ...]:
+        """Every topic that its sensors publish on."""
+        return (self.odometry_topic, self.scan_topic, *self.sensor_topics)

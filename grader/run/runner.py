@@ -181,7 +181,7 @@ def _topics(scenario: Scenario) -> tuple[Topic, ...]:
         command = robot.topics.command
         commands = Topic(command.topic, command.type, "reliable", "volatile", 100)
         found.setdefault(command.topic, commands)
-        for options in (robot.topics.odometry, robot.topics.scan):
+        for options in (robot.topics.odometry, robot.topics.scan, *robot.sensors):
             name = options.topic
             if name in scenario.recorded_types:
                 type = scenario.recorded_types[name]

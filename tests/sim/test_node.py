@@ -22,7 +22,7 @@ from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import LaserScan
+from sensor_msgs.msg import BatteryState, Imu, JointState, LaserScan, Range
 
 from grader.run.cell.domain import lock_domain
 from sim.description import SimulatorOptions
@@ -389,3 +389,35 @@ def test_the_loop_ends_with_its_context(bench: Bench) -> None:
     bench.context.try_shutdown()
     loop.join(LIMIT_S)
     assert not loop.is_alive()
+
+
+def test_the_other_sensors_of_a_turtlebot_arrive_with_their_units(bench: Bench) -> None:
+    simulator = bench.simulator(
+        robot={"drives": [{"at": "0 s", "linear": "0.1 m/s", "angular": "0.5 rad/s"}]},
+        lidar={"enabled": False},
+        odometry={"enabled": False},
+        imu={"noise": {"angular": "0 rad/s", "linear": "0.5 m/s^2"}},
+        joint_states={},
+        battery={"charge": "50 %"},
+        ranges=[{"topic": "/sonar", "frame": "sonar_link", "radiation": "infrared"}],
+    )
+    kinds = {"/imu": Imu, "/joint_states": JointState, "/battery_state": BatteryState}
+    heard = {topic: bench.listen(kind, topic) for topic, kind in {**kinds, "/sonar": Range}.items()}
+    publishers = [one.publisher for one in simulator.robots[""].sensors.values()]
+    bench.wait(lambda: all(one.get_subscription_count() == 1 for one in publishers), "match")
+    simulator.start()
+    for tenth in range(1, 11):
+        bench.step(simulator, 10)
+        bench.wait(lambda tenth=tenth: len(heard["/imu"]) == 5 * tenth, "an IMU")
+    bench.wait(lambda: all(heard.values()), "messages")
+    imu, joints, battery, sonar = (heard[topic][-1] for topic in heard)
+    assert imu.header.frame_id == "imu_link"
+    assert imu.angular_velocity.z == pytest.approx(0.5)
+    assert imu.linear_acceleration_covariance[0] == pytest.approx(0.25)
+    assert list(joints.name) == ["wheel_left_joint", "wheel_right_joint"]
+    assert list(joints.velocity) == pytest.approx([0.06 / 0.033, 0.14 / 0.033])
+    assert battery.percentage == pytest.approx(0.5, abs=1e-3)
+    assert battery.voltage == pytest.approx(11.25, abs=1e-2)
+    assert math.isnan(battery.current)
+    assert (sonar.radiation_type, sonar.max_range) == (Range.INFRARED, 4.0)
+    assert 2.0 < sonar.range < 3.1

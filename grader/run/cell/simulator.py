@@ -87,6 +87,7 @@ class SimulatedRobot:
             odometry_topic=options.topics.odometry.topic,
             scan_topic=options.topics.scan.topic,
             acceleration_m_s2=robot.limits.acceleration_m_s2,
+            sensor_topics=tuple(sensor.topic for sensor in options.sensors),
         )
 
     def keep(self, step: Step, stamp_ns: int) -> None:
