@@ -291,7 +291,8 @@ def _at_hand(place: str, packages: Packages) -> Iterator[Path | None]:
             with urllib.request.urlopen(url, timeout=_ANSWER_S) as answer, file.open("wb") as out:
                 shutil.copyfileobj(answer, out)
         except (OSError, ValueError) as error:
-            raise GraderFault(f"{url}: cannot be fetched: {error}") from error
+            reason = getattr(error, "reason", error)
+            raise GraderFault(f"{url}: cannot be fetched: {reason}") from error
         found = sha256_of(file)
         if found != wanted:
             raise UsageError(f"{url}: is not what was meant: its hash is {found}")
