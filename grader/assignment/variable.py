@@ -133,9 +133,14 @@ class Variable(Model):
         return f"/{name.lstrip('/')}" if self.is_of_runs and self.in_ != "parameters" else name
 
     @property
+    def is_free(self) -> bool:
+        """Whether the whole name may be any."""
+        return self.match == ANY
+
+    @property
     def part(self) -> str:
         """Regular expression of its values; of `any` they are whole names."""
-        if self.match == ANY:
+        if self.is_free:
             return ".+"
         return "[0-9]+" if isinstance(self.example, int) else "[A-Za-z0-9_]+"
 

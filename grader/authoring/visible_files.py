@@ -42,7 +42,7 @@ def visible_files(loaded: LoadedAssignment) -> dict[str, bytes]:
     files = grading_files(loaded)
     if HANDOUT_FILE in files:
         text = files[HANDOUT_FILE].decode("utf-8", "surrogateescape")
-        whole = with_table(text, loaded.assignment.contract)
+        whole = with_table(text, loaded.assignment)
         files[HANDOUT_FILE] = whole.encode("utf-8", "surrogateescape")
     part = visible_part(loaded)
     if part is loaded:

@@ -15,6 +15,7 @@ from grader.assignment.contract.table import MARKER, with_table
 from grader.assignment.load import load_assignment
 from grader.authoring.visible_files import visible_files
 from grader.errors import AssignmentError
+from grader.machine import resources
 from grader.report.html.handout import make_handout
 from grader.spec.document import write_yaml
 from grader.spec.source import parse_source
@@ -342,7 +343,7 @@ def test_a_rate_is_judged_and_told_in_the_table(write: Write) -> None:
     *_, rate = loaded.checks
     assert (rate.spec.id, rate.title) == ("rate", f"Messages come with {often}")
     assert rate.spec.with_ == {"topic": "/cmd_vel", "at_least": "9 Hz", "at_most": "11 Hz"}
-    assert f"| how often | {often} |" in with_table(MARKER, loaded.assignment.contract)
+    assert f"| how often | {often} |" in with_table(MARKER, loaded.assignment)
     (wrong,) = found(write(text.replace("at_least: 9 Hz, at_most: 11 Hz", "at_least: 9 m")))
     assert wrong.startswith("13: contract.packages.bot.executables.drive.publishes./cmd_vel: ")
 
@@ -370,3 +371,12 @@ def test_what_is_asked_of_a_value_is_told_in_the_title_and_in_the_handout(
     assert f"Every message has {words}" in [one.title for one in loaded.checks]
     field, _, rest = words.replace(" that", "").partition(" ")
     assert f"| message | `{field}` {rest};" in make_handout(loaded).text
+
+
+def test_a_handout_says_which_names_of_its_table_are_only_examples() -> None:
+    team = load_assignment(resources.root() / "docs" / "examples" / "rescue_team").assignment
+    said, _, table = with_table(MARKER, team).partition("\n\n")
+    assert said.startswith("These names are examples, and yours to choose: ") and said.endswith(".")
+    assert "`scout`" in said and "`/assign`" in said and "| offers the service | `/assign`" in table
+    # The package has the name of the team in front: it is no free name.
+    assert "red_rescue" not in said

@@ -8,8 +8,9 @@ from typing import Any
 
 from grader.assignment.contract.model import Connection, Contract, Declared, Program
 from grader.assignment.contract.standard import ANY, period_of, rate_words
+from grader.assignment.model import Assignment
 from grader.findings.fields import each_field, wanted_words
-from grader.findings.words import codes, listing, value_text
+from grader.findings.words import code, codes, listing, value_text
 from grader.spec.document import Place
 
 MARKER = "<!-- contract -->"
@@ -30,12 +31,15 @@ class Row:
         return f"{self.label} | {self.text}"
 
 
-def with_table(text: str, contract: Contract | None) -> str:
+def with_table(text: str, assignment: Assignment) -> str:
     """A handout with the table in place of its marker; what follows may be more of its rows."""
-    if contract is None or MARKER not in text:
+    if assignment.contract is None or MARKER not in text:
         return text
-    lines = "\n".join(f"| {row} |" for row in rows(contract))
-    return text.replace(MARKER, f"{_HEAD}\n{lines}")
+    lines = "\n".join(f"| {row} |" for row in rows(assignment.contract))
+    free = [one.whole(str(one.example)) for one in assignment.variables.values() if one.is_free]
+    shown = ", ".join(code(name) for name in dict.fromkeys(free) if code(name) in lines)
+    said = f"These names are examples, and yours to choose: {shown}.\n\n" if shown else ""
+    return text.replace(MARKER, f"{said}{_HEAD}\n{lines}")
 
 
 def rows(contract: Contract) -> Iterator[Row]:

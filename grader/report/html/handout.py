@@ -42,7 +42,7 @@ def make_handout(loaded: LoadedAssignment) -> Handout:
         text = file.read_text(encoding="utf-8") if file.is_file() else ""
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"{file} cannot be read: {error}") from error
-    text = with_table(text, loaded.assignment.contract)
+    text = with_table(text, loaded.assignment)
     all_points = total((*(one.spec.points for one in loaded.checks), loaded.withheld.points))
     here = total(bound.spec.points for bound in visible)
     hidden = len(loaded.checks) - len(visible) + loaded.withheld.checks
