@@ -51,13 +51,27 @@ class NotFollowing(Symptom[Finding]):
             if not all(self.derived.fitting(one.errors, index) for one in self.some)
         ]
 
+    @cached_property
+    def ages_s(self) -> list[float] | None:
+        """How old the values of each of some are, if all of them are those of an older source."""
+        ages, derived = [], self.derived
+        for sample in self.some:
+            older = derived.fitting(derived.errors(sample.values, range(sample.window[0])))
+            if not older:
+                return None
+            ages.append((sample.message.stamp_ns - derived.sources[older[-1]].stamp_ns) / NS)
+        still = spread([one.values[0] for one in self.some]) <= derived.tolerances[0]
+        # A value that never changes is old as well, but that says less.
+        return None if still and len(ages) > 1 else ages
+
 
 @explanation(NotFollowing)
 def older_values(symptom: NotFollowing) -> Finding | None:
     """The values are those of an older message: a timer or a sleep holds the newest one up."""
-    late_s, source = _lag_s(symptom.derived, symptom.some), symptom.source
-    if late_s is None:
+    ages_s, source = symptom.ages_s, symptom.source
+    if ages_s is None:
         return None
+    late_s = sorted(ages_s)[len(ages_s) // 2]
     return mistaken(
         "older_values",
         f"the values are those of {source} {format_duration(late_s)} earlier",
@@ -92,19 +106,6 @@ def other_values(symptom: NotFollowing) -> Finding:
         source=source,
         values=codes(derived.values[index] for index in bad),
     )
-
-
-def _lag_s(derived: DerivedMessages, wrong: list[Sample]) -> float | None:
-    """How old the values are, if all wrong messages have those of an older source."""
-    ages = []
-    for sample in wrong:
-        older = derived.fitting(derived.errors(sample.values, range(sample.window[0])))
-        if not older:
-            return None
-        ages.append((sample.message.stamp_ns - derived.sources[older[-1]].stamp_ns) / NS)
-    still = spread([sample.values[0] for sample in wrong]) <= derived.tolerances[0]
-    # A value that never changes is old as well, but that says less.
-    return None if still and len(wrong) > 1 else sorted(ages)[len(ages) // 2]
 
 
 def _clause(derived: DerivedMessages, seen: list[Sample], wrong: list[Sample], index: int) -> str:

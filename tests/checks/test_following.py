@@ -165,6 +165,18 @@ class TestPasses:
         busy = recording(messages=late.messages, disturbance=taken(0.1, 4.0, waited_s=1.0))
         assert (verdict(busy).status, verdict(busy).disturbed) == (Status.ERROR, True)
 
+    def test_what_still_waits_in_queues_after_a_delay_is_not_reported_as_a_lag(self):
+        """The delay is before the newest values that a quick node could have had."""
+        late = run(lambda t: right(t - 1.2), times=TIMES[30:34])
+        assert "s earlier" in verdict(late, at_least=4).observed
+        for waited_s, is_undecided in ((0.3, False), (0.8, True)):
+            busy = taken(TIMES[30] - 1.9, TIMES[30] - 1.2, waited_s=waited_s)
+            found = verdict(recording(messages=late.messages, disturbance=busy), at_least=4)
+            assert (found.disturbed, found.status is Status.FAILED) == (
+                is_undecided,
+                not is_undecided,
+            )
+
     def test_a_node_that_does_not_lag_passes_on_a_busy_machine(self):
         busy = recording(messages=run(right).messages, disturbance=taken(0.1, 4.0, waited_s=1.0))
         assert verdict(busy).status is Status.PASSED

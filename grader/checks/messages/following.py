@@ -17,7 +17,7 @@ from grader.findings.finding import Evidence, Finding, Plot, evidence_at
 from grader.findings.value import FieldPath
 from grader.findings.words import code, counted, listing
 from grader.measure.derived_messages import DerivedMessages, Sample
-from grader.recording.model import Recording
+from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
 
@@ -94,7 +94,8 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         )
     wrong = [sample for sample in judged if sample.number not in right]
     if wrong:
-        return _failure(recording, NotFollowing(source, derived, judged, wrong))
+        symptom = NotFollowing(source, derived, judged, wrong)
+        return _held_up(recording, parameters, symptom) or _failure(recording, symptom)
     late = [one for one in judged if not derived.fitting(one.errors[one.excused :])]
     # Where the machine took nothing, no message is excused: most of them decide for all.
     undisturbed = sum(not one.excused for one in judged)
@@ -120,6 +121,22 @@ def _judged(
     if first and known[first - 1].message.stamp_ns > settled_ns:
         first = 0
     return known[first:]
+
+
+def _held_up(recording: Recording, parameters: Follows, symptom: NotFollowing) -> Finding | None:
+    """Undecided, if the machine had taken as much time as all of the values are too old.
+
+    What waits in the queues of several nodes after a delay takes as long again.
+    """
+    stolen_s = 0.0
+    for sample, age_s in zip(symptom.some, symptom.ages_s or (), strict=False):
+        now_ns = sample.message.stamp_ns
+        stolen_s = recording.stolen_s(now_ns - round(2.0 * age_s * NS), now_ns)
+        if age_s - parameters.within > stolen_s:
+            return None
+    if not stolen_s:
+        return None
+    return Finding.held_up(f"{len(symptom.wrong)} of the messages have older values", stolen_s)
 
 
 def _failure(recording: Recording, symptom: NotFollowing) -> Finding:
