@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -25,6 +26,12 @@ def pytest_configure() -> None:
     A shell starts such jobs with it ignored, and every process that they start inherits that.
     """
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(scope="session")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cache folder of rosgrade's: the Python of the sandbox in it is made once."""
+    return tmp_path_factory.mktemp("cache")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

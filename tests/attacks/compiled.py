@@ -7,42 +7,11 @@ from typing import Any
 from tests.attacks.attack import ALIVE, HOLDER, Attack
 from tests.attacks.submissions import compiled_node
 
-_BOMB = """\
-while (true) {
-  if (fork() == 0) {
-    setsid();
-  }
-}
-"""
-_SHARED_MEMORY = """\
-const size_t size = 3UL << 30;
-char * shared = static_cast<char *>(
-  mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
-for (size_t place = 0; place < size; place += 4096) {
-  shared[place] = 1;
-}
-"""
-_OUTPUT = """\
-static char block[1 << 18];
-memset(block, 'x', sizeof(block));
-while (write(1, block, sizeof(block)) > 0) {
-}
-"""
 _DEAF = "for (int number : {SIGINT, SIGTERM, SIGHUP}) {signal(number, SIG_IGN);}\n"
 _ENDLESS = f"""{_DEAF}
 volatile bool forever = true;
 std::thread([&] {{while (forever) {{}}}}).detach();
 while (forever) {{
-}}
-"""
-_DAEMON = f"""\
-if (fork() == 0) {{
-  setsid();
-  if (fork() == 0) {{
-    {_DEAF}
-    execlp("sleep", "sleep", "86397", nullptr);
-  }}
-  _exit(0);
 }}
 """
 _FORGED = """\
@@ -134,20 +103,6 @@ for (const char * file : {"/mem", "/environ", "/fd/3"}) {
 }
 process_vm_writev(parent, nullptr, 0, nullptr, 0, 0);
 """
-_GARBAGE = """\
-char packet[200] = "RTPS";
-const int udp = socket(AF_INET, SOCK_DGRAM, 0);
-for (uint16_t port : {7400, 7401, 7410, 7411, 7412, 7413}) {
-  sockaddr_in to{};
-  to.sin_family = AF_INET;
-  to.sin_port = htons(port);
-  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  for (int number = 0; number < 200; ++number) {
-    packet[20 + number % 100] = static_cast<char>(number);
-    sendto(udp, packet, sizeof(packet), 0, reinterpret_cast<sockaddr *>(&to), sizeof(to));
-  }
-}
-"""
 _COMMANDS = """\
 execute_process(COMMAND touch /etc/planted RESULT_VARIABLE unwritten)
 execute_process(COMMAND cat /etc/shadow RESULT_VARIABLE unread)
@@ -192,29 +147,12 @@ def unseen(**more: Any) -> Attack:
 
 RIGHT = compiled()
 COMPILED = {
-    "cpp_fork_bomb": ended(_BOMB, "sessions"),
-    "cpp_heap": ended("while (true) {new char[1 << 24];}", "std::bad_alloc"),
-    "cpp_shared_memory": ended(_SHARED_MEMORY, "MiB of memory"),
-    "cpp_endless_output": ended(_OUTPUT, "MiB of output"),
     "cpp_endless_loop": ended(_ENDLESS, "s of CPU time, 3 s are allowed"),
-    "cpp_ignores_signals": compiled(
-        _DEAF + "while (true) {\n  tick();\n  usleep(100000);\n}",
-        lost=frozenset({"ends", "timer"}),
-        named=("SIGKILL",),
-    ),
-    "cpp_daemon": compiled(_DAEMON, lost=frozenset({"ends"}), named=("86397",)),
-    "cpp_kills_the_probe": ended("kill(getppid(), SIGKILL);", f"sent SIGKILL to {HOLDER}"),
     "cpp_attacks_the_probe": ended(
         _PROBE,
         *("/mem: no", "/environ: no", "/fd/3: no"),
         f"called `process_vm_writev` on {HOLDER}",
     ),
-    "cpp_another_domain": compiled(
-        at_import='setenv("ROS_DOMAIN_ID", "5", 1);',
-        lost=frozenset({"starts"}),
-        named=("joined ROS domain 5",),
-    ),
-    "cpp_garbage_on_dds_ports": ended(_GARBAGE, "sent garbage to the UDP ports"),
     "cpp_forged_tracer": ended(_FORGED, "wrote into the channel"),
     "cpp_declares_a_timer_beside_a_thread": compiled(
         files={"src/bot_pub.cpp": compiled_node().replace(_TIMER, _FORGED_TIMER)},
@@ -234,9 +172,7 @@ COMPILED = {
         "it started 64 processes",
         at_build="execute_process(COMMAND sh -c [[b() { b & b & exec sleep 99; }; b]])",
     ),
-    "cpp_build_memory": unbuilt(
-        "memory", files={"src/before.hpp": '#include "/dev/zero"'}
-    ),
+    "cpp_build_memory": unbuilt("memory", files={"src/before.hpp": '#include "/dev/zero"'}),
     "cpp_build_disk": unbuilt(
         "File size limit exceeded",
         files={"src/before.hpp": "static char wide[1 << 30] = {1};\nchar * used = wide;"},

@@ -25,12 +25,6 @@ MARKER = f"rosgrade-attack-{os.getpid()}"
 
 
 @pytest.fixture(scope="session")
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """rosgrade's cache folder."""
-    return tmp_path_factory.mktemp("cache")
-
-
-@pytest.fixture(scope="session")
 def sandbox(cache: Path) -> Sandbox:
     """The sandbox; without one there is nothing to attack."""
     found = try_sandbox()

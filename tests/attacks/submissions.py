@@ -49,8 +49,6 @@ COMPILED_NODE = """\
 #include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
-#include <netinet/in.h>
-#include <sys/mman.h>
 #include <sys/uio.h>
 #include <unistd.h>
 #include <geometry_msgs/msg/twist.h>

@@ -1,15 +1,21 @@
 """Submissions that fight: each costs its own points, is named in its report, and nothing else.
 
-A class of honest submissions is graded twice: by itself, and with all hostile ones among it,
-several at once. Every honest grade must be the same, byte for byte.
+A class of honest submissions is graded by itself, with all hostile ones among it, several at once,
+and with those among it that hoard what all processes of a user share; the last as most shells start
+things, with 1024 open files, and as an ordinary user. Every honest grade must be the same, byte for
+byte.
 """
 
 from __future__ import annotations
 
 import html
+import json
 import os
 import random
 import re
+import resource
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -601,6 +607,21 @@ HONEST = {
 }
 """Right and wrong, without any bad intent."""
 
+OPEN_FILES = 1024
+USER = 61_500
+BESIDE_HOARDS = (
+    "right",
+    "misnamed",
+    "stops_too_early",
+    "crashes",
+    "does_unusual_things",
+    "does_not_build",
+)
+HOARDS = {name: attack for name, attack in ATTACKS.items() if "hoards" in name}
+HOARDS |= {f"hoards_{number}": ATTACKS["hoards_descriptors_in_flight"] for number in range(4)}
+HOARDS |= {"writes_into_the_init": ATTACKS["writes_into_the_init"]}
+HOARDS |= {name: attack for name, attack in ATTACKS.items() if name.startswith("is_stopped")}
+
 
 @dataclass(frozen=True)
 class Handed:
@@ -631,8 +652,8 @@ class Handed:
         return "\n".join([*lines, build.log[-500:] if build and not build.succeeded else ""])
 
 
-def grade_class(folder: Path, members: dict[str, Attack]) -> dict[str, Handed]:
-    """Grade a class as `rosgrade batch` does, in an order of its own, with nothing cached."""
+def grade_class(folder: Path, members: dict[str, Attack], sandbox: Sandbox) -> dict[str, Handed]:
+    """Grade a class as `rosgrade batch` does, in an order of its own, with no build cached."""
     submissions, staging = folder / "class", folder / "staging"
     staging.mkdir(parents=True)
     for name, member in members.items():
@@ -640,13 +661,12 @@ def grade_class(folder: Path, members: dict[str, Attack]) -> dict[str, Handed]:
     rows = collect(submissions, staging)
     random.Random(1).shuffle(rows)
     loaded = load_assignment(LESSON)
-    cache = folder / "cache"
     with (
-        Runner(ros.find(), sandbox=Sandbox(cache)) as runner,
+        Runner(ros.find(), sandbox=sandbox) as runner,
         Ledger(folder / "out").opened() as ledger,
     ):
         batch = Batch(loaded, ledger)
-        executor = LocalExecutor(Grading(loaded, runner, cache), AT_ONCE)
+        executor = LocalExecutor(Grading(loaded, runner, folder / "cache"), AT_ONCE)
         try:
             done = list(batch.grade(batch.read(rows)[1], executor))
         finally:
@@ -679,13 +699,13 @@ def named(members: dict[str, Attack]) -> list[Any]:
 @pytest.fixture(scope="module")
 def calm(sandbox: Sandbox, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Handed]:
     """The honest ones among themselves."""
-    return grade_class(tmp_path_factory.mktemp("calm"), possible(HONEST))
+    return grade_class(tmp_path_factory.mktemp("calm"), possible(HONEST), sandbox)
 
 
 @pytest.fixture(scope="module")
 def graded(sandbox: Sandbox, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Handed]:
     """The same honest ones, with all the others among them."""
-    return grade_class(tmp_path_factory.mktemp("hostile"), possible({**HONEST, **ATTACKS}))
+    return grade_class(tmp_path_factory.mktemp("hostile"), possible({**HONEST, **ATTACKS}), sandbox)
 
 
 @pytest.mark.parametrize("name", named(ATTACKS))
@@ -719,3 +739,59 @@ def test_what_it_prints_is_shown_and_never_executed(graded: dict[str, Handed]) -
     assert "alert(2)" in page
     assert "<script>alert" not in page and "<img src=x" not in page
     assert "\x1b" not in page
+
+
+def bound() -> None:
+    resource.setrlimit(resource.RLIMIT_NOFILE, (OPEN_FILES, OPEN_FILES))
+
+
+def as_a_user(folder: Path) -> list[str]:
+    """What to start a program with, so that it does not run as root; empty where it need not."""
+    drop = ["setpriv", f"--reuid={USER}", f"--regid={USER}", "--clear-groups"]
+    tried = [*drop, sys.executable, "-c", "import os, sys; os.stat(sys.executable)"]
+    if os.geteuid() != 0 or subprocess.run(tried, capture_output=True, check=False).returncode:
+        return []
+    for place in (folder, *folder.parents):
+        if place.owner() == "root" and place != Path("/tmp"):
+            place.chmod(place.stat().st_mode | 0o055)
+        if place.name.startswith("pytest-of"):
+            break
+    os.chown(folder, USER, USER)
+    return drop
+
+
+def test_six_honest_grades_are_the_same_bits_beside_submissions_that_hoard(
+    calm: dict[str, Handed], tmp_path: Path
+) -> None:
+    members = (*BESIDE_HOARDS, *HOARDS)
+    done = subprocess.run(
+        [*as_a_user(tmp_path), sys.executable, "-m", __name__, str(tmp_path), *members],
+        preexec_fn=bound,
+        env={**os.environ, "HOME": str(tmp_path)},
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,
+    )
+    assert done.returncode == 0, done.stderr
+    beside: dict[str, str] = json.loads(done.stdout.splitlines()[-1])
+    for name in BESIDE_HOARDS:
+        assert beside[name] == grade_json(calm[name].result)
+    for name, attack in HOARDS.items():
+        assert all(text in beside[name] for text in attack.named), (name, beside[name])
+
+
+def main(folder: str, *names: str) -> None:
+    """Grade some of the submissions, and print what came of each."""
+    known, place = {**HONEST, **HOARDS}, Path(folder, "graded")
+    members = {name: known[name] for name in names}
+    handed = grade_class(place, members, Sandbox(place / "cache"))
+    told = {
+        name: grade_json(one.result) if name in HONEST else one.told for name, one in handed.items()
+    }
+    print(json.dumps(told))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

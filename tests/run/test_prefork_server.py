@@ -33,11 +33,11 @@ pytestmark = pytest.mark.ros
 
 
 @pytest.fixture
-def sandbox(tmp_path: Path) -> Sandbox:
+def sandbox(cache: Path) -> Sandbox:
     found = try_sandbox()
     if found.problem:
         pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
-    return Sandbox(tmp_path / "cache")
+    return Sandbox(cache)
 
 
 def prefork_servers() -> set[int]:

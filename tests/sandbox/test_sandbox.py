@@ -38,11 +38,11 @@ def test_rosgrade_s_code_is_covered_where_it_would_be_shown() -> None:
 
 
 def test_assignments_are_covered_where_rosgrade_is_installed_in_its_environment(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, cache: Path
 ) -> None:
     data = Path(sys.prefix).resolve() / "lib"
     monkeypatch.setattr(sandbox, "_DATA", data)
-    command = Sandbox(tmp_path).server_command(["true"], ros.find(), tmp_path, {})
+    command = Sandbox(cache).server_command(["true"], ros.find(), tmp_path, {})
     covered = [command[at + 1] for at, text in enumerate(command) if text == "--tmpfs"]
     assert str(sandbox.ENVIRONMENT / "lib") in covered
     assert str(data) not in covered
@@ -118,8 +118,8 @@ def test_a_damaged_python_or_filter_is_made_anew(tmp_path: Path) -> None:
     assert found.read_bytes() == whole
 
 
-def test_a_library_that_the_assignment_allows_is_there(tmp_path: Path) -> None:
-    sandbox = Sandbox(tmp_path).allowing(("SciPy",))
+def test_a_library_that_the_assignment_allows_is_there(cache: Path) -> None:
+    sandbox = Sandbox(cache).allowing(("SciPy",))
     (site,) = sandbox.python_tree.glob("lib/python3*/site-packages")
     assert (site / "scipy").is_dir()
     assert sandbox.allowing(("SciPy",)) is sandbox
@@ -171,7 +171,7 @@ def test_what_was_not_used_for_a_month_is_thrown_away(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"a", "b"}
 
 
-def test_a_build_room_writes_only_where_it_may(tmp_path: Path) -> None:
+def test_a_build_room_writes_only_where_it_may(tmp_path: Path, cache: Path) -> None:
     found = trial.try_sandbox()
     if found.problem:
         pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
@@ -181,7 +181,7 @@ def test_a_build_room_writes_only_where_it_may(tmp_path: Path) -> None:
         f"(echo x > {path}) 2>/dev/null && echo {path}"
         for path in (folder / "file", "/tmp/file", "/usr/file", "/etc/file", "/file", "/dev/file")
     )
-    with Sandbox(tmp_path / "cache").build(ros.find(), (folder,)) as room:
+    with Sandbox(cache).build(ros.find(), (folder,)) as room:
         ended = subprocess.run(
             room.command(["/bin/sh", "-c", script + "; id -u; echo $SECRET"], {"PATH": "/usr/bin"}),
             env={**room.environment, "SECRET": "secret"},
@@ -228,8 +228,10 @@ def test_the_filter_refuses_and_pretends(tmp_path: Path) -> None:
     assert said.stdout.split() == ["True", "True", "True", "0"], said.stderr
 
 
-def test_no_two_builds_and_no_run_are_one_user_where_we_are_root(tmp_path: Path) -> None:
-    sandbox, installation = Sandbox(tmp_path / "cache"), ros.find()
+def test_no_two_builds_and_no_run_are_one_user_where_we_are_root(
+    tmp_path: Path, cache: Path
+) -> None:
+    sandbox, installation = Sandbox(cache), ros.find()
     folders = [tmp_path / "one", tmp_path / "other"]
     for folder in folders:
         folder.mkdir()

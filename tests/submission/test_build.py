@@ -331,19 +331,23 @@ def test_a_failure_is_not_hidden_by_last_words_without_a_line_end(
 
 
 def test_a_sandbox_that_does_not_start_is_no_fault_of_the_student(
-    tree: Tree, real_ros: RosInstallation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tree: Tree,
+    real_ros: RosInstallation,
+    cache: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     bwrap = tmp_path / "bin/bwrap"
     bwrap.parent.mkdir()
     bwrap.write_text("#!/bin/sh\necho bwrap: Creating new namespace failed >&2\nexit 1\n")
     bwrap.chmod(0o755)
     tree.package()
-    cache = tree.root.parent / "cache"
+    builds = tree.root.parent / "cache"
     with monkeypatch.context() as patched:
         patched.setenv("PATH", f"{bwrap.parent}:{os.environ['PATH']}")
         with pytest.raises(GraderFault, match="sandbox of the build could not be started"):
-            prepare(tree.root, Preparation(ros=real_ros, cache=cache, sandbox=Sandbox(cache)))
-    assert list(cache.rglob("build.json")) == []
+            prepare(tree.root, Preparation(ros=real_ros, cache=builds, sandbox=Sandbox(cache)))
+    assert list(builds.rglob("build.json")) == []
 
 
 def test_a_package_of_jazzy_that_is_not_installed_keeps_only_what_rests_on_it(
@@ -441,12 +445,18 @@ if 'install' in sys.argv:
     [("runpy", 1, True), ("runpy", 9, False), ("setup.py", 1, True)],
 )
 def test_a_build_that_is_killed_from_outside_is_built_again_and_never_kept(
-    tree: Tree, real_ros: RosInstallation, enclosed: bool, target: str, times: int, graded: bool
+    tree: Tree,
+    real_ros: RosInstallation,
+    cache: Path,
+    enclosed: bool,
+    target: str,
+    times: int,
+    graded: bool,
 ) -> None:
     if enclosed and try_sandbox().problem:
         pytest.skip("no sandbox on this machine")
     tree.package({"setup.py": WAITS})
-    cache = tree.root.parent / "cache"
+    builds = tree.root.parent / "cache"
     killed: list[int] = []
 
     def kill(line: str) -> None:
@@ -461,7 +471,7 @@ def test_a_build_that_is_killed_from_outside_is_built_again_and_never_kept(
     def graded_now() -> Prepared:
         sandbox = Sandbox(cache) if enclosed else None
         return prepare(
-            tree.root, Preparation(ros=real_ros, cache=cache, sandbox=sandbox, on_output=kill)
+            tree.root, Preparation(ros=real_ros, cache=builds, sandbox=sandbox, on_output=kill)
         )
 
     if graded:
@@ -471,7 +481,7 @@ def test_a_build_that_is_killed_from_outside_is_built_again_and_never_kept(
     with pytest.raises(GraderFault, match="ended in the middle of a build"):
         graded_now()
     assert len(killed) == 2
-    assert list(cache.rglob("build.json")) == []
+    assert list(builds.rglob("build.json")) == []
 
 
 def test_the_students_own_tests_run_with_what_was_built(

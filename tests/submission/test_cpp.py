@@ -260,11 +260,12 @@ def test_broken_classes_give_an_outline(parts: list[str]) -> None:
     assert {one.name.rpartition("::")[2] for one in found.classes} <= {"Bot"}
 
 
-def handed_in(root: Path, files: dict[str, Any], isolated: bool = False) -> dict[str, SourceFile]:
+def handed_in(
+    root: Path, files: dict[str, Any], sandbox: Sandbox | None = None
+) -> dict[str, SourceFile]:
     for path, data in files.items():
         (root / path).parent.mkdir(parents=True, exist_ok=True)
         (root / path).write_bytes(data if isinstance(data, bytes) else data.encode())
-    sandbox = Sandbox(root.with_name("cache")) if isolated else None
     with opened(root) as located:
         return read_cpp(located, find_ros(), sandbox)
 
@@ -274,10 +275,10 @@ PACKAGE = {"bot/package.xml": "<package/>", "bot/src/bot.cpp": "class Bot {};"}
 
 @pytest.mark.parametrize("isolated", [True, False], ids=["sandbox", "none"])
 def test_files_of_a_submission_are_read_in_a_process_of_their_own(
-    tmp_path: Path, isolated: bool
+    tmp_path: Path, cache: Path, isolated: bool
 ) -> None:
     files = {**PACKAGE, "bot/a b.hpp": "struct ä {};", "bot/latin.hpp": b"// \xe4\nclass L {};"}
-    found = handed_in(tmp_path / "in", files, isolated)
+    found = handed_in(tmp_path / "in", files, Sandbox(cache) if isolated else None)
     assert {path: one.classes for path, one in found.items()} == {
         "bot/src/bot.cpp": (SourceClass("Bot", 1, end=1),),
         "bot/a b.hpp": (SourceClass("ä", 1, end=1),),

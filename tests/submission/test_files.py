@@ -91,13 +91,14 @@ def test_a_bag_whose_recording_did_not_end_says_so(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("isolated", [True, False], ids=["sandbox", "none"])
 def test_a_bag_that_unpacks_to_more_than_a_disk_fills_none(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, isolated: bool
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch, isolated: bool
 ) -> None:
     elsewhere = tmp_path / "tmp"
     elsewhere.mkdir()
     monkeypatch.setenv("TMPDIR", str(elsewhere))
     monkeypatch.setattr(reader, "BUILD", replace(BUILD, disk_bytes=8 * MIB, file_bytes=8 * MIB))
-    record = read(packed_bag(tmp_path / "submission", 64 * MIB), isolated=isolated)
+    bag = packed_bag(tmp_path / "submission", 64 * MIB)
+    record = read(bag, Sandbox(cache) if isolated else None)
     assert "cannot be read" in str(record.problem)
     assert not list(elsewhere.iterdir())
 
@@ -112,8 +113,7 @@ def test_a_bag_is_read_only_where_a_check_asks_for_it(tmp_path: Path) -> None:
         assert (record.bags is not None) is asked
 
 
-def read(bag: Path, *, isolated: bool = False) -> BagRecord:
-    sandbox = Sandbox(bag.parent.with_name("cache")) if isolated else None
+def read(bag: Path, sandbox: Sandbox | None = None) -> BagRecord:
     with opened(bag.parent) as located:
         (record,) = read_bags(located, find_ros(), sandbox)
     return record
