@@ -9,7 +9,7 @@ import pytest
 from grader.report.html.overview import MOST_SHOWN, render_overview
 from grader.report.model.class_row import ClassRow
 from grader.report.model.cluster import clusters
-from tests.browser.test_report import violations
+from tests.browser.test_report import EACH_WIDTH_AND_SCHEME, violations
 from tests.report.classroom import classroom
 from tests.report.sample import full_points, reviewed
 
@@ -22,8 +22,7 @@ def page_of_few():
     return render_overview(classroom(FEW))
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [390, 1280])
+@pytest.mark.parametrize(("width", "scheme"), EACH_WIDTH_AND_SCHEME)
 def test_an_overview_is_accessible_quiet_and_fits(look, width, scheme):
     waits = full_points().result.model_copy(update=reviewed("x", waits=True))
     rows = [*classroom(FEW), ClassRow("zed", "", "zed/report.html", waits)]

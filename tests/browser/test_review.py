@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page, expect
 from grader.review.store import ReviewStore
 from grader.server.review import ReviewServer
 from tests.browser.conftest import SCREENSHOTS
-from tests.browser.test_report import violations
+from tests.browser.test_report import EACH_WIDTH_AND_SCHEME, violations
 from tests.server.make_class import NODE, hand_in_again, make_class
 
 pytestmark = pytest.mark.slow
@@ -56,8 +56,7 @@ def saved(page: Page) -> None:
     expect(page.locator("#saved")).to_have_text(SAVED)
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [390, 1280])
+@pytest.mark.parametrize(("width", "scheme"), EACH_WIDTH_AND_SCHEME)
 @pytest.mark.parametrize(
     "path", ["", "s/ben/", "s/ben/#source", "clusters#cause-1", "regrade?check=docs"]
 )
