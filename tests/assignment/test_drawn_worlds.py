@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -28,19 +28,21 @@ P_CONTROLLER = load_assignment("p_controller")
 
 
 def worlds(
-    loaded: LoadedAssignment, scenario_id: str
+    loaded: LoadedAssignment, scenario_id: str, seeds: Iterable[int] = SEEDS
 ) -> Iterator[tuple[Scenario, World, dict[str, float]]]:
-    """World and values of a scenario for every seed."""
+    """World and values of a scenario for each seed."""
     (scenario,) = [one for one in loaded.assignment.scenarios if one.id == scenario_id]
-    for seed in SEEDS:
+    for seed in seeds:
         values = draw_values(scenario, seed)
         file = loaded.folder / str(scenario.world)
         yield scenario, read_scenario_world(file, world_values(scenario, values)), values
 
 
-def drawn(scenario_id: str) -> Iterator[tuple[Scenario, Pose, Pose, dict[str, Any]]]:
-    """Start, goal and parameters of a scenario of p_controller for every seed."""
-    for scenario, world, values in worlds(P_CONTROLLER, scenario_id):
+def drawn(
+    scenario_id: str, seeds: Iterable[int] = SEEDS
+) -> Iterator[tuple[Scenario, Pose, Pose, dict[str, Any]]]:
+    """Start, goal and parameters of a scenario of p_controller for each seed."""
+    for scenario, world, values in worlds(P_CONTROLLER, scenario_id, seeds):
         given = {key: fill_in(it, values) for key, it in scenario.launch[0].parameters.items()}
         goal = Pose(given["goal_x"], given["goal_y"], wrap_angle(given["goal_theta"]))
         yield scenario, world.start, goal, given
@@ -89,7 +91,7 @@ def test_no_start_is_where_the_handout_lets_it_start() -> None:
 
 
 def test_every_push_ends_a_way_that_is_counted_and_none_that_is_seen() -> None:
-    for scenario, start, goal, given in drawn("random"):
+    for scenario, start, goal, given in drawn("random", SEEDS[::8]):
         pose = goal.x_m, goal.y_m, goal.yaw_rad
         near = {"near": given["goal_tolerance"], "straight": given["angle_tolerance"]}
         sees = run(scenario, start, on_odometry(Student(pose, **near)))
