@@ -6,13 +6,13 @@ graded here, so that the tests stay short. `rosgrade selftest` grades them all.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import pytest
 
 from grader.assignment.load import list_assignments, load_assignment
 from grader.assignment.mutant import reference_of
-from grader.authoring.mutants.selftest import Role, Setup, mutation_score, selftest, trials
+from grader.authoring.mutants.selftest import Role, Setup, Trial, mutation_score, selftest, trials
 from grader.grading.grading import Grading
 from grader.grading.type_support import missing_underlays
 from grader.machine import resources, ros
@@ -45,6 +45,10 @@ def runner() -> Iterator[Runner]:
         yield made
 
 
+def middle(some: Sequence[Trial]) -> Trial:
+    return some[len(some) // 2]
+
+
 @pytest.mark.ros
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
@@ -53,8 +57,11 @@ def test_the_mutation_score_is_perfect(name: str, runner: Runner) -> None:
     for missing in missing_underlays(loaded):
         pytest.skip(missing)
     every = trials(loaded)
-    assert sum(trial.role is Role.MUTANT for trial in every) >= LEAST_MUTANTS
-    kept = (every[0], every[len(every) // 2], every[-1])
+    mutants = [trial for trial in every if trial.role is Role.MUTANT]
+    assert len(mutants) >= LEAST_MUTANTS
+    # A mistake that a run imposes on the reference needs no build of its own.
+    imposed = [trial for trial in mutants if trial.mistakes and name in COMPILED]
+    kept = (every[0], middle(imposed or mutants), every[-1])
     grading = Grading(loaded, runner, resources.cache_folder())
     setup = Setup(loaded, grading, reference_of(loaded.assignment.id, loaded.folder))
     results = list(selftest(setup, kept, jobs=cpu_count()))
