@@ -301,7 +301,7 @@ def test_an_executable_that_does_not_exist_is_recorded(run_node: RunNode) -> Non
 
 @pytest.mark.slow
 def test_a_gigabyte_of_output_is_drained_and_bounded(run_node: RunNode) -> None:
-    recording = run_node(nodes.FLOOD)
+    recording = run_node(nodes.FLOOD, timeout="60 s")
     kept = sum(len(line.text) for line in recording.log)
     assert recording.processes[0].exit_code == 0
     assert kept < 2**20
@@ -404,10 +404,10 @@ def one_run(*arguments: str) -> subprocess.Popen[str]:
 
 
 @pytest.mark.slow
-def test_ten_at_once_never_hear_each_other(tmp_path: Path) -> None:
-    processes = [one_run(str(tmp_path / str(n)), f"{n}.0") for n in range(1, 11)]
+def test_five_at_once_never_hear_each_other(tmp_path: Path) -> None:
+    processes = [one_run(str(tmp_path / str(n)), f"{n}.0") for n in range(1, 6)]
     heard = [process.communicate()[0].split() for process in processes]
-    assert heard == [[f"{number}.0"] for number in range(1, 11)]
+    assert heard == [[f"{number}.0"] for number in range(1, 6)]
 
 
 def test_nothing_survives_the_end_of_the_process_that_ordered_the_run(tmp_path: Path) -> None:
