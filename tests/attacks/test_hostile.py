@@ -618,7 +618,7 @@ BESIDE_HOARDS = (
     "does_not_build",
 )
 HOARDS = {name: attack for name, attack in ATTACKS.items() if "hoards" in name}
-HOARDS |= {f"hoards_{number}": ATTACKS["hoards_descriptors_in_flight"] for number in range(4)}
+HOARDS |= {f"hoards_{number}": ATTACKS["hoards_descriptors_in_flight"] for number in range(3)}
 HOARDS |= {"writes_into_the_init": ATTACKS["writes_into_the_init"]}
 HOARDS |= {name: attack for name, attack in ATTACKS.items() if name.startswith("is_stopped")}
 
