@@ -26,7 +26,14 @@ OFFLINE = (
 MISSING = "no Chromium here, so no page was looked at: sudo apt install chromium"
 SCREENSHOTS = resources.PACKAGE.parent / "rosgrade-report" / "screenshots"
 _missing: list[str] = []
-_taken: list[Path] = []
+_taken: list[str] = []
+
+
+def keep(page: Page, name: str) -> None:
+    """Keep a picture of all of a page to look at, where ROSGRADE_SCREENSHOTS asks for it."""
+    if "ROSGRADE_SCREENSHOTS" in os.environ:
+        page.screenshot(path=SCREENSHOTS / f"{name}.png", full_page=True)
+        _taken.append(name)
 
 
 @dataclass
@@ -37,11 +44,8 @@ class Look:
     complaints: list[str] = field(default_factory=list)
     requests: list[str] = field(default_factory=list)
 
-    def keep(self, name: str, **options: object) -> None:
-        """Keep a screenshot to look at."""
-        file = SCREENSHOTS / f"{name}.png"
-        self.page.screenshot(path=file, **options)  # type: ignore[arg-type]
-        _taken.append(file)
+    def keep(self, name: str) -> None:
+        keep(self.page, name)
 
 
 @pytest.fixture(scope="session")

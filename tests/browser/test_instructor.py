@@ -25,7 +25,7 @@ def test_a_page_for_the_instructor_is_accessible_quiet_and_fits(
     ledger = graded(tmp_path, {"ana": NODE, "ben": OTHER, "cai": renamed(NODE)})
     file, _ = WRITE[page](loaded, ledger)
     found = look(file.read_text(encoding="utf-8"), width, color_scheme=scheme)
-    found.keep(f"{page}-{width}-{scheme}", full_page=True)
+    found.keep(f"{page}-{width}-{scheme}")
     assert Axe().run(found.page).response["violations"] == []
     assert found.complaints == [] and found.requests == []
     wide = "document.documentElement.scrollWidth > document.documentElement.clientWidth"

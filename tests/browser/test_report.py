@@ -81,7 +81,7 @@ def test_a_report_is_accessible_quiet_and_fits(look, pages, name, width, scheme)
     found.page.wait_for_function(
         "() => [...document.querySelectorAll('.replay')].every((root) => !root.hidden)"
     )
-    found.keep(f"report-{name}-{width}-{scheme}", full_page=True)
+    found.keep(f"report-{name}-{width}-{scheme}")
     assert violations(found.page) == []
     assert found.complaints == [] and found.requests == []
     assert found.page.evaluate("document.documentElement.scrollWidth") <= width
@@ -130,7 +130,7 @@ class TestReplay:
         page.get_by_label("Reference").uncheck()
         assert page.locator(".replay .plan .of-reference").is_hidden()
         assert page.locator(".replay .plan .of-before").is_visible()
-        found.keep("replay-ghosts", full_page=True)
+        found.keep("replay-ghosts")
         assert found.complaints == []
 
     def test_a_moving_thing_near_the_way_is_in_sight_as_a_whole(self, look, pages):

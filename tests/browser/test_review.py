@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from grader.review.store import ReviewStore
 from grader.server.review import ReviewServer
-from tests.browser.conftest import SCREENSHOTS
+from tests.browser.conftest import keep
 from tests.browser.test_report import EACH_WIDTH_AND_SCHEME, violations
 from tests.server.make_class import NODE, hand_in_again, make_class
 
@@ -68,7 +68,7 @@ def test_every_page_is_accessible_and_fits(
         page.keyboard.press("s")
         expect(page.locator(".code .note.is-finding").first).to_be_visible()
     name = re.sub(r"\W+", "-", path).strip("-") or "class"
-    page.screenshot(path=SCREENSHOTS / f"review-{name}-{width}-{scheme}.png", full_page=True)
+    keep(page, f"review-{name}-{width}-{scheme}")
     assert violations(page) == []
     assert page.evaluate("document.documentElement.scrollWidth") <= width
 
