@@ -1,7 +1,8 @@
 """Every assignment of rosgrade tells right from wrong: mutation score 100 %, with real nodes.
 
-There are a thousand trials: of each assignment the reference, a mutant and the starter package are
-graded here, so that the tests stay short. `rosgrade selftest` grades them all.
+There are a thousand trials: of each assignment the reference and a mutant are graded here, and the
+starter package, which the same code writes for all, of rosgrade's own and of an example in C++, so
+that the tests stay short. `rosgrade selftest` grades them all.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ COMPILED = (
     "victim_report",
     "waypoints",
 )
+WITH_STARTER = (*list_assignments(), "action_server")
 NAMES = [
     pytest.param(name, marks=[pytest.mark.compiles] if name in COMPILED else [])
     for name in (*list_assignments(), *EXAMPLES)
@@ -61,7 +63,8 @@ def test_the_mutation_score_is_perfect(name: str, runner: Runner) -> None:
     assert len(mutants) >= LEAST_MUTANTS
     # A mistake that a run imposes on the reference needs no build of its own.
     imposed = [trial for trial in mutants if trial.mistakes and name in COMPILED]
-    kept = (every[0], middle(imposed or mutants), every[-1])
+    starter = every[-1:] if name in WITH_STARTER else ()
+    kept = (every[0], middle(imposed or mutants), *starter)
     grading = Grading(loaded, runner, resources.cache_folder())
     setup = Setup(loaded, grading, reference_of(loaded.assignment.id, loaded.folder))
     results = list(selftest(setup, kept, jobs=cpu_count()))
