@@ -301,7 +301,7 @@ def test_an_executable_that_does_not_exist_is_recorded(run_node: RunNode) -> Non
 
 @pytest.mark.slow
 def test_a_gigabyte_of_output_is_drained_and_bounded(run_node: RunNode) -> None:
-    recording = run_node(nodes.FLOOD, timeout="60 s")
+    recording = run_node(nodes.FLOOD, discovery="60 s", timeout="60 s")
     kept = sum(len(line.text) for line in recording.log)
     assert recording.processes[0].exit_code == 0
     assert kept < 2**20
