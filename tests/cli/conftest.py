@@ -15,9 +15,12 @@ Rosgrade = Callable[..., "subprocess.CompletedProcess[str]"]
 ROOT = Path(__file__).resolve().parents[2]
 # Imports take most of the time of a short command: they are made once, and each command is a fork.
 _SERVER = """\
-import json, os, sys, numpy
+import json, os, pkgutil, sys, numpy
+from grader import batch, checks, cli, diagnosis, grading, report
 from grader.__main__ import main
-from grader.cli import app, batch, catalogue, check, instructor, regrade, report, start
+for room in (batch, checks, cli, diagnosis, grading, report):
+    for module in pkgutil.walk_packages(room.__path__, f"{room.__name__}."):
+        __import__(module.name)
 for line in sys.stdin:
     arguments, folder, environment, *files = json.loads(line)
     pid = os.fork()
