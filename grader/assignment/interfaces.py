@@ -201,10 +201,9 @@ def field_problems(
 def _types(assignment: Assignment, bound: BoundCheck, endpoint: str) -> list[str]:
     """The types that a topic, a service or an action has in the scenarios of a check."""
     found = []
-    for scenario in assignment.scenarios:
-        if not bound.spec.scenarios or scenario.id in bound.spec.scenarios:
-            used = dict(one.exchanged for one in scenario.stimuli if one.exchanged)
-            found.append({**used, **scenario.recorded_types}.get(endpoint))
+    for scenario in assignment.judged_by(bound.spec):
+        used = dict(one.exchanged for one in scenario.stimuli if one.exchanged)
+        found.append({**used, **scenario.recorded_types}.get(endpoint))
     return list(dict.fromkeys(interface for interface in found if interface is not None))
 
 

@@ -73,8 +73,7 @@ class LoadedAssignment:
         """The scenarios that a check of a run judges: those that it names, or all."""
         if bound.check.subject is Subject.SUBMISSION:
             return ()
-        wanted = bound.spec.scenarios
-        return tuple(one for one in self.assignment.scenarios if not wanted or one.id in wanted)
+        return self.assignment.judged_by(bound.spec)
 
 
 def list_assignments() -> tuple[str, ...]:

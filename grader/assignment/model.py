@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
+from grader.assignment.bag import BagOptions
 from grader.assignment.contract.model import Contract
 from grader.assignment.limits import BuildLimitOptions, LimitOptions
 from grader.assignment.stimuli.stimulus import Stimulus
@@ -258,7 +259,7 @@ class Until(Model):
 
 
 class Scenario(Model):
-    """One run: what is launched, what is recorded, and when it ends."""
+    """One run: what is launched, what is recorded, and when it ends. Or a bag that is read."""
 
     id: Id = Field(description="Short name, unique in the assignment.")
     title: str = Field("", description="What happens in the run, for the report.")
@@ -269,7 +270,13 @@ class Scenario(Model):
         description="How many times it is run, each time with other random values. The runs of "
         "`drive` are called `drive_1`, `drive_2`, ... See `counts` of the checks.",
     )
-    launch: tuple[Launch, ...] = Field(min_length=1, description="Processes of the student.")
+    launch: tuple[Launch, ...] = Field((), description="Processes of the student.")
+    bag: BagOptions | None = Field(
+        None,
+        description="In place of `launch`: nothing is run, and a bag of the submission is judged. "
+        "`record` says which of its topics. Of `robot`, the limits, the `radius` and the `pose` "
+        "at the beginning count, and of `topics`, `command` and `odometry`.",
+    )
     companions: tuple[Launch, ...] = Field(
         (),
         description="Programs of the author's, each an executable of a package in `packages/` "
@@ -323,7 +330,10 @@ class Scenario(Model):
         "60 cm}`, to say them once. They are named like those of `random`.",
     )
     until: Until = Field(default_factory=Until, description="When to end early.")
-    timeout: Duration = Field(description="End of the observation, counted from the first match.")
+    timeout: Duration = Field(
+        description="End of the observation, counted from the first match. What a bag has later, "
+        "counted from its first message, is not judged."
+    )
     discovery: Duration = Field(
         10.0,
         description="Longest time until the first node appears, without delays of the machine.",
@@ -354,9 +364,17 @@ class Scenario(Model):
         return {} if self.world is None else self.simulator.each(self.robots)
 
     @property
+    def has_robot(self) -> bool:
+        """Whether a robot's motion is known: a simulated one's, or by the odometry in a bag."""
+        return self.world is not None or (self.bag is not None and self.odometry.enabled)
+
+    @property
     def recorded_types(self) -> dict[str, str]:
-        """Topic -> type of all that is recorded: `record`, and the simulated robot's topics."""
+        """Topic -> type of all that is recorded: `record`, and the robot's topics."""
         found = {one.topic: one.type for one in self.record}
+        if self.bag is not None and self.has_robot:
+            found.setdefault(self.topics.command.topic, self.topics.command.type)
+            found[self.topics.odometry.topic] = ODOMETRY
         for robot in self.simulated.values():
             found.setdefault(robot.topics.command.topic, robot.topics.command.type)
             if robot.odometry.enabled:
@@ -408,8 +426,8 @@ class CheckSpec(Model):
     )
     scenarios: tuple[Id, ...] = Field(
         (),
-        description="Scenarios whose recordings it judges; by default all. Checks of a submission "
-        "have no scenarios.",
+        description="Scenarios whose recordings it judges; by default all, but a bag only where "
+        "nothing is run. Checks of a submission have no scenarios.",
     )
     counts: Counts = Field(
         Counts.WORST,
@@ -522,7 +540,9 @@ class Assignment(Model):
         "standard checks are made from it.",
     )
     packages: tuple[Package, ...] = Field(
-        min_length=1, description="Packages that students hand in; they come from the contract."
+        (),
+        description="Packages that students hand in; they come from the contract. There need be "
+        "none if all scenarios read a `bag`; nothing is built then.",
     )
     limits: LimitOptions = Field(
         default_factory=LimitOptions, description="Limits of the student's processes."
@@ -565,3 +585,17 @@ class Assignment(Model):
         description="Hidden checks that are not in this file: `rosgrade export` writes it into "
         "the copy for students.",
     )
+
+    @property
+    def needs_build(self) -> bool:
+        """Whether students hand in packages."""
+        return bool(self.packages)
+
+    def judged_by(self, spec: CheckSpec) -> tuple[Scenario, ...]:
+        """The scenarios of a check of a run: those that it names, or all that run something.
+
+        Where nothing is run, all bags.
+        """
+        if spec.scenarios:
+            return tuple(one for one in self.scenarios if one.id in spec.scenarios)
+        return tuple(one for one in self.scenarios if one.bag is None) or self.scenarios

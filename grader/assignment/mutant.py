@@ -10,9 +10,12 @@ point.
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -21,9 +24,12 @@ from grader.assignment.model import Assignment
 from grader.errors import AssignmentError, Problem, UsageError
 from grader.findings.finding import Status
 from grader.machine import resources
+from grader.recording.bag_writer import read_bag, write_bag
+from grader.recording.model import NS
 from grader.spec.document import Place
-from grader.spec.name import Id
+from grader.spec.name import Id, TopicName
 from grader.spec.nearest_name import nearest_or_all
+from grader.spec.quantity import Duration
 from grader.spec.source import Model, Source, in_order, read_source
 
 
@@ -81,8 +87,25 @@ class Edit(_Place):
     with_: str = Field(alias="with", description="The new text.")
 
 
+class BagEdit(Model):
+    """What is different in a bag of the reference."""
+
+    folder: FilePath = Field(description="Its folder in the reference.")
+    without: tuple[TopicName, ...] = Field((), description="Topics that are not in it.")
+    rename: dict[TopicName, TopicName] = Field(
+        default_factory=dict, description="Topics that have another name in it."
+    )
+    since: Duration | None = Field(None, description="The recording begins so much later.")
+    until: Duration | None = Field(None, description="The recording ends so long after its start.")
+    every: dict[TopicName, int] = Field(
+        default_factory=dict,
+        description="Topic -> n: only each nth of its messages is in it.",
+    )
+    storage: Literal["mcap", "sqlite3"] = Field("mcap", description="How it is stored.")
+
+
 class Edits(_Place):
-    """What is different from the reference: `edits` first, then `files`, then `move`."""
+    """What is different from the reference: `edits` first, then `files`, `move` and `bag`."""
 
     replace: str | None = Field(
         None, min_length=1, description="Where there is one edit only: the text in the file."
@@ -97,6 +120,8 @@ class Edits(_Place):
         default_factory=dict, description="Files or folders to move: from -> to."
     )
 
+    bag: BagEdit | None = Field(None, description="What is different in a bag.")
+
     @model_validator(mode="after")
     def _belong_together(self) -> Edits:
         if (self.replace is None) != (self.with_ is None):
@@ -106,7 +131,7 @@ class Edits(_Place):
     @property
     def has_edits(self) -> bool:
         """Whether anything is different by it."""
-        return bool(self.edits or self.files or self.move or self.replace)
+        return bool(self.edits or self.files or self.move or self.replace or self.bag)
 
     def every_edit(self, file: str | None = None) -> Iterator[tuple[Place, Edit]]:
         """Its edits, and where they stand in it; those that name no file are in the given one."""
@@ -211,6 +236,39 @@ def _apply(change: Edits, files: dict[str, bytes], file: str | None) -> Iterator
         if not moved:
             yield ("move", source), f"nothing to move: the reference has no {source!r}"
         files.update({target + path.removeprefix(source): moved[path] for path in moved})
+    if change.bag is not None:
+        bag = _take(change.bag.folder, files)
+        if not bag:
+            text = f"the reference has no folder {change.bag.folder!r}"
+            yield ("bag", "folder"), text
+        else:
+            files.update(_edited_bag(change.bag, bag))
+
+
+def _edited_bag(edit: BagEdit, files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """The files of a bag that is written anew."""
+    with TemporaryDirectory() as scratch:
+        before, after = Path(scratch, "before"), Path(scratch, "after")
+        for path, content in files.items():
+            file = before / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(content)
+        messages, definitions = read_bag(before / edit.folder)
+        begin_ns = min(one.recorded_ns for one in messages)
+        first_ns = begin_ns + (edit.since or 0.0) * NS
+        last_ns = math.inf if edit.until is None else begin_ns + edit.until * NS
+        numbers: Counter[str] = Counter()
+        kept = []
+        for one in messages:
+            name = one.channel.name
+            numbers[name] += 1
+            is_skipped = name in edit.without or numbers[name] % edit.every.get(name, 1)
+            if first_ns <= one.recorded_ns <= last_ns and not is_skipped:
+                channel = replace(one.channel, name=edit.rename.get(name, name))
+                kept.append(replace(one, channel=channel))
+        (after / edit.folder).parent.mkdir(parents=True, exist_ok=True)
+        write_bag(after / edit.folder, kept, definitions, edit.storage)
+        return read_files(after)
 
 
 def _take(name: str, files: dict[str, bytes]) -> dict[str, bytes]:
@@ -360,7 +418,8 @@ def _read_mutants(
                 source.problem((key, index, *inner, *inside), text) for inside, text in found
             ]
             every = tuple(edit for _, edit in edits.every_edit(named))
-            made = {"edits": every, "replace": None, "files": edits.files, "move": edits.move}
+            made = {"edits": every, "replace": None}
+            made |= {key: getattr(edits, key) for key in ("files", "move", "bag")}
             kept[key].append(change.model_copy(update=made))
     if problems:
         raise AssignmentError(source.file, in_order(problems))

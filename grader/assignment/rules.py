@@ -34,6 +34,11 @@ from sim.description import SimulatorOptions
 
 _Lack = tuple[Place, str]
 """A place below the entry of a check, and what is wrong there."""
+_OF_RUNS = (
+    *("repeat", "launch", "companions", "stimuli", "world", "robots", "lidar", "random"),
+    *("until", "discovery", "shutdown", "limits"),
+)
+"""Keys of a scenario that say how it is run."""
 
 
 def problems(
@@ -42,6 +47,10 @@ def problems(
     """Find everything that does not fit together."""
     for name, *keys in (("name", "packages"), ("id", "scenarios"), ("id", "checks", "manual")):
         yield from source.duplicates(name, *keys)
+    if not assignment.packages and not (
+        assignment.scenarios and all(one.bag is not None for one in assignment.scenarios)
+    ):
+        yield source.problem((), "the key 'packages' is missing")
     for index, package in enumerate(assignment.packages):
         try:
             package_name(package.name)
@@ -65,13 +74,21 @@ def problems(
 
 
 def _scenario(assignment: Assignment, scenario: Scenario) -> Iterator[tuple[Place, str]]:
+    if scenario.bag is not None:
+        for key in (key for key in _OF_RUNS if key in scenario.model_fields_set):
+            yield (key,), f"a bag is read, and nothing is run: leave {key!r} out"
+        for topic in {*scenario.bag.rename.values()} - scenario.recorded_types.keys():
+            text = f"{topic!r} is not recorded."
+            yield ("bag", "rename"), text + nearest_or_all(topic, scenario.recorded_types)
+    elif not scenario.launch:
+        yield (), "the key 'launch' is missing; or 'bag', to judge a recording that is handed in"
     for number, launch in enumerate(scenario.launch):
         for place, text in _launch(assignment, launch):
             yield ("launch", number, *place), text
         if launch.after >= scenario.timeout:
             limit = format_duration(scenario.timeout)
             yield ("launch", number, "after"), f"the scenario ends after {limit} at the latest"
-    if all(launch.after > 0.0 for launch in scenario.launch):
+    if scenario.launch and all(launch.after > 0.0 for launch in scenario.launch):
         yield ("launch",), "nothing is started at once: one launch is without 'after'"
     topics = [recorded.topic for recorded in scenario.record]
     for number, topic in enumerate(topics):
@@ -83,7 +100,7 @@ def _scenario(assignment: Assignment, scenario: Scenario) -> Iterator[tuple[Plac
     for key in ("messages", "quiet"):
         if not topics and getattr(until, key) is not None:
             yield ("until", key), "no topic is recorded: 'record' is missing"
-    if scenario.world is None:
+    if scenario.world is None and scenario.bag is None:
         for key in ("robots", *SimulatorOptions.model_fields):
             if key in scenario.model_fields_set:
                 yield (key,), "a simulated robot needs a 'world', which is missing"
@@ -174,7 +191,7 @@ def _points(source: Source, assignment: Assignment) -> Iterator[Problem]:
 def _check(assignment: Assignment, bound: BoundCheck) -> Iterator[tuple[Place, str]]:
     name, spec = bound.check.name, bound.spec
     scenarios = {scenario.id: scenario for scenario in assignment.scenarios}
-    judged = [scenarios[one] for one in spec.scenarios or scenarios if one in scenarios]
+    judged = assignment.judged_by(spec)
     if bound.check.subject is Subject.SUBMISSION:
         if spec.scenarios or spec.window is not None:
             key = "scenarios" if spec.scenarios else "from, to, after, before and while"
@@ -190,10 +207,7 @@ def _check(assignment: Assignment, bound: BoundCheck) -> Iterator[tuple[Place, s
         if not spec.scenarios:
             yield from _other_programs(judged)
     yield from _robots(bound, judged)
-    yield from need_problems(assignment, bound, judged)
-    for key, phase in spec.window.phases.items() if spec.window else ():
-        for place, text in need_problems(assignment, replace(bound, parameters=phase), judged):
-            yield (key, *place[1:]), text
+    yield from _of_run(assignment, bound, judged)
     yield from _unknown_values(bound, judged)
     for one in judged:
         if spec.from_ >= one.timeout:
@@ -209,6 +223,29 @@ def _robots(bound: BoundCheck, judged: Sequence[Scenario]) -> Iterator[tuple[Pla
         if bound.spec.robot is not None and bound.spec.robot not in one.robots:
             advice = nearest_or_all(bound.spec.robot, one.robots, "Its 'robots' are")
             yield ("robot",), f"the scenario {one.id!r} has no robot {bound.spec.robot!r}.{advice}"
+
+
+def _of_run(
+    assignment: Assignment, bound: BoundCheck, judged: Sequence[Scenario]
+) -> Iterator[tuple[Place, str]]:
+    """What a check, and what its windows look at, need and lack."""
+    is_of_run = bound.check.subject is Subject.RECORDING
+    bag = next((one for one in judged if one.bag is not None and is_of_run), None)
+    if bag is not None and not bound.parameters.judges_bags:
+        text = (
+            f"{bound.check.name!r} looks at more than a bag holds, and the scenario {bag.id!r} is "
+            "a bag: messages with their times, their publishers, and the motion of the robot by "
+            "its odometry"
+        )
+        yield ("uses",), text
+    else:
+        yield from need_problems(assignment, bound, judged)
+    for key, phase in bound.spec.window.phases.items() if bound.spec.window else ():
+        if bag is not None and not phase.judges_bags:
+            yield (key,), f"the scenario {bag.id!r} is a bag, which does not show this"
+            continue
+        for place, text in need_problems(assignment, replace(bound, parameters=phase), judged):
+            yield (key, *place[1:]), text
 
 
 def _unknown_values(bound: BoundCheck, judged: Sequence[Scenario]) -> Iterator[tuple[Place, str]]:
@@ -282,8 +319,10 @@ def _(need: needs.SimulatedRobot, user: _User) -> Iterator[_Lack]:
             names = ", ".join(scenario.robots)
             text = f"the scenario {scenario.id!r} has several robots: say which 'robot' it judges"
             yield (), f"{text} ({names})"
-        if scenario.world is None:
+        if not scenario.has_robot:
             text = f"the scenario {scenario.id!r} has no 'world', and so no simulated robot"
+            if scenario.bag is not None:
+                text = f"the odometry of the scenario {scenario.id!r} is not enabled"
             yield ("uses",), text
 
 

@@ -35,7 +35,7 @@ def problems(source: Source, assignment: Assignment, known: Interfaces) -> Itera
     Worlds are tried with the values of several seeds, functions with the seed 0. Fields of
     messages are checked where the definitions are at hand.
     """
-    default = assignment.packages[0].name
+    default = next((one.name for one in assignment.packages), "")
     for index, scenario in enumerate(assignment.scenarios):
         place: Place = ("scenarios", index)
         values = draw_values(scenario, 0)

@@ -40,6 +40,10 @@ class Program:
 def write_starter(loaded: LoadedAssignment, folder: Path, *, cpp: bool = False) -> tuple[Path, ...]:
     """Write the starter packages of an assignment, unless one is there already."""
     packages = loaded.assignment.packages
+    if not packages:
+        raise UsageError(
+            f"{loaded.assignment.id} asks for a recording and for no package: there is no starter"
+        )
     places = tuple(folder / package.name for package in packages)
     for place in places:
         if place.exists():
@@ -61,6 +65,8 @@ def starter_files(loaded: LoadedAssignment, *, cpp: bool = False) -> dict[str, s
     """
     assignment = loaded.assignment
     files: dict[str, str] = {}
+    if not assignment.packages:
+        return files
     for package in assignment.packages:
         files.update(_package(assignment, in_cpp(package) if cpp else package))
     first = assignment.packages[0].name

@@ -49,12 +49,19 @@ class Parameters(Model):
     """After such disturbances a failure must happen twice to count."""
     pauses: ClassVar[bool] = False
     """Whether the executors pause at the end of each run that it judges."""
+    of_bags: ClassVar[bool] = False
+    """Whether it looks at messages and motion only, which the bag of a real robot has too."""
     only: ClassVar[str] = ""
     """The one language that it can read, or nothing if it is the same for all."""
     about: ClassVar[tuple[str, ...]] = ("publisher", "subscription", "node")
     """What it judges of all that a program declares: a failure shows where that is created."""
     asks: ClassVar[str] = ""
     """What is asked for, in the words of the handout, such as ``the node `{self.name}```."""
+
+    @property
+    def judges_bags(self) -> bool:
+        """Whether a bag has all that it looks at, with these parameters."""
+        return self.of_bags
 
     @property
     def asked_for(self) -> str:

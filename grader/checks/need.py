@@ -47,6 +47,8 @@ class SimulatedRobot(Need):
     """Parameter that is about the robot, if one is."""
     unless: str | None = None
     """Parameter that stands for the robot where it is given."""
+    commanded: bool = False
+    """Whether the velocities that it is commanded count too, which a bag may not have."""
 
 
 @dataclass(frozen=True)

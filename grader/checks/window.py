@@ -68,6 +68,11 @@ class Phase(Parameters):
             raise ValueError("'fields' are those of a 'message'")
         return self
 
+    @property
+    def judges_bags(self) -> bool:
+        """Whether a bag shows it: a bag has messages, and the motion of the robot."""
+        return self.message is not None or self.robot in ("moves", "rests")
+
     def named_fields(self) -> Iterator[NamedFields]:
         """The fields of the message."""
         yield NamedFields(("fields",), self.message or "", self.fields)

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 from grader.assignment.binding import BoundCheck
 from grader.checks.check import Parameters
 from grader.checks.doubt import is_doubtful
+from grader.checks.need import Recorded, SimulatedRobot
+from grader.diagnosis.bag import why_not_in_bag
+from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_parameter import why_not_taken
 from grader.diagnosis.not_built import why_lacking
 from grader.findings.finding import Finding, Status, Verdict
-from grader.findings.words import percent
+from grader.findings.words import code, percent
 from grader.grade.model import ScenarioFinding
 from grader.grade.origins import with_origins
 from grader.grade.windowed import judged_in
-from grader.recording.model import Recording
+from grader.recording.model import BAG_RECEIVED, Recording
 from grader.recording.submission import SubmissionRecord
 
 NOT_YOURS = "Nothing to fix on your side: tell your instructor."
@@ -52,13 +55,14 @@ class Case:
 def judged(case: Case) -> ScenarioFinding:
     """The verdict of a check, and of a failure also what the steps add to it."""
     try:
-        finding = case.verdict(case.bound.parameters)
+        finding = why_no_motion(case) or case.verdict(case.bound.parameters)
         misuse = _misuse(finding)
         if misuse:
             finding = fault(f"the check {case.bound.check.name!r} {misuse}")
         for step in STEPS:
             if finding.status is Status.FAILED:
                 finding = step(finding, case)
+        finding = in_bag(finding, case)
     except Exception as error:
         # Any exception of a check is a bug in it, and must not cost the student points.
         trace = "".join(traceback.format_exception(error))
@@ -114,7 +118,66 @@ def with_what_is_lacking(finding: Finding, case: Case) -> Finding:
     return why_incomplete(case.submission, case.launched, finding.expected) or finding
 
 
+def why_no_motion(case: Case) -> Finding | None:
+    """Why a bag does not show the motion of the robot that a check judges; None if it does."""
+    needs = [one for one in case.bound.parameters.needs if isinstance(one, SimulatedRobot)]
+    recording = case.recording
+    if recording is None or recording.bag is None or recording.scene is None or not needs:
+        return None
+    topics = [recording.scene.odometry_topic]
+    topics += [recording.scene.command_topic for one in needs if one.commanded]
+    cause = _lacking(recording, topics)
+    if cause is None and not recording.truth:
+        seen = f"{code(topics[0])} in {code(recording.bag)} says too little: fewer than two poses"
+        cause = mistaken("short_bag", seen)
+    return cause and replace(cause, expected=case.bound.parameters.asked_of(recording))
+
+
+def with_what_the_bag_lacks(finding: Finding, case: Case) -> Finding:
+    """Only what a bag does not have, if there is nothing in it to judge."""
+    recording = case.recording
+    if recording is None or recording.bag is None:
+        return finding
+    cause = _lacking(recording, _judged_topics(case))
+    return replace(cause, expected=finding.expected) if cause else finding
+
+
+def _lacking(recording: Recording, topics: Iterable[str]) -> Finding | None:
+    causes = (why_not_in_bag(recording, topic) for topic in topics)
+    return next((one for one in causes if one is not None), None)
+
+
+def in_bag(finding: Finding, case: Case) -> Finding:
+    """Said of what a bag says: whose times these are, and that the odometry is the truth."""
+    recording = case.recording
+    if recording is None or recording.bag is None:
+        return finding
+    told = [f"in the bag {code(recording.bag)}"]
+    if case.bound.check.family == "timing" and BAG_RECEIVED in recording.environment:
+        told.append("by the times when it was recorded, which vary more than those of publishing")
+    if any(isinstance(need, SimulatedRobot) for need in case.bound.parameters.needs):
+        told.append("the odometry counts as where the robot is")
+    expected = f"{finding.expected} ({'; '.join(told)})"
+    observed = finding.observed
+    if finding.status is Status.FAILED and recording.bag_notes:
+        observed = f"{observed}; about the bag: {'; '.join(recording.bag_notes)}"
+    return replace(finding, expected=expected, observed=observed)
+
+
+def _judged_topics(case: Case) -> Iterator[str]:
+    """The topics that a check, or one of its windows, judges."""
+    window = case.bound.spec.window
+    for parameters in (case.bound.parameters, *(window.phases.values() if window else ())):
+        for need in parameters.needs:
+            if isinstance(need, Recorded):
+                topic = getattr(parameters, need.topic)
+                yield from () if topic is None else (f"{topic}{need.suffix}",)
+    if topic := getattr(case.bound.parameters, "topic", None):
+        yield topic
+
+
 STEPS: tuple[Callable[[Finding, Case], Finding], ...] = (
+    with_what_the_bag_lacks,
     with_credit,
     with_doubt,
     with_place,

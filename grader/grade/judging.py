@@ -21,6 +21,7 @@ from grader.checks.parameter.parameter import PARAMETERS_GIVEN
 from grader.diagnosis.not_built import why_not_built
 from grader.findings.finding import Finding, Status, Verdict
 from grader.findings.words import speaking
+from grader.grade.bags import chosen_bag
 from grader.grade.chain import NOT_YOURS, Case, fault, judged, not_taken, why_incomplete
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
 from grader.grade.naming import Unnamed, with_chosen_names
@@ -173,8 +174,9 @@ class _Known:
         """Packages that a scenario launches something of."""
         assignment = self.loaded.assignment
         launches = next(item.launch for item in assignment.scenarios if item.id == scenario)
-        default = assignment.packages[0].name
-        return tuple(dict.fromkeys(launch.package or default for launch in launches))
+        return tuple(
+            dict.fromkeys(launch.package or assignment.packages[0].name for launch in launches)
+        )
 
     def _of_submission(self, bound: BoundCheck) -> ScenarioFinding:
         only = bound.parameters.only
@@ -186,19 +188,27 @@ class _Known:
 
     def _of_run(self, bound: BoundCheck, scenario: str) -> ScenarioFinding:
         recording, launched = self.recordings.get(scenario), self._launched(scenario)
+        if recording is None and (why := self._why_no_bag(scenario)) is not None:
+            return ScenarioFinding(scenario, why)
         if recording is None:
             lost = self.faults.get(scenario, f"there is no recording of the scenario {scenario!r}")
             packages = [*launched, *(one.name for one in self.loaded.assignment.packages)]
             finding = why_incomplete(self.submission, launched, "a run of what was handed in")
             finding = finding or why_not_run(self.submission, packages) or fault(lost)
-        elif why := _why_unusable(recording, scenario, self.submission):
-            finding = fault(why)
+        elif unusable := _why_unusable(recording, scenario, self.submission):
+            finding = fault(unusable)
         elif (robot := bound.spec.robot) and robot not in recording.scenes:
             finding = fault(f"the recording has no robot {robot!r}")
         else:
             shown = of_robot(recording, robot) if robot else recording
             return judged(Case(bound, self.submission, shown, scenario, launched))
         return ScenarioFinding(scenario, finding)
+
+    def _why_no_bag(self, scenario: str) -> Finding | None:
+        """What is wrong with the bags, if the scenario reads one and cannot."""
+        run = next(one for one in self.loaded.assignment.scenarios if one.id == scenario)
+        found = run.bag and chosen_bag(run.bag, scenario, self.submission)
+        return found if isinstance(found, Finding) else None
 
     def _is_put_right(self, item: ScenarioFinding) -> bool:
         """Whether no check has to wait for a finding: it passed, or the others do not need it."""

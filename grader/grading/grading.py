@@ -75,7 +75,8 @@ class Grading:
         self.told = told or Told()
         self.mistakes: tuple[Mistake, ...] = ()
         self._cache = cache
-        self._with_bags = any(True for _ in _needed(loaded, Bags))
+        self._bag_types = _bag_types(loaded)
+        self._with_bags = self._bag_types != () or any(True for _ in _needed(loaded, Bags))
         self._libraries = (*loaded.assignment.libraries, *([LIBRARY] if _tested(loaded) else ()))
         check_installed(self._libraries)
         self._build_limits = _build_limits(loaded.assignment.build_limits)
@@ -120,6 +121,8 @@ class Grading:
             choose_tested=choose_tested,
             source_folder=source,
             with_bags=self._with_bags,
+            bag_types=self._bag_types,
+            needs_build=self.loaded.assignment.needs_build,
             place=self._build_place,
         )
 
@@ -164,6 +167,14 @@ def _tested(loaded: LoadedAssignment) -> frozenset[str]:
     """The packages whose own tests a check judges."""
     found = _needed(loaded, StudentTests)
     return frozenset(getattr(parameters, need.package) for parameters, need in found)
+
+
+def _bag_types(loaded: LoadedAssignment) -> Collection[str] | None:
+    """Types of the messages that scenarios judge of bags; None, for all, where one is not known."""
+    read = [one for one in loaded.assignment.scenarios if one.bag is not None]
+    if read and loaded.assignment.variables:
+        return None
+    return tuple({type for one in read for type in one.recorded_types.values()})
 
 
 def _needed(loaded: LoadedAssignment, kind: type[_N]) -> Iterator[tuple[Parameters, _N]]:

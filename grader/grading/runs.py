@@ -7,9 +7,12 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
 
+from grader.assignment.bag import BagOptions
+from grader.assignment.model import Scenario
 from grader.errors import GraderFault, UsageError, machine_fault
 from grader.findings.finding import Status
 from grader.grade import Grade, judge_all
+from grader.grade.bags import chosen_bag, same_bags
 from grader.grade.naming import with_chosen_names
 from grader.grading.graded import SUBMISSION_FILE, Graded
 from grader.grading.grading import Grading
@@ -17,8 +20,9 @@ from grader.grading.next_runs import Round, Run, times_run
 from grader.grading.reference_run import read_references
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording, to_json
-from grader.recording.submission import SubmissionRecord
+from grader.recording.submission import BagRecord, SubmissionRecord
 from grader.report.files import write_whole
+from grader.run.from_bag import BagOrder, record_bag
 from grader.run.runner import RunRequest, scenario_seed
 from grader.submission.prepare import Prepared
 
@@ -64,7 +68,7 @@ class Runs:
         disturbed = grade.disturbed_scenarios(Status.ERROR)
         faulty = [name for name, recording in self._recordings.items() if recording.faults]
         return Round(
-            scenarios=self._loaded.assignment.scenarios if self._can_run else (),
+            scenarios=tuple(filter(self._is_to_run, self._loaded.assignment.scenarios)),
             runs=runs,
             names=grade.names,
             undecided={
@@ -89,6 +93,12 @@ class Runs:
     @property
     def _record(self) -> SubmissionRecord:
         return self._prepared.record
+
+    def _is_to_run(self, scenario: Scenario) -> bool:
+        """Whether there is what a scenario needs: something that was built, or a bag."""
+        if scenario.bag is None:
+            return self._can_run
+        return isinstance(chosen_bag(scenario.bag, scenario.id, self._record), BagRecord)
 
     def _file(self, name: str) -> Path:
         return self._folder / f"{name}.mcap"
@@ -118,11 +128,31 @@ class Runs:
         # As they lie in their folder, whichever ended first.
         self._recordings = {name: self._recordings[name] for name in sorted(self._recordings)}
 
+    def _read_bag(self, options: BagOptions, scenario: Scenario, file: Path) -> None:
+        bag = chosen_bag(options, scenario.id, self._record)
+        assert isinstance(bag, BagRecord)
+        ros, install = self._grading.runner.ros, self._prepared.install
+        prefixes = self._support.prefixes(self._grading.told.progress)
+        order = BagOrder(
+            self._loaded.assignment.id,
+            scenario,
+            self._record,
+            bag,
+            self._prepared.bags[bag.path],
+            # rosgrade's own definition comes before one of the student's.
+            (*prefixes, *ros.underlays, *ros.prefixes, *([install] if install else [])),
+            same_bags(bag, self._record),
+        )
+        record_bag(order, file)
+
     def _run(self, run: Run) -> Recording:
-        assert self._prepared.install is not None
         loaded, scenario, grading = self._loaded, run.scenario, self._grading
         file = self._file(scenario.id)
         try:
+            if scenario.bag is not None:
+                self._read_bag(scenario.bag, scenario, file)
+                return read_recording(file)
+            assert self._prepared.install is not None
             request = RunRequest(
                 loaded.assignment,
                 scenario,

@@ -25,6 +25,8 @@ from grader.spec.names import NO_NAMES, Names
 NS = 1_000_000_000
 PROBE_NODE = "rosgrade_probe"
 """Name of the node through which a run is watched."""
+BAG, BAG_NOTES, BAG_RECEIVED = "bag", "bag_notes", "bag_received"
+"""Keys of ``Recording.environment``, where a bag was read in place of a run."""
 
 
 class Owner(str, Enum):
@@ -322,6 +324,8 @@ class Recording:
             ``ros_imports`` that are installed; the ``parameters`` of the launch, by name;
             ``other_domains`` that the student joined;
             ``compiled_tracer``: ``preloaded``, ``lacking``, or ``none`` where nothing is compiled.
+            Where a bag was read in place of a run, its folder (``bag``), what is conspicuous about
+            it (``bag_notes``), and ``bag_received`` where its times are those of the recorder.
         names: Wrong names of the student that were put right in this run.
     """
 
@@ -376,6 +380,16 @@ class Recording:
     def given_parameters(self) -> tuple[str, ...]:
         """Names of the parameters that the scenario launches its programs with."""
         return tuple(self.environment.get("parameters", "").split())
+
+    @property
+    def bag(self) -> str | None:
+        """Folder of the bag that was read; None for a run."""
+        return self.environment.get(BAG)
+
+    @property
+    def bag_notes(self) -> tuple[str, ...]:
+        """What is conspicuous about that bag, parts of a sentence."""
+        return tuple(self.environment.get(BAG_NOTES, "").splitlines())
 
     def on(self, topic: str) -> tuple[Message, ...]:
         """Messages on a topic, oldest first."""

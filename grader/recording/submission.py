@@ -355,12 +355,18 @@ class BagRecord:
     Attributes:
         path: Folder of its metadata.yaml.
         problem: Why it cannot be read to its end, or None.
+        distro: The ROS distribution that recorded it; empty if it does not say that.
+        lost: How many messages it does not have, although its metadata.yaml counts them.
+        sha256: Of its messages that a scenario may judge; empty where none are read.
     """
 
     path: str
     problem: str | None = None
     duration_s: float = 0.0
     topics: tuple[BagTopic, ...] = ()
+    distro: str = ""
+    lost: int = 0
+    sha256: str = ""
 
 
 @dataclass(frozen=True)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from grader.errors import SubmissionError
 from grader.machine.ros import RosInstallation
 from grader.machine.tree import listing
+from grader.recording.bag import KeptBag
 from grader.recording.submission import SubmissionRecord
 from grader.submission.build.build import Builder, once_more
 from grader.submission.build.build_cache import BuildCache
@@ -25,7 +26,7 @@ from grader.submission.intake.members import MIB
 from grader.submission.intake.paths import shown
 from grader.submission.kept_source import keep_source
 from grader.submission.read.answers import read_answers
-from grader.submission.read.bag import read_bags
+from grader.submission.read.bag import ReadBag, read_bags
 from grader.submission.read.cpp import read_cpp
 from grader.submission.read.document import read_headings
 from grader.submission.read.package import Package, read_package, record_packages
@@ -47,11 +48,13 @@ class Prepared:
         install: Its install space (merged layout), read-only; also there when only some packages
             were built. None where nothing was.
         underlays: Install spaces under it.
+        bags: What is kept of its bags, by their paths.
     """
 
     record: SubmissionRecord
     install: Path | None
     underlays: tuple[Path, ...] = ()
+    bags: Mapping[str, KeptBag] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +66,8 @@ class Preparation(BuildSetting):
         choose_tested: Packages whose own tests are run after the build, by what was read before it.
         source_folder: Where the text files of the submission are kept, or None.
         with_bags: Whether its bags are read.
+        bag_types: Types of the messages that are kept of them; None for all.
+        needs_build: Whether it is to hold packages, which are built.
         place: Entered for the time of the build, and with True for one that is repeated because of
             the machine: nothing else of rosgrade's is to run beside that.
     """
@@ -71,6 +76,8 @@ class Preparation(BuildSetting):
     choose_tested: Callable[[SubmissionRecord], frozenset[str]] = lambda _: frozenset()
     source_folder: Path | None = None
     with_bags: bool = False
+    bag_types: Collection[str] | None = ()
+    needs_build: bool = True
     place: Callable[[bool], AbstractContextManager[object]] = nullcontext
 
 
@@ -93,14 +100,24 @@ def prepare(path: Path | str, how: Preparation) -> Prepared:
         with how.place(is_second), opened(source) as located:
             if how.source_folder is not None:
                 keep_source(located.root, how.source_folder)
-            bags = read_bags(located, how.ros, how.sandbox) if how.with_bags else None
+            bags = _read_bags(located, how) if how.with_bags else None
             prepared = _prepare(located, how, store, is_second)
-            return replace(prepared, record=replace(prepared.record, bags=bags))
+            return prepared if bags is None else _with_bags(prepared, bags)
 
     try:
         return once_more(attempt)
     except SubmissionError as error:
         return refused(source, error)
+
+
+def _read_bags(located: Located, how: Preparation) -> tuple[ReadBag, ...]:
+    return read_bags(located, how.ros, how.sandbox, how.bag_types)
+
+
+def _with_bags(prepared: Prepared, found: Sequence[ReadBag]) -> Prepared:
+    record = replace(prepared.record, bags=tuple(one.record for one in found))
+    kept = {one.record.path: one.kept for one in found if one.kept is not None}
+    return replace(prepared, record=record, bags=kept)
 
 
 def refused(source: Path, error: SubmissionError) -> Prepared:
@@ -167,7 +184,7 @@ def _prepare(located: Located, how: Preparation, store: UnderlayStore, is_second
     record = SubmissionRecord(
         located.id,
         located.sha256,
-        find_problem(located, packages),
+        find_problem(located, packages if how.needs_build else None),
         record_packages(packages, ros, None),
         leftovers=located.leftovers,
         files=tuple(shown(file.path) for file in located.files[:_MOST_PATHS]),
@@ -176,7 +193,7 @@ def _prepare(located: Located, how: Preparation, store: UnderlayStore, is_second
         answers_problem=answers_problem,
         parameter_files=read_parameter_files(located.root, located.files),
     )
-    if record.problem is not None:
+    if record.problem is not None or not how.needs_build:
         return Prepared(record, None)
     used = _named(packages)
     ros = store.completed(store.needed(ros, used), used)
@@ -203,10 +220,16 @@ def _prepare(located: Located, how: Preparation, store: UnderlayStore, is_second
     return Prepared(record, built.install, ros.underlays)
 
 
-def find_problem(located: Located, packages: Sequence[Package]) -> str | None:
-    """Why a submission cannot be built at all, in words for its author; None if it can."""
+def find_problem(located: Located, packages: Sequence[Package] | None) -> str | None:
+    """Why a submission cannot be built at all, in words for its author; None if it can.
+
+    Args:
+        packages: None where none are needed.
+    """
     if not located.files:
         return "the submission is empty"
+    if packages is None:
+        return None
     if not packages:
         return _no_package(located)
     if len(located.packages) > _MAX_PACKAGES:

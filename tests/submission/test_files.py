@@ -115,8 +115,8 @@ def test_a_bag_is_read_only_where_a_check_asks_for_it(tmp_path: Path) -> None:
 
 def read(bag: Path, sandbox: Sandbox | None = None) -> BagRecord:
     with opened(bag.parent) as located:
-        (record,) = read_bags(located, find_ros(), sandbox)
-    return record
+        (found,) = read_bags(located, find_ros(), sandbox)
+    return found.record
 
 
 def packed_bag(root: Path, size: int) -> Path:

@@ -169,7 +169,7 @@ def _changed(
 
 def _of_run(contract: Contract, run: Any) -> dict[str, _Made]:
     """What a scenario lacks: by default it runs the only program and records its topics."""
-    if not isinstance(run, dict):
+    if not isinstance(run, dict) or "bag" in run:
         return {}
     made = {}
     launched = _launched(contract, run)

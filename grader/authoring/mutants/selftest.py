@@ -112,7 +112,11 @@ def trials(loaded: LoadedAssignment, language: Language = PYTHON) -> tuple[Trial
             Trial(Role.MUTANT, one.mutant.id, one.mutant.title, one.mutant, True, one.mistakes)
             for one in with_standard_mutants(loaded, mutants)
         ),
-        Trial(Role.STARTER, "starter", "the starter package, untouched", None),
+        *(
+            [Trial(Role.STARTER, "starter", "the starter package, untouched", None)]
+            if loaded.assignment.packages
+            else []
+        ),
     )
 
 

@@ -28,6 +28,7 @@ _CONCLUSIVE = 4.0
 class Follows(Parameters):
     """Parameters of messages.follows."""
 
+    of_bags = True
     about = ("published", "subscription")
     needs = (Recorded(), Recorded("source"))
 

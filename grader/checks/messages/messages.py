@@ -45,6 +45,7 @@ _MOST_FIELDS = 8
 class Count(Parameters):
     """Parameters of messages.count."""
 
+    of_bags = True
     about = ("published", "subscription")
     needs = (Recorded(), PUBLISHED)
 
@@ -133,6 +134,7 @@ def count(recording: Recording, parameters: Count) -> Finding:
 class Equal(Parameters):
     """Parameters of messages.equal."""
 
+    of_bags = True
     about = ("published", "subscription")
     needs = (Recorded(),)
 
@@ -217,6 +219,7 @@ def _wrong(
 class Series(Parameters):
     """Parameters of messages.sequence."""
 
+    of_bags = True
     about = ("published", "subscription")
     needs = (Recorded(),)
 

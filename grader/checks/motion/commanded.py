@@ -9,6 +9,7 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters
+from grader.checks.need import SimulatedRobot
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.no_motion import (
     why_cut_short,
@@ -43,6 +44,7 @@ _HELD_NS = NS
 class WithinLimits(RobotParameters):
     """Parameters of motion.within_limits."""
 
+    needs = (SimulatedRobot(commanded=True),)
     asks = "commands within the limits of the robot"
 
     def asked_of(self, subject: Recording) -> str:
@@ -100,6 +102,8 @@ def _excess(item: VelocityCommand, scene: Scene) -> tuple[float, str]:
 
 class SlowsDown(RobotParameters):
     """Parameters of motion.slows_down."""
+
+    needs = (SimulatedRobot(commanded=True),)
 
     share: Ratio = Field(
         0.8, description="Speed of the last commands that drive, as a share of the fastest."

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters, moved_in
+from grader.checks.need import SimulatedRobot
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
@@ -47,6 +48,8 @@ _WAY_TOLERANCE_M = 2e-3
 class Drives(RobotParameters):
     """Parameters of motion.drives."""
 
+    needs = (SimulatedRobot(commanded=True),)
+
     speed: Speed = Field(description="Expected speed ahead.")
     tolerance: Ratio = Field(0.10, description="Largest error of the speed, as a share of it.")
     until_distance: PositiveLength | None = Field(
@@ -54,6 +57,11 @@ class Drives(RobotParameters):
         description="The speed does not count while something straight ahead is nearer than this. "
         "By default it always counts.",
     )
+
+    @property
+    def judges_bags(self) -> bool:
+        """Whether it need not know what is ahead."""
+        return self.until_distance is None
 
     def _asked(self) -> str:
         how = f"{speed(self.speed)} (within {percent(self.tolerance)})"
@@ -148,6 +156,8 @@ def _wrong_speed(
 class KeepsDriving(RobotParameters):
     """Parameters of motion.keeps_driving."""
 
+    needs = (SimulatedRobot(commanded=True),)
+
     distance: PositiveLength = Field(description="Least forward distance, along its path.")
 
     def _asked(self) -> str:
@@ -217,6 +227,8 @@ def _since_departure(recording: Recording) -> Evidence:
 
 class Straight(RobotParameters):
     """Parameters of motion.straight."""
+
+    needs = (SimulatedRobot(commanded=True),)
 
     tolerance: AngularSpeed = Field(
         0.01, description="Largest angular.z that still counts as zero, in both directions."

@@ -19,6 +19,7 @@ from grader.spec.quantity import PositiveLength
 class RobotParameters(Parameters):
     """Base of the parameters of a check of the robot's true motion."""
 
+    of_bags = True
     about = ("published",)
     needs = (SimulatedRobot(),)
     doubt = Doubt.STEERING_HELD_UP

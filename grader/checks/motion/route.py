@@ -163,6 +163,8 @@ def _middle(place: Sequence[float], position_m: float) -> tuple[float, float, fl
 class KeepsDistance(RobotParameters):
     """Parameters of motion.keeps_distance."""
 
+    of_bags = False
+
     distance: PositiveLength = Field(
         description="Distance from the LiDAR to the nearest obstacle, such as the wall."
     )

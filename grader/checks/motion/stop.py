@@ -42,6 +42,8 @@ _SCANS = 6
 class Stops(RobotParameters):
     """Parameters of motion.stops."""
 
+    of_bags = False
+
     distance: PositiveLength = Field(
         description="Distance of the obstacle straight ahead, from the LiDAR."
     )
@@ -246,6 +248,7 @@ def _set_off(
 class NoContact(RobotParameters):
     """Parameters of motion.no_contact."""
 
+    of_bags = False
     asks = "touches nothing"
 
 

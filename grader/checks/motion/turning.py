@@ -9,6 +9,7 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import GoalParameters
+from grader.checks.need import SimulatedRobot
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.off_course import why_off_course
@@ -31,6 +32,8 @@ _PAUSE_NS = NS // 5
 
 class TwoPhases(GoalParameters):
     """Parameters of motion.two_phases."""
+
+    needs = (SimulatedRobot(commanded=True),)
 
     position: PositiveLength = Field(description="How near the goal counts as reached.")
     speed: Speed = Field(0.01, description="Commanded speed that still counts as none.")
@@ -99,6 +102,7 @@ def _turns_away(run: Approach, step: Truth) -> bool:
 class ShortWay(GoalParameters):
     """Parameters of motion.short_way."""
 
+    needs = (SimulatedRobot(commanded=True),)
     asks = "turns the short way, never more than half a turn"
 
     tolerance: Angle = Field(

@@ -86,6 +86,7 @@ class Profile(Parameters):
 class Offered(Profile):
     """Parameters of qos.offered."""
 
+    of_bags = True
     kind = Kind.PUBLISHER
 
 

@@ -55,6 +55,7 @@ class EdgeParameters(Parameters):
     """Base of the parameters of a check of one transform."""
 
     needs: ClassVar[tuple[Need, ...]] = (Recorded(), OwnTransform())
+    of_bags = True
 
     parent: FrameName = Field(description="The parent frame, `header.frame_id`.")
     child: FrameName = Field(description="The child frame, `child_frame_id`.")
@@ -268,6 +269,7 @@ class Tree(Parameters):
     """Parameters of tf.tree."""
 
     needs = (Recorded(), Recorded("static_topic"))
+    of_bags = True
 
     topic: TopicName = Field("/tf", description="Topic of the transforms that change.")
     static_topic: TopicName = Field("/tf_static", description="Topic of the static ones.")

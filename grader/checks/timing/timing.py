@@ -58,6 +58,7 @@ _STAMPING = "rmw_fastrtps_cpp"
 class Period(Parameters):
     """Parameters of timing.period."""
 
+    of_bags = True
     about = ("timer", "publisher")
     needs = (Recorded(),)
 
@@ -210,6 +211,7 @@ def _evidence(
 class Rate(Parameters):
     """Parameters of timing.rate."""
 
+    of_bags = True
     about = ("timer", "publisher")
     needs = (Recorded(),)
 

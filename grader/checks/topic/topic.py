@@ -32,6 +32,7 @@ class Topic(Named):
 class Published(Topic):
     """Parameters of topic.published."""
 
+    of_bags = True
     asks = "a publisher on `{self.topic}`"
 
 
@@ -131,6 +132,11 @@ class Type(Topic):
     kind: Literal["publisher", "subscription"] = Field(
         "publisher", description="Which endpoint of the student to judge."
     )
+
+    @property
+    def judges_bags(self) -> bool:
+        """Whether it is about what was recorded."""
+        return self.kind == "publisher"
 
 
 @check("topic.type", Subject.RECORDING, Type, concept="interfaces")

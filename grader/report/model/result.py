@@ -146,6 +146,8 @@ def remarks(recording: Recording) -> tuple[str, ...]:
 
     A limit of the sandbox that was reached is reported elsewhere (``Recording.breaches``).
     """
+    if recording.bag is not None:
+        return tuple(f"the bag {code(recording.bag)}: {note}" for note in recording.bag_notes)
     names = f"so that everything else could be judged: {codes(map(str, recording.names.wrong))}"
     renamed = (f"this run corrected wrong names, {names}",) if recording.names else ()
     return (*renamed, *_posing(recording), *_excess(recording), *_tricks(recording))

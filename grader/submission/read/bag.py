@@ -6,9 +6,12 @@ student's, and a small one may unpack to a disk full.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import signal
+from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,8 +20,10 @@ from pydantic import TypeAdapter
 from grader.errors import GraderFault
 from grader.machine.out_of_memory import oom_kills
 from grader.machine.ros import RosInstallation
+from grader.recording.bag import BagChannel, KeptBag
+from grader.recording.model import Qos
 from grader.recording.submission import BagRecord, BagTopic
-from grader.submission.build.bounded import OutputLimits
+from grader.submission.build.bounded import Outcome, OutputLimits
 from grader.submission.intake.locate import Located
 from grader.submission.intake.paths import join, shown
 from grader.submission.read.reader import Reader
@@ -28,53 +33,120 @@ if TYPE_CHECKING:
 
 _METADATA = "metadata.yaml"
 _STORAGE = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
+_JOURNALS = (".db3-wal", ".db3-journal")
 _MOST_BAGS = 10
 _CPU_S = 30
 _WALL_S = 300.0
-_READER = Reader("bag_contents.py", ("rosbags",), _WALL_S, OutputLimits(head=256 * 1024, tail=4096))
-_RECORD = TypeAdapter(BagRecord)
+_READER = Reader(
+    "bag_contents.py", ("rosbags", "mcap"), _WALL_S, OutputLimits(head=1024 * 1024, tail=4096)
+)
+
+
+@dataclass(frozen=True)
+class _Topic:
+    name: str
+    type: str
+    messages: int
+    hash: str
+    publishers: tuple[Qos, ...]
+
+
+@dataclass(frozen=True)
+class _Contents:
+    """What the process prints of a bag."""
+
+    problem: str | None = None
+    duration_s: float = 0.0
+    distro: str = ""
+    lost: int = 0
+    has_published: bool = False
+    topics: tuple[_Topic, ...] = ()
+
+
+_CONTENTS = TypeAdapter(_Contents)
+
+
+@dataclass(frozen=True)
+class ReadBag:
+    """A bag with what is kept of its messages, if it can be read."""
+
+    record: BagRecord
+    kept: KeptBag | None = None
 
 
 def read_bags(
-    located: Located, ros: RosInstallation, sandbox: Sandbox | None
-) -> tuple[BagRecord, ...]:
+    located: Located,
+    ros: RosInstallation,
+    sandbox: Sandbox | None,
+    types: Collection[str] | None = (),
+) -> tuple[ReadBag, ...]:
     """Read every bag of a submission, at most ten.
 
     Args:
         located: The submission's private copy; what is unpacked of a bag lies beside it for a
             while.
+        types: Of the messages that are kept; None for all.
 
     Raises:
         GraderFault: One was not read within minutes, by no fault of its own.
     """
     paths = {file.path for file in located.files}
     folders = {path.rpartition("/")[0] or "." for path in paths if path.endswith(_STORAGE)}
-    return tuple(
-        _read(located.root, folder, ros, sandbox)
-        if join(folder, _METADATA) in paths
-        else BagRecord(
-            shown(folder), f"it has no {_METADATA}, which is written when the recording ends"
+    given = json.dumps(None if types is None else sorted(types))
+    found = []
+    for folder in sorted(folders, key=os.fsencode)[:_MOST_BAGS]:
+        problem = _why_unended(folder, paths)
+        found.append(
+            ReadBag(BagRecord(shown(folder), problem))
+            if problem
+            else _read(located.root, folder, given, (ros, sandbox))
         )
-        for folder in sorted(folders, key=os.fsencode)[:_MOST_BAGS]
-    )
+    return tuple(found)
 
 
-def _read(root: Path, folder: str, ros: RosInstallation, sandbox: Sandbox | None) -> BagRecord:
+def _why_unended(folder: str, paths: Collection[str]) -> str | None:
+    """Why the recording of a bag did not end as it should, by the files in its folder."""
+    if join(folder, _METADATA) not in paths:
+        return f"it has no {_METADATA}, which is written when the recording ends"
+    beside = sorted(path for path in paths if (path.rpartition("/")[0] or ".") == folder)
+    for path in beside:
+        if path.endswith(_JOURNALS):
+            return f"{shown(path)} lies beside it, so not all messages are in the bag itself yet"
+    return None
+
+
+def _read(
+    root: Path, folder: str, given: str, where: tuple[RosInstallation, Sandbox | None]
+) -> ReadBag:
     path, kills = shown(folder), oom_kills()
-    outcome = _READER.run(root, (str(root / folder), str(_CPU_S)), ros, sandbox)
+    outcome, data = _READER.run_keeping(root, (str(root / folder), str(_CPU_S)), *where, given)
+    problem = _why_not_read(outcome, path, kills)
+    if problem is not None:
+        return ReadBag(BagRecord(path, problem))
+    try:
+        found = _CONTENTS.validate_python(json.loads(outcome.output))
+    except (ValueError, TypeError):
+        return ReadBag(BagRecord(path, "it cannot be read"))
+    topics = tuple(BagTopic(shown(one.name), shown(one.type), one.messages) for one in found.topics)
+    digest = hashlib.sha256(data).hexdigest() if data else ""
+    problem, distro = found.problem and shown(found.problem), shown(found.distro)
+    record = BagRecord(path, problem, found.duration_s, topics, distro, found.lost, digest)
+    channels = tuple(
+        BagChannel(shown(one.name), shown(one.type), one.hash, one.publishers)
+        for one in found.topics
+    )
+    return ReadBag(record, None if problem else KeptBag(channels, found.has_published, data))
+
+
+def _why_not_read(outcome: Outcome, path: str, kills: int | None) -> str | None:
+    """Why reading was cut off, or None."""
     if outcome.ended_by_us == "time":
         raise GraderFault(f"the bag {path} was not read within {_WALL_S:.0f} s")
     if outcome.ended_by_us:
-        return BagRecord(path, f"it cannot be read: {outcome.ended_by_us}")
+        return f"it cannot be read: {outcome.ended_by_us}"
     # bubblewrap ends as a shell does: 128 and the signal.
     if abs(outcome.status or 0) % 128 in (signal.SIGXCPU, signal.SIGKILL):
         if kills != oom_kills():
             raise GraderFault(f"this machine ran out of memory while the bag {path} was read")
-        return BagRecord(path, f"it cannot be read within {_CPU_S} s of CPU time")
-    try:
-        found = _RECORD.validate_python({"path": path, **json.loads(outcome.output)})
-    except (ValueError, TypeError):
-        return BagRecord(path, "it cannot be read")
-    topics = (BagTopic(shown(one.name), shown(one.type), one.messages) for one in found.topics)
-    problem = found.problem and shown(found.problem)
-    return BagRecord(path, problem, found.duration_s, tuple(topics))
+        return f"it cannot be read within {_CPU_S} s of CPU time"
+    return None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -52,11 +53,23 @@ class Reader:
             root: The submission's private copy; what the program writes lies beside it meanwhile.
             given: What it finds in the file ``given``, in its working directory.
         """
+        return self.run_keeping(root, arguments, ros, sandbox, given)[0]
+
+    def run_keeping(
+        self,
+        root: Path,
+        arguments: Sequence[str],
+        ros: RosInstallation,
+        sandbox: Sandbox | None,
+        given: str = "",
+    ) -> tuple[Outcome, bytes]:
+        """The same, and what it wrote into the file ``kept`` there."""
         scratch = root.with_name("reading")
         scratch.mkdir()
         (scratch / "given").write_text(given, encoding="ascii")
         try:
-            return self._run(root, scratch, arguments, ros, sandbox)
+            outcome = self._run(root, scratch, arguments, ros, sandbox)
+            return outcome, _plain_bytes(scratch / "kept")
         finally:
             shutil.rmtree(scratch, ignore_errors=True)
 
@@ -91,3 +104,13 @@ class Reader:
                 excess = room.excess
             bounded = Command(command, scratch, environment)
             return run_bounded(bounded, wall_s=self.wall_s, output=self.output, excess=excess)
+
+
+def _plain_bytes(file: Path) -> bytes:
+    """What is in a file of the program's; nothing if it is none, as a link to another file."""
+    try:
+        descriptor = os.open(file, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except OSError:
+        return b""
+    with os.fdopen(descriptor, "rb") as stream:
+        return stream.read() if stat.S_ISREG(os.fstat(descriptor).st_mode) else b""

@@ -1,0 +1,87 @@
+"""The motion of a real robot, from its odometry: what stands for the truth in a bag."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+from grader.recording.simulated import Truth
+from sim.motion import Pose, Twist, compose, relative, wrap_angle
+
+STEP_NS = 10_000_000
+"""As the simulator's."""
+
+Timed = tuple[int, Mapping[str, Any]]
+"""A time in ns and the fields of a message."""
+
+
+def motion(
+    odometry: Sequence[Timed], commands: Sequence[Timed], start: Pose | None = None
+) -> tuple[Truth, ...]:
+    """The way of the robot in steps, between the first and the last message of its odometry.
+
+    Args:
+        odometry: Messages of nav_msgs/msg/Odometry, oldest first.
+        commands: Messages of geometry_msgs/msg/Twist or TwistStamped, oldest first.
+        start: The pose that the robot begins at; by default what its odometry says.
+    """
+    seen = [
+        (time_ns, pose, twist) for time_ns, pose, twist in map(_read, odometry) if _is_finite(pose)
+    ]
+    seen = [one for index, one in enumerate(seen) if index == 0 or one[0] > seen[index - 1][0]]
+    if len(seen) < 2:
+        return ()
+    if start is not None:
+        first = seen[0][1]
+        seen = [(at, compose(start, relative(first, pose)), twist) for at, pose, twist in seen]
+    orders = [(time_ns, _twist(value.get("twist", value))) for time_ns, value in commands]
+    order_times = [time_ns for time_ns, _ in orders]
+    found = []
+    for (begin_ns, pose, twist), (end_ns, after, _) in pairwise(seen):
+        for time_ns in range(begin_ns, end_ns, STEP_NS):
+            share = (time_ns - begin_ns) / (end_ns - begin_ns)
+            last = bisect_right(order_times, time_ns)
+            command = orders[last - 1][1] if last else Twist(0.0, 0.0)
+            found.append(
+                Truth(
+                    time_ns,
+                    pose.x_m + share * (after.x_m - pose.x_m),
+                    pose.y_m + share * (after.y_m - pose.y_m),
+                    wrap_angle(pose.yaw_rad + share * wrap_angle(after.yaw_rad - pose.yaw_rad)),
+                    twist.linear_m_s,
+                    twist.angular_rad_s,
+                    command.linear_m_s,
+                    command.angular_rad_s,
+                )
+            )
+    return tuple(found)
+
+
+def jump(odometry: Sequence[Timed], fastest_m_s: float) -> tuple[int, float] | None:
+    """When the odometry first goes farther than any robot can, and how far in m; or None."""
+    for (before_ns, one), (after_ns, other) in pairwise(odometry):
+        pose, after = _read((before_ns, one))[1], _read((after_ns, other))[1]
+        way_m = math.hypot(after.x_m - pose.x_m, after.y_m - pose.y_m)
+        if way_m > 0.1 + 2.0 * fastest_m_s * (after_ns - before_ns) / 1e9:
+            return after_ns, way_m
+    return None
+
+
+def _read(message: Timed) -> tuple[int, Pose, Twist]:
+    time_ns, value = message
+    place, turn = value["pose"]["pose"]["position"], value["pose"]["pose"]["orientation"]
+    x, y, z, w = (float(turn[key]) for key in "xyzw")
+    yaw_rad = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    pose = Pose(float(place["x"]), float(place["y"]), yaw_rad)
+    return time_ns, pose, _twist(value["twist"]["twist"])
+
+
+def _twist(value: Mapping[str, Any]) -> Twist:
+    return Twist(float(value["linear"]["x"]), float(value["angular"]["z"]))
+
+
+def _is_finite(pose: Pose) -> bool:
+    return all(map(math.isfinite, (pose.x_m, pose.y_m, pose.yaw_rad)))
