@@ -19,6 +19,10 @@ def why_not_in_bag(recording: Recording, topic: str) -> Finding | None:
     wanted = {one.type for one in ends if one.owner is Owner.PROBE}
     found = {one.type for one in recording.student_endpoints(Kind.PUBLISHER, topic)}
     wanted -= found
+    if recording.misdefined(topic):
+        types = codes(found)
+        seen = f"{here} has {code(topic)} with another definition of {types} than Jazzy's"
+        return mistaken("other_definition_in_bag", seen, type=types)
     if found and wanted:
         seen = f"{here} has {codes(found)} on {code(topic)}, not {codes(wanted)}"
         return mistaken("other_type_in_bag", seen, topic=code(topic))

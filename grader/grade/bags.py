@@ -58,7 +58,7 @@ def _chosen(
     read = [one for one in named if one.problem is None]
     if not read:
         return mistaken("broken_bag", f"{code(named[0].path)}: {named[0].problem}")
-    others = [one for one in read if not _is_same(one, read[0])]
+    others = [one for one in read[1:] if not _is_same(one, read[0])]
     if others:
         seen = f"there are {codes(one.path for one in read)}, and only one of them can be judged"
         line = code(f"{scenario}: {read[0].path}")

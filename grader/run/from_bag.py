@@ -151,7 +151,7 @@ class _Reading:
         twice: Counter[str] = Counter()
         for one in self._order.kept.messages():
             channel = self._renamed(one.channel)
-            if self._types.get(channel.name) == channel.type:
+            if self._is_read(channel):
                 key = (channel.name, one.recorded_ns, one.published_ns, one.cdr)
                 twice[channel.name] += key in found
                 found[key] = replace(one, channel=channel)
@@ -160,6 +160,12 @@ class _Reading:
                 seen = f"{counted(number, 'message')} on {code(topic)} are in it more than once"
                 self._notes.append(f"{seen}, and count once")
         return sorted(found.values(), key=lambda one: (one.published_ns, one.recorded_ns))
+
+    def _is_read(self, channel: BagChannel) -> bool:
+        """Whether a topic is recorded, with this type and, where that is known, its definition."""
+        own = self._own_hashes.get(channel.type, "")
+        is_other = channel.hash and own and channel.hash != own
+        return self._types.get(channel.name) == channel.type and not is_other
 
     def _renamed(self, channel: BagChannel) -> BagChannel:
         """A topic by the name that the assignment has for it."""
@@ -188,7 +194,7 @@ class _Reading:
     def _endpoints(self) -> Iterator[Endpoint]:
         """The publishers, as the student's, and the subscription that stands for the reader."""
         for topic, type in self._types.items():
-            read = BagChannel(topic, type, self._own_hash(type))
+            read = BagChannel(topic, type, self._own_hashes[type])
             yield self._endpoint(Kind.SUBSCRIPTION, Owner.PROBE, read, Qos())
         for channel in map(self._renamed, self._order.kept.channels):
             # That nothing is said of its publishers does not mean that it had none.
@@ -207,6 +213,10 @@ class _Reading:
             appeared_ns=self.begin_ns,
             type_hash=channel.hash,
         )
+
+    @cached_property
+    def _own_hashes(self) -> dict[str, str]:
+        return {type: self._own_hash(type) for type in self._types.values()}
 
     def _own_hash(self, type: str) -> str:
         """The hash of a definition here, which ROS installs beside it; nothing without it."""
