@@ -50,6 +50,8 @@ def replay(
     Ends with 0 when all messages were sent, 1 when the node ended early or never subscribed.
     """
     recorded = read_recording(recording)
+    if recorded.bag is not None:
+        raise UsageError(f"{recording}: is what was in a bag: `ros2 bag play` sends that again")
     found = find_recordings(recording)
     words = ("replay", str(recording), str(submission))
     loaded = load_assignment(assignment or found.assignment_folder(*words))

@@ -20,7 +20,7 @@ def chosen_bag(
     Of several that fit, ``rosgrade.yaml`` says which one is meant: ``square: bags/second``.
     """
     expected = f"a bag {code(options.name)}" if options.name else "a bag"
-    if submission.problem is not None:
+    if submission.bags is None and submission.problem is not None:
         cause = mistaken("no_bag", f"nothing can be read: {submission.problem}")
     elif submission.bags is None:
         cause = Finding.ours("the bags were not read: grade again")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
-from grader.recording.simulated import Truth
+from grader.recording.simulated import Incident, Truth
 from sim.motion import Pose, Twist, compose, relative, wrap_angle
 
 STEP_NS = 10_000_000
@@ -28,16 +28,14 @@ def motion(
         commands: Messages of geometry_msgs/msg/Twist or TwistStamped, oldest first.
         start: The pose that the robot begins at; by default what its odometry says.
     """
-    seen = [
-        (time_ns, pose, twist) for time_ns, pose, twist in map(_read, odometry) if _is_finite(pose)
-    ]
+    seen = [one for one in map(_read, odometry) if _is_finite(one[1]) and one[2].is_finite]
     seen = [one for index, one in enumerate(seen) if index == 0 or one[0] > seen[index - 1][0]]
     if len(seen) < 2:
         return ()
     if start is not None:
         first = seen[0][1]
         seen = [(at, compose(start, relative(first, pose)), twist) for at, pose, twist in seen]
-    orders = [(time_ns, _twist(value.get("twist", value))) for time_ns, value in commands]
+    orders = [one for one in _orders(commands) if one[1].is_finite]
     order_times = [time_ns for time_ns, _ in orders]
     found = []
     for (begin_ns, pose, twist), (end_ns, after, _) in pairwise(seen):
@@ -58,6 +56,24 @@ def motion(
                 )
             )
     return tuple(found)
+
+
+def rejected(commands: Sequence[Timed]) -> tuple[Incident, ...]:
+    """Commands that are not finite, which no robot can follow."""
+    return tuple(
+        Incident(
+            time_ns,
+            "command_rejected",
+            f"linear.x = {twist.linear_m_s:g}, angular.z = {twist.angular_rad_s:g}",
+        )
+        for time_ns, twist in _orders(commands)
+        if not twist.is_finite
+    )
+
+
+def _orders(commands: Sequence[Timed]) -> Iterator[tuple[int, Twist]]:
+    for time_ns, value in commands:
+        yield time_ns, _twist(value.get("twist", value))
 
 
 def jump(odometry: Sequence[Timed], fastest_m_s: float) -> tuple[int, float] | None:

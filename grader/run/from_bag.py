@@ -34,7 +34,7 @@ from grader.recording.model import (
     Qos,
     Recording,
 )
-from grader.recording.odometry import Timed, jump, motion
+from grader.recording.odometry import Timed, jump, motion, rejected
 from grader.recording.simulated import Scene
 from grader.recording.submission import BagRecord, SubmissionRecord
 from grader.spec.unit import format_duration
@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 _SAME_CLOCK_S = 2.0
 """Stamps in headers that are farther from a bag's own times come from another clock."""
 _MOST_SAMPLES = 50
+_NODE = "unknown node"
+"""A bag does not say who published."""
 
 
 @dataclass(frozen=True)
@@ -134,6 +136,7 @@ class _Reading:
             submission=order.submission,
             endpoints=tuple(self._endpoints()),
             truth=truth,
+            incidents=rejected(commands),
             scenes={"": self._scene()} if scenario.has_robot else {},
             values=values,
             environment={
@@ -206,7 +209,7 @@ class _Reading:
             kind=kind,
             topic=channel.name,
             type=channel.type,
-            node="",
+            node=_NODE,
             owner=owner,
             qos=qos,
             gid="",

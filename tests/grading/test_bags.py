@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import shutil
+import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -109,15 +111,8 @@ def test_a_bag_gets_full_points_and_says_that_its_odometry_is_the_truth(judge: J
     assert "in the bag `square`" in seen(graded, "rate")
     recording = graded.recordings["square"]
     assert recording.processes == recording.nodes == recording.disturbance == ()
-    assert {one.topic for one in recording.student_endpoints(*publishers())} == {
-        "/odom",
-        "/cmd_vel",
-    }
-
-
-def publishers() -> tuple[object]:
-
-    return (Kind.PUBLISHER,)
+    published = recording.student_endpoints(Kind.PUBLISHER)
+    assert {one.topic for one in published} == {"/odom", "/cmd_vel"}
 
 
 @pytest.mark.parametrize(
@@ -158,9 +153,9 @@ def test_a_topic_that_is_not_in_the_bag_is_said_with_those_that_are(judge: Judge
         ({"files": {"square/metadata.yaml": "a: ["}}, "square`: it cannot be read"),
         ({"files": {"square/square.mcap": None}}, "there is no bag, a folder with"),
         ({"files": {"square/square.mcap": "no MCAP"}}, "square`: it cannot be read"),
-        ({"files": {"square/square.db3-wal": "x"}}, "square.db3-wal lies beside it"),
+        ({"files": {"square/square.db3-wal": "x"}}, "square.db3-wal lies in it"),
         ({"files": {"square": None, "README.md": "x"}}, "there is no bag, a folder with"),
-        ({"files": {"square": None}}, "the submission is empty"),
+        ({"files": {"square": None}}, "there is no bag, a folder with"),
         (
             {"bag": {"folder": "square", "without": [ODOMETRY, COMMANDS]}},
             "has no `/odom`; it is empty",
@@ -278,7 +273,7 @@ def with_yaml(tmp_path: Path, old: str, new: str) -> Path:
             "'node.alive' looks at more than a bag holds",
         ),
         (
-            "uses: motion.reaches\n    with: {goal: [0, 0, 0 deg], position: 20 cm, heading: 15 deg}",
+            "uses: motion.visits\n    with: {places: [[1, 0], [1, 1], [0, 1]], position: 15 cm}",
             "uses: motion.no_contact",
             "'motion.no_contact' looks at more than a bag holds",
         ),
@@ -306,6 +301,63 @@ def test_a_scenario_needs_something_to_launch_or_a_bag(tmp_path: Path) -> None:
         load_assignment(file)
 
 
+MIXED = """\
+rosgrade: 1
+id: mixed
+title: A run and a bag
+packages: [{name: bot, executables: [bot]}]
+scenarios:
+  - id: run
+    launch: [{executable: bot}]
+    record: [{topic: /odom, type: nav_msgs/msg/Odometry}]
+    timeout: 5 s
+  - id: bag
+    bag: {name: sq*, rename: {/robot1/odom: /odom}}
+    timeout: 2 min
+checks:
+  - {id: alive, uses: node.alive, points: 1}
+  - {id: sent, uses: messages.count, with: {topic: /odom, at_least: 1}, points: 1}
+  - id: driven
+    uses: messages.count
+    with: {topic: /odom, at_least: 700}
+    scenarios: [bag]
+    points: 1
+"""
+
+
+def test_beside_runs_a_bag_is_judged_only_by_checks_that_name_it(
+    judge: Judge, tmp_path: Path
+) -> None:
+    (tmp_path / "mixed").mkdir()
+    file = tmp_path / "mixed" / "assignment.yaml"
+    file.write_text(MIXED)
+    loaded = load_assignment(file)
+    judged = {one.spec.id: [run.id for run in loaded.scenarios_of(one)] for one in loaded.checks}
+    assert judged == {"alive": ["run"], "sent": ["run"], "driven": ["bag"]}
+    # Without a package nothing can be run, and the bag is judged nevertheless.
+    statuses = {one.id: one.status for one in judge(assignment=file).grade.results}
+    assert statuses.pop("driven") is Status.PASSED
+    assert set(statuses.values()) == {Status.FAILED}
+
+
+def test_commands_that_no_robot_can_follow_are_said(judge: Judge, tmp_path: Path) -> None:
+    messages, definitions = read_bag(EXAMPLE / "reference" / "square")
+    nan = struct.pack("<4x6d", *(math.nan,) * 6)
+    wrong = [
+        replace(one, cdr=one.cdr[:4] + nan[4:]) if one.channel.name == COMMANDS else one
+        for one in messages
+    ]
+    write_bag(tmp_path / "made" / "square", wrong, definitions)
+    limits = with_yaml(
+        tmp_path,
+        "uses: timing.rate\n    with: {topic: /cmd_vel, at_least: 5 Hz}",
+        "uses: motion.within_limits",
+    )
+    graded = judge(files=read_files(tmp_path / "made"), assignment=limits)
+    assert "350 commands on `/cmd_vel` were not finite" in seen(graded, "rate")
+    assert result(graded, "corners").status is Status.PASSED
+
+
 JUDGED = (
     *("arrives", "aligns", "phases", "often", "proportional", "proportional_align", "limits"),
     *("overshoot", "settles"),
@@ -327,10 +379,11 @@ JUDGED = (
 def test_a_bag_of_a_run_is_judged_as_the_run_itself(
     tmp_path: Path, runner: Runner, mutant: str | None, storage: str
 ) -> None:
-    loaded = select(load_assignment("p_controller"), JUDGED, ("ahead",))
+    whole = load_assignment("p_controller")
+    loaded = select(whole, JUDGED, ("ahead",))
     submission = resources.reference() / "p_controller"
     if mutant is not None:
-        every = load_mutants(loaded.assignment, loaded.folder).mutants
+        every = load_mutants(whole.assignment, whole.folder).mutants
         apply(next(one for one in every if one.id == mutant), submission, tmp_path / "mutant")
         submission = tmp_path / "mutant"
     grading = Grading(loaded, runner, resources.cache_folder())

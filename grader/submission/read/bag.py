@@ -10,7 +10,7 @@ import hashlib
 import json
 import os
 import signal
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,6 +24,7 @@ from grader.recording.bag import BagChannel, KeptBag
 from grader.recording.model import Qos
 from grader.recording.submission import BagRecord, BagTopic
 from grader.submission.build.bounded import Outcome, OutputLimits
+from grader.submission.intake.listing import SubmissionFile
 from grader.submission.intake.locate import Located
 from grader.submission.intake.paths import join, shown
 from grader.submission.read.reader import Reader
@@ -95,7 +96,7 @@ def read_bags(
     given = json.dumps(None if types is None else sorted(types))
     found = []
     for folder in sorted(folders, key=os.fsencode)[:_MOST_BAGS]:
-        problem = _why_unended(folder, paths)
+        problem = _why_unended(folder, located.files)
         found.append(
             ReadBag(BagRecord(shown(folder), problem))
             if problem
@@ -104,14 +105,14 @@ def read_bags(
     return tuple(found)
 
 
-def _why_unended(folder: str, paths: Collection[str]) -> str | None:
+def _why_unended(folder: str, files: Sequence[SubmissionFile]) -> str | None:
     """Why the recording of a bag did not end as it should, by the files in its folder."""
-    if join(folder, _METADATA) not in paths:
+    beside = [one for one in files if (one.path.rpartition("/")[0] or ".") == folder]
+    if not any(one.path == join(folder, _METADATA) for one in beside):
         return f"it has no {_METADATA}, which is written when the recording ends"
-    beside = sorted(path for path in paths if (path.rpartition("/")[0] or ".") == folder)
-    for path in beside:
-        if path.endswith(_JOURNALS):
-            return f"{shown(path)} lies beside it, so not all messages are in the bag itself yet"
+    for one in beside:
+        if one.path.endswith(_JOURNALS) and one.size:
+            return f"{shown(one.path)} lies in it, so not all messages are in the bag itself yet"
     return None
 
 

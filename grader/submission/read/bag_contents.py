@@ -14,7 +14,7 @@ from struct import Struct
 from typing import Any
 
 _MEMORY_BYTES = 2 * 2**30
-_MOST_KEPT_BYTES = 128 * 2**20
+_MOST_KEPT, _MOST_KEPT_BYTES = 500_000, 64 * 2**20
 _HEAD = Struct("<IqqI")
 _ENDLESS_S = 2**31
 
@@ -28,7 +28,7 @@ def contents(bag: Path, kept_types: list[str] | None) -> dict[str, object]:
     from rosbags.rosbag2 import Reader
 
     messages: Counter[tuple[str, str]] = Counter()
-    kept_bytes, has_published = 0, False
+    kept_messages, kept_bytes, has_published = 0, 0, False
     with Reader(bag) as reader, Path("kept").open("wb") as kept:
         topics = {(one.topic, one.msgtype): one for one in reader.connections}
         numbers = {key: number for number, key in enumerate(sorted(topics))}
@@ -37,9 +37,9 @@ def contents(bag: Path, kept_types: list[str] | None) -> dict[str, object]:
             messages[key] += 1
             has_published |= logged != published
             if kept_types is None or key[1] in kept_types:
-                kept_bytes += len(data)
-                if kept_bytes > _MOST_KEPT_BYTES:
-                    raise ValueError("it holds more than 128 MiB of the messages that are judged")
+                kept_messages, kept_bytes = kept_messages + 1, kept_bytes + len(data)
+                if kept_messages > _MOST_KEPT or kept_bytes > _MOST_KEPT_BYTES:
+                    raise ValueError("more than 500,000 messages or 64 MiB of what is judged")
                 kept.write(_HEAD.pack(numbers[key], logged, published, len(data)) + data)
         duration_s = reader.duration / 1e9 if messages.total() else 0.0
         said = reader.message_count

@@ -1,9 +1,9 @@
-"""Make the bag of the reference: a TurtleBot3 that drives a square, as its computer records it.
+"""The bag of the example real_robot_bag: a TurtleBot3 drives a square, and its computer records it.
 
 The robot is the simulator's, and its odometry drifts a little. The messages are real ones, in the
 bytes that DDS sends.
 
-python docs/examples/real_robot_bag/make_bag.py FOLDER [mcap|sqlite3]
+python -m grader.dev.square_bag FOLDER [mcap|sqlite3]
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import math
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
@@ -60,15 +61,16 @@ def steps() -> Iterator[tuple[int, Twist, OdometrySample]]:
         yield now_ns, command(number * STEP_S), odometry.sample(now_ns, pose, twist)
 
 
-def twist_message(twist: Twist) -> object:
+def twist_message(twist: Twist) -> Any:
+    """A twist as a message."""
     vector = TYPES["geometry_msgs/msg/Vector3"]
-    return TYPES[TWIST](
-        vector(twist.linear_m_s, 0.0, 0.0), vector(0.0, 0.0, twist.angular_rad_s)
-    )
+    return TYPES[TWIST](vector(twist.linear_m_s, 0.0, 0.0), vector(0.0, 0.0, twist.angular_rad_s))
 
 
-def odometry_message(at_ns: int, sample: OdometrySample) -> object:
-    def typed(name: str, *fields: object) -> object:
+def odometry_message(at_ns: int, sample: OdometrySample) -> Any:
+    """What the odometry says as a message."""
+
+    def typed(name: str, *fields: Any) -> Any:
         return TYPES[f"geometry_msgs/msg/{name}"](*fields)
 
     stamp = TYPES["builtin_interfaces/msg/Time"](*divmod(at_ns, NS))
@@ -103,5 +105,7 @@ def messages() -> Iterator[BagMessage]:
 
 
 if __name__ == "__main__":
-    definitions = {kind: STORE.generate_msgdef(kind, ros_version=2)[0] for kind in (ODOMETRY, TWIST)}
+    definitions = {
+        kind: STORE.generate_msgdef(kind, ros_version=2)[0] for kind in (ODOMETRY, TWIST)
+    }
     write_bag(Path(sys.argv[1]), messages(), definitions, *sys.argv[2:])
