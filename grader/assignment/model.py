@@ -270,7 +270,7 @@ class Scenario(Model):
         description="How many times it is run, each time with other random values. The runs of "
         "`drive` are called `drive_1`, `drive_2`, ... See `counts` of the checks.",
     )
-    launch: tuple[Launch, ...] = Field((), description="Processes of the student.")
+    launch: tuple[Launch, ...] = Field((), min_length=1, description="Processes of the student.")
     bag: BagOptions | None = Field(
         None,
         description="In place of `launch`: nothing is run, and a bag of the submission is judged. "
@@ -541,6 +541,7 @@ class Assignment(Model):
     )
     packages: tuple[Package, ...] = Field(
         (),
+        min_length=1,
         description="Packages that students hand in; they come from the contract. There need be "
         "none if all scenarios read a `bag`; nothing is built then.",
     )

@@ -47,12 +47,15 @@ def assignment_schema(catalogue: Mapping[str, Check] = CATALOGUE) -> dict[str, A
     entry["allOf"] = [
         _parameters_of(check, references[check.parameters]) for check in catalogue.values()
     ]
-    # What a contract stands for need not be written.
+    # What a contract stands for need not be written, and for bags nothing is built.
     whole = schema["$defs"][references[Assignment]["$ref"].rpartition("/")[2]]
-    made = {"packages", "checks"}
-    whole["required"] = [name for name in whole["required"] if name not in made]
-    whole["anyOf"] = [{"required": sorted(made)}, {"required": ["contract"]}]
-    schema["$defs"]["Scenario"]["required"].remove("launch")
+    bags = {"minItems": 1, "items": {"required": ["bag"]}}
+    whole["required"].remove("checks")
+    whole["anyOf"] = [
+        {"required": ["checks", "packages"]},
+        {"required": ["contract"]},
+        {"required": ["checks", "scenarios"], "properties": {"scenarios": bags}},
+    ]
     for key, model in MODELS.items():
         whole["properties"][key]["items"] = _with_groups(key, references[model], schema)
     return {**references[Assignment], **schema}
