@@ -35,8 +35,9 @@ from sim.description import SimulatorOptions
 _Lack = tuple[Place, str]
 """A place below the entry of a check, and what is wrong there."""
 _OF_RUNS = (
-    *("repeat", "launch", "companions", "stimuli", "world", "robots", "lidar", "random"),
-    *("until", "discovery", "shutdown", "limits"),
+    *("repeat", "launch", "companions", "stimuli", "world", "robots", "random", "until"),
+    *("discovery", "shutdown", "limits"),
+    *sorted({*SimulatorOptions.model_fields} - {"robot", "odometry", "topics"}),
 )
 """Keys of a scenario that say how it is run."""
 
