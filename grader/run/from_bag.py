@@ -143,7 +143,7 @@ class _Reading:
                 "assignment": order.assignment,
                 "ros_distro": order.bag.distro or "unknown",
                 BAG: order.bag.path,
-                BAG_NOTES: "\n".join(self._notes),
+                **({BAG_NOTES: "\n".join(self._notes)} if self._notes else {}),
                 **({} if order.kept.has_published else {BAG_RECEIVED: "true"}),
             },
         )
