@@ -45,7 +45,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     folder = Path(page.file.abs_src_path).parent
     if MARKER not in markdown or not (folder / ASSIGNMENT_FILE).is_file():
         return markdown
-    return with_table(markdown, load_assignment(folder).assignment.contract)
+    return with_table(markdown, load_assignment(folder).assignment)
 
 
 def on_page_content(html: str, **_: Any) -> str:

@@ -17,7 +17,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from grader.assignment import limits, model, mutant, variable
+from grader.assignment import bag, limits, model, mutant, variable
 from grader.assignment.contract import model as contract
 from grader.assignment.own_check import FOLDER, lesson_checks
 from grader.assignment.stimuli.stimulus import stimulus_models
@@ -48,6 +48,7 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "packages": model.Package,
         "scenarios": model.Scenario,
         "launch": model.Launch,
+        "bag": bag.BagOptions,
         "record": model.RecordedTopic,
         "until": model.Until,
         "limits": limits.LimitOptions,
@@ -96,6 +97,7 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "mutants": mutant.Mutant,
         "variants": mutant.Variant,
         "edits": mutant.Edit,
+        "bag": mutant.BagEdit,
     },
     "worlds": {
         "The whole of a world": world_model.WorldModel,

@@ -90,7 +90,10 @@ def test_a_handout_shows_the_table_that_its_contract_makes(site: Path) -> None:
     examples = sorted((ROOT / "docs" / "examples").glob("*/assignment.yaml"))
     assert examples
     for file in examples:
-        contract = load_assignment(file.parent).assignment.contract
+        assignment = load_assignment(file.parent).assignment
+        contract = assignment.contract
+        if not assignment.packages:
+            continue
         assert contract, file
         page = (site / "examples" / file.parent.name / "index.html").read_text(encoding="utf-8")
         shown = [" | ".join(row) for row in Tables(page).rows]
