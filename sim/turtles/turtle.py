@@ -20,6 +20,7 @@ _COMMAND_NS = NS
 """So long a command acts."""
 _TURN_RAD_S = 1.0
 _THERE_RAD = 0.02
+_MOST = 1e30
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +38,8 @@ class Velocity:
 
     @property
     def is_finite(self) -> bool:
-        """Whether no part is NaN or infinite."""
-        return all(map(math.isfinite, (self.ahead_m_s, self.left_m_s, self.turn_rad_s)))
+        """Whether no part is NaN, infinite, or too large for a float32."""
+        return all(abs(one) < _MOST for one in (self.ahead_m_s, self.left_m_s, self.turn_rad_s))
 
 
 REST = Velocity()
