@@ -29,7 +29,7 @@ from sim.motion import NS, Pose
 from sim.pacing import Lateness, Pacer
 from sim.turtles.canvas import Colour
 from sim.turtles.polling import Inbox, Request
-from sim.turtles.rotating import RotationServer
+from sim.turtles.rotating import RotationGoal, RotationServer
 from sim.turtles.simulation import State, Step, Turtles
 from sim.turtles.turtle import STEP_NS, Jump, Pen, Velocity
 
@@ -48,6 +48,9 @@ class Sink(Protocol):
 
     def on_late(self, lateness: Lateness) -> None:
         """Called when steps are late, which are done right after this call."""
+
+    def on_answer(self, request: Request, response: Any) -> None:
+        """Called before a request to a service of the turtles is answered."""
 
 
 @dataclass
@@ -73,13 +76,15 @@ class RosTurtles:
         """Offer everything in a node of the caller, see :func:`make_node`; nothing moves yet."""
         self._node: Any = node
         self._turtles, self._sink, self._steady_ns = turtles, sink, steady_ns
-        self._inbox = Inbox(node)
+        self._inbox = Inbox(node, self._tell)
         self._inbox.serve_own()
         self._inbox.serve(Spawn, "/spawn", self._spawn)
         self._inbox.serve(Kill, "/kill", self._kill)
         self._inbox.serve(Empty, "/clear", lambda request: self._do(request, turtles.clear))
         self._inbox.serve(Empty, "/reset", lambda request: self._do(request, turtles.reset))
         self._ends: dict[str, _Ends] = {}
+        self.goals: list[RotationGoal] = []
+        """Goals of the action rotate_absolute so far."""
         self._pacer: Pacer | None = None
         self._stamp_ns = 0
         self._meet()
@@ -89,6 +94,11 @@ class RosTurtles:
         """The colour below the lines."""
         red, green, blue = (self._node.get_parameter(f"background_{one}").value for one in "rgb")
         return red, green, blue
+
+    @property
+    def services(self) -> frozenset[str]:
+        """Names of what can be called."""
+        return self._inbox.services
 
     def start(self) -> int:
         """Let simulated time begin now."""
@@ -188,14 +198,15 @@ class RosTurtles:
             serve(TeleportRelative, "teleport_relative", move),
         ]
         rotation = RotationServer(
-            node, inbox, name, lambda theta: turtles.rotate(name, theta), self._now_ns
+            node, inbox, name, lambda theta: turtles.rotate(name, theta), self.goals
         )
         pose = node.create_publisher(PoseMessage, f"/{name}/pose", _DEPTH)
         colour = node.create_publisher(Color, f"/{name}/color_sensor", _DEPTH)
         return _Ends(pose, colour, taken, rotation)
 
-    def _now_ns(self) -> int:
-        return self._stamp_ns + self._turtles.time_ns
+    def _tell(self, request: Request, response: Any) -> None:
+        if self._sink is not None:
+            self._sink.on_answer(request, response)
 
     def _do(self, request: Request, act: Callable[[], None]) -> None:
         act()

@@ -34,23 +34,33 @@ class PolledGroup(CallbackGroup):
 
 @dataclass(frozen=True)
 class Request:
-    """A request to a service, which can be answered later."""
+    """A request to a service, which can be answered later.
+
+    Attributes:
+        arrived_ns: When the middleware had received it.
+        told: Called with it and with its answer.
+    """
 
     service: Any
     header: Any
     message: Any
+    arrived_ns: int
+    told: Callable[[Request, Any], None]
 
     def answer(self, response: Any = None) -> None:
         """Answer it, by default with an empty response."""
-        self.service.send_response(response or self.service.srv_type.Response(), self.header)
+        response = response or self.service.srv_type.Response()
+        self.told(self, response)
+        self.service.send_response(response, self.header)
 
 
 class Inbox:
     """What has arrived, in the order of its arrival, and not yet acted."""
 
-    def __init__(self, node: Node) -> None:
-        """Begin with nothing to take from."""
+    def __init__(self, node: Node, told: Callable[[Request, Any], None]) -> None:
+        """Begin with nothing to take from; ``told`` is called with each request and its answer."""
         self._node: Any = node
+        self._told = told
         self._group = PolledGroup()
         self._subscriptions: dict[Any, Callable[[Any], None]] = {}
         self._services: dict[Any, Callable[[Request], None]] = {}
@@ -74,6 +84,11 @@ class Inbox:
         for service in self._node.services:
             self._services.setdefault(service, _called_back)
 
+    @property
+    def services(self) -> frozenset[str]:
+        """Names of the services that it takes requests to."""
+        return frozenset(one.srv_name for one in [*self._services])
+
     def forget(self, made: Any) -> None:
         """Take nothing from a subscription or a service any more, and destroy it."""
         if self._subscriptions.pop(made, None) is not None:
@@ -90,7 +105,8 @@ class Inbox:
                 self._keep(arrived_ns, partial(act, message))
         for service, answer in self._services.items():
             for message, info in self._taken(_request, service):
-                request = Request(service, info.request_id, message)
+                header, at_ns = info.request_id, info.received_timestamp
+                request = Request(service, header, message, at_ns, self._told)
                 arrived_ns = min(info.received_timestamp - begin_ns, now_ns)
                 self._keep(arrived_ns, partial(answer, request))
 

@@ -6,6 +6,7 @@ would let a goal act when a thread of it happens to run.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -26,21 +27,33 @@ _STATUS = {
 }
 _MOST_GOALS = 100
 """Whose results are kept."""
+_MOST_SENT = 5_000
 
 
 @dataclass
-class _Goal:
-    """A goal that was accepted, and who waits for its result."""
+class RotationGoal:
+    """A goal that was sent, and who waits for its result.
 
+    Attributes:
+        turtle: Name of the turtle.
+        rotation: None if it was rejected.
+    """
+
+    turtle: str
     id: Any
-    accepted_ns: int
-    rotation: Rotation
+    theta_rad: float
+    asked_ns: int
+    rotation: Rotation | None
+    canceled_ns: int | None = None
+    ended_ns: int | None = None
     waiting: list[Request] = field(default_factory=list)
     is_told: bool = False
 
     @property
     def status(self) -> int:
         """As the messages of an action say it."""
+        if self.rotation is None:
+            return int(GoalStatus.STATUS_UNKNOWN)
         outcome, is_canceling = self.rotation.outcome, self.rotation.is_canceling
         running = GoalStatus.STATUS_CANCELING if is_canceling else GoalStatus.STATUS_EXECUTING
         return int(running if outcome is None else _STATUS[outcome])
@@ -55,18 +68,18 @@ class RotationServer:
         inbox: Inbox,
         name: str,
         rotate: Callable[[float], Rotation | None],
-        now_ns: Callable[[], int],
+        sent: list[RotationGoal],
     ) -> None:
         """Offer it.
 
         Args:
             name: Of the turtle.
             rotate: Begins to turn it; None if it cannot.
-            now_ns: The time of what is sent.
+            sent: Gets each goal.
         """
         parts, action = RotateAbsolute.Impl, f"/{name}/rotate_absolute/_action"
-        self._rotate, self._now_ns = rotate, now_ns
-        self._goals: dict[bytes, _Goal] = {}
+        self._name, self._rotate, self._sent = name, rotate, sent
+        self._goals: dict[bytes, RotationGoal] = {}
         self._parts = parts
         self._feedback = node.create_publisher(parts.FeedbackMessage, f"{action}/feedback", 10)
         # Who comes later sees the status too.
@@ -83,12 +96,13 @@ class RotationServer:
     def tell(self) -> None:
         """Publish feedback, and answer who waits for results; called after each step."""
         for goal in [one for one in self._goals.values() if not one.is_told]:
+            assert goal.rotation is not None
             if goal.rotation.outcome is None:
                 message = self._parts.FeedbackMessage(goal_id=goal.id)
                 message.feedback.remaining = goal.rotation.remaining_rad
                 self._feedback.publish(message)
                 continue
-            goal.is_told = True
+            goal.is_told, goal.ended_ns = True, time.time_ns()
             self._publish_status()
             for request in goal.waiting:
                 request.answer(self._result(goal))
@@ -97,36 +111,41 @@ class RotationServer:
     def _accept(self, request: Request) -> None:
         rotation = self._rotate(request.message.goal.theta)
         response = self._parts.SendGoalService.Response(accepted=rotation is not None)
-        now_ns = self._now_ns()
+        theta_rad, asked_ns = request.message.goal.theta, request.arrived_ns
+        goal = RotationGoal(self._name, request.message.goal_id, theta_rad, asked_ns, rotation)
+        if len(self._sent) < _MOST_SENT:
+            self._sent.append(goal)
         if rotation is not None:
-            goal = _Goal(request.message.goal_id, now_ns, rotation)
             if len(self._goals) == _MOST_GOALS:
                 self._goals.pop(next(iter(self._goals)))
             self._goals[bytes(goal.id.uuid)] = goal
-            _set_time(response.stamp, now_ns)
+            _set_time(response.stamp, asked_ns)
         request.answer(response)
         self._publish_status()
 
     def _cancel(self, request: Request) -> None:
         response = CancelGoal.Response()
         for goal in self._named(request.message.goal_info):
+            assert goal.rotation is not None
             goal.rotation.is_canceling = True
+            goal.canceled_ns = goal.canceled_ns or request.arrived_ns
             info = GoalStatus().goal_info
             info.goal_id = goal.id
-            _set_time(info.stamp, goal.accepted_ns)
+            _set_time(info.stamp, goal.asked_ns)
             response.goals_canceling.append(info)
         if not response.goals_canceling:
             response.return_code = CancelGoal.Response.ERROR_REJECTED
         request.answer(response)
         self._publish_status()
 
-    def _named(self, info: Any) -> Iterator[_Goal]:
+    def _named(self, info: Any) -> Iterator[RotationGoal]:
         """The goals that a request to cancel means: one, all up to a time, or all."""
         wanted, until_ns = bytes(info.goal_id.uuid), info.stamp.sec * NS + info.stamp.nanosec
         is_any = not any(wanted)
         for key, goal in self._goals.items():
-            in_time = goal.accepted_ns <= until_ns if until_ns else is_any
-            if goal.rotation.outcome is None and (key == wanted or in_time):
+            in_time = goal.asked_ns <= until_ns if until_ns else is_any
+            running = goal.rotation is not None and goal.rotation.outcome is None
+            if running and (key == wanted or in_time):
                 yield goal
 
     def _give_result(self, request: Request) -> None:
@@ -138,9 +157,10 @@ class RotationServer:
         else:
             goal.waiting.append(request)
 
-    def _result(self, goal: _Goal) -> Any:
+    def _result(self, goal: RotationGoal) -> Any:
         response = self._parts.GetResultService.Response(status=goal.status)
-        response.result.delta = goal.rotation.delta_rad
+        if goal.rotation is not None:
+            response.result.delta = goal.rotation.delta_rad
         return response
 
     def _publish_status(self) -> None:
@@ -148,7 +168,7 @@ class RotationServer:
         for goal in self._goals.values():
             status = GoalStatus(status=goal.status)
             status.goal_info.goal_id = goal.id
-            _set_time(status.goal_info.stamp, goal.accepted_ns)
+            _set_time(status.goal_info.stamp, goal.asked_ns)
             message.status_list.append(status)
         self._status.publish(message)
 

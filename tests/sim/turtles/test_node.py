@@ -56,6 +56,7 @@ class Bench:
         self.node: Any = make_node(self.make_context())
         self.steps: list[Step] = []
         self.late: list[Lateness] = []
+        self.answered: list[str] = []
         self.ros = RosTurtles(self.node, Turtles(), self, lambda: self.now_ns)
         self.ros.start()
         context = self.make_context()
@@ -70,6 +71,9 @@ class Bench:
 
     def on_step(self, step: Step, stamp_ns: int) -> None:
         self.steps.append(step)
+
+    def on_answer(self, request: Any, response: Any) -> None:
+        self.answered.append(request.service.srv_name)
 
     def on_late(self, lateness: Lateness) -> None:
         self.late.append(lateness)
