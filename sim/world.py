@@ -34,7 +34,7 @@ from grader.spec.nearest_name import did_you_mean
 from grader.spec.source import Source, in_order, parse_source, read_source
 from sim.motion import ORIGIN, Pose
 from sim.shapes import Body, MovingObstacle, Shape, polygon, wall
-from sim.turtles.canvas import SIZE_M
+from sim.turtles.bounds import SIZE_M
 from sim.world_model import WorldModel
 
 MAX_SEGMENTS = 3_000

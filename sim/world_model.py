@@ -21,7 +21,7 @@ from sim.coordinates import (
 )
 from sim.motion import NS, ORIGIN, Pose, relative
 from sim.shapes import MAX_SPEED_M_S, MovingObstacle, Shape, Waypoint, box, circle, polygon
-from sim.turtles.canvas import CENTRE_M
+from sim.turtles.bounds import CENTRE_M
 
 TURTLE_NAME = r"[A-Za-z][A-Za-z0-9_]*"
 

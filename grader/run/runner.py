@@ -178,12 +178,12 @@ def _topics(scenario: Scenario) -> tuple[Topic, ...]:
         one.topic: Topic(one.topic, one.type, one.reliability, one.durability, one.depth)
         for one in scenario.record
     }
-    for topic, type in commands(scenario.turtles).items():
-        found.setdefault(topic, Topic(topic, type, "reliable", "volatile", 100))
+    for name, type in commands(scenario.turtles).items():
+        found.setdefault(name, Topic(name, type, "reliable", "volatile", 100))
     for robot in scenario.simulated.values():
         command = robot.topics.command
-        topic = Topic(command.topic, command.type, "reliable", "volatile", 100)
-        found.setdefault(command.topic, topic)
+        own = Topic(command.topic, command.type, "reliable", "volatile", 100)
+        found.setdefault(command.topic, own)
         for options in (robot.topics.odometry, robot.topics.scan, *robot.sensors):
             name = options.topic
             if name in scenario.recorded_types:

@@ -6,15 +6,8 @@ import math
 
 import numpy as np
 
-Point = tuple[float, float]
-Colour = tuple[int, int, int]
+from sim.turtles.bounds import PIXELS, PIXELS_PER_M, SIZE_M, Colour, Point
 
-PIXELS = 500
-PIXELS_PER_M = 45.0
-"""The height of the picture of a turtle in turtlesim, which is its metre."""
-SIZE_M = (PIXELS - 1) / PIXELS_PER_M
-"""Width and height, from wall to wall: 11.0889 m."""
-CENTRE_M = SIZE_M / 2.0
 EMPTY: Colour = (255, 255, 255)
 """What the sensor sees where nothing is drawn: the background lies below, like a tablecloth."""
 

@@ -27,7 +27,7 @@ from turtlesim.srv import Kill, SetPen, Spawn, TeleportAbsolute, TeleportRelativ
 
 from sim.motion import NS, Pose
 from sim.pacing import Lateness, Pacer
-from sim.turtles.canvas import Colour
+from sim.turtles.bounds import Colour
 from sim.turtles.polling import Inbox, Request
 from sim.turtles.rotating import RotationGoal, RotationServer
 from sim.turtles.simulation import State, Step, Turtles

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from sim.motion import Pose
-from sim.turtles.canvas import CENTRE_M, Canvas, Colour
+from sim.turtles.bounds import CENTRE_M, Colour
+from sim.turtles.canvas import Canvas
 from sim.turtles.turtle import STEP_NS, Jump, Outcome, Pen, Rotation, Turtle, Velocity
 
 FIRST = "turtle1"

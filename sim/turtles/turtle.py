@@ -11,7 +11,8 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from sim.motion import NS, Pose
-from sim.turtles.canvas import SIZE_M, Canvas, Colour
+from sim.turtles.bounds import SIZE_M, Colour
+from sim.turtles.canvas import Canvas
 
 STEP_NS = 16_000_000
 """Length of a step: turtlesim's timer."""

@@ -20,7 +20,7 @@ from grader.recording.model import Recording
 from grader.recording.simulated import Truth
 from grader.report.drawing import svg
 from grader.report.drawing.svg import Point
-from sim.turtles.canvas import PIXELS, PIXELS_PER_M, SIZE_M
+from sim.turtles.bounds import PIXELS, PIXELS_PER_M, SIZE_M
 
 BACKGROUND: Colour = (69, 86, 255)
 MOST_LINES = 1_000

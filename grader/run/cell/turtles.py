@@ -26,7 +26,7 @@ from sim.turtles.simulation import Act, Event, Step, Turtles
 from sim.turtles.turtle import REST
 
 if TYPE_CHECKING:
-    from sim.turtles.canvas import Colour
+    from sim.turtles.bounds import Colour
     from sim.turtles.polling import Request
     from sim.turtles.rotating import RotationGoal
 

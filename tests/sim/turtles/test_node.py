@@ -23,7 +23,7 @@ from grader.run.cell.domain import lock_domain
 from grader.run.cell.main import add_type_support
 from grader.submission.underlay.store import UnderlayStore
 from sim.pacing import Lateness
-from sim.turtles.canvas import CENTRE_M
+from sim.turtles.bounds import CENTRE_M
 from sim.turtles.simulation import Act, Event, Step, Turtles
 from sim.turtles.turtle import STEP_NS
 

@@ -7,7 +7,8 @@ import math
 import pytest
 
 from sim.motion import NS, Pose
-from sim.turtles.canvas import CENTRE_M, EMPTY, SIZE_M
+from sim.turtles.bounds import CENTRE_M, SIZE_M
+from sim.turtles.canvas import EMPTY
 from sim.turtles.simulation import Act, Step, Turtles
 from sim.turtles.turtle import STEP_NS, Jump, Outcome, Pen, Velocity
 
