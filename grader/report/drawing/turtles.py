@@ -20,7 +20,7 @@ from grader.recording.model import Recording
 from grader.recording.simulated import Truth
 from grader.report.drawing import svg
 from grader.report.drawing.svg import Point
-from sim.turtles.bounds import PIXELS, PIXELS_PER_M, SIZE_M
+from sim.turtles.bounds import PIXELS, SIZE_M
 
 BACKGROUND: Colour = (69, 86, 255)
 MOST_LINES = 1_000
@@ -93,7 +93,7 @@ def _caption(lines: Sequence[Line], asked: Sequence[object], killed: Sequence[st
         text += f"; the dashed {noun} {'was' if len(asked) == 1 else 'were'} asked for"
     if killed:
         text += f"; {counted(len(killed), 'turtle')} killed (marked ×, in order)"
-    return f"{text}. The canvas is {SIZE_M:.2f} m wide, and {PIXELS_PER_M:g} pixels are 1 m."
+    return f"{text}. The canvas is {SIZE_M:.2f} m wide."
 
 
 def _line(line: Line, pixel: _Pixel, pixel_size: float) -> Markup:
