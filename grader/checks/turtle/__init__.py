@@ -1,1 +1,1 @@
-"""Turtles: what they draw, with which pen, who is caught; judged by the true simulation."""
+"""Checks of turtles: what they draw and with which pen, who is spawned and caught."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field, WithJsonSchema, model_validator
 
 from grader.checks.check import Subject, check
 from grader.checks.turtle.turtle_check import TurtleParameters
@@ -16,12 +16,24 @@ from grader.recording.model import Recording
 from grader.spec.quantity import Ratio
 
 Shade = Annotated[int, Field(ge=0, le=255)]
+Colour = Annotated[
+    tuple[Shade, Shade, Shade],
+    WithJsonSchema(
+        {
+            "type": "array",
+            "items": {"type": "integer", "minimum": 0, "maximum": 255},
+            "minItems": 3,
+            "maxItems": 3,
+            "x-words": "`[red, green, blue]`",
+        }
+    ),
+]
 
 
 class Pen(TurtleParameters):
     """Parameters of turtle.pen."""
 
-    colour: tuple[Shade, Shade, Shade] | None = Field(
+    colour: Colour | None = Field(
         None, description="Red, green and blue, each from 0 to 255; by default any."
     )
     width: int | None = Field(None, ge=1, le=255, description="Width in pixels; by default any.")
