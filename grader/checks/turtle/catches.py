@@ -11,7 +11,7 @@ from grader.checks.check import Subject, check, stop_if
 from grader.checks.turtle.turtle_check import TurtleParameters, astray
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.turtle.astray import why_no_turtles
-from grader.findings.finding import Evidence, Finding, moment
+from grader.findings.finding import Evidence, Finding, moment, until_the_end
 from grader.findings.words import code, codes, counted, metres
 from grader.measure.turtle.hunt import Catch, Hunt
 from grader.recording.model import Recording
@@ -114,6 +114,7 @@ def _mistake(one: Catch, number: int, asked: Catches, evidence: Evidence) -> Fin
 def _missing(hunt: Hunt, asked: Catches, evidence: Evidence) -> Finding:
     """Why some were not caught."""
     recording = hunt.recording
+    evidence = replace(evidence, moments=(*evidence.moments, until_the_end(recording)))
     caught = {one.name for one in hunt.catches}
     left = [name for name in asked.prey if name not in caught]
     number = f"{len(caught)} of {counted(len(asked.prey), 'turtle')}"

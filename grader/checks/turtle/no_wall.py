@@ -6,7 +6,7 @@ from grader.checks.check import Subject, check, stop_if
 from grader.checks.turtle.turtle_check import TurtleParameters, astray
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.turtle.astray import why_no_turtles
-from grader.findings.finding import Finding, evidence_at
+from grader.findings.finding import Evidence, Finding, evidence_at, until_the_end
 from grader.findings.words import code, point
 from grader.recording.model import Recording
 
@@ -30,5 +30,7 @@ def no_wall(recording: Recording, parameters: NoWall) -> Finding:
         shown = evidence_at(recording, "ran into a wall", hit.time_ns)
         return mistaken("turtle_in_wall", f"a wall at {point(hit.x_m, hit.y_m)}", shown)
     if len({(step.x_m, step.y_m, step.yaw_rad) for step in way}) < 2:
-        return astray(recording, f"{code(parameters.turtle)} never moved", parameters.turtle)
+        seen = f"{code(parameters.turtle)} never moved"
+        shown = Evidence((until_the_end(recording),))
+        return astray(recording, seen, parameters.turtle, evidence=shown)
     return Finding.as_asked("no wall", evidence_at(recording, "moved", way[0].time_ns))

@@ -11,7 +11,7 @@ from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import WithTurtles
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.turtle.astray import why_no_turtles
-from grader.findings.finding import Evidence, Finding, moment
+from grader.findings.finding import Evidence, Finding, moment, until_the_end
 from grader.findings.words import code, codes, counted, metres, point
 from grader.recording.model import Recording
 from grader.spec.quantity import PositiveLength
@@ -46,6 +46,7 @@ def spawns(recording: Recording, parameters: Spawns) -> Finding:
     shown = Evidence(
         tuple(moment(recording, f"{one.turtle} spawned", one.time_ns) for one in spawned)
     )
+    shown = shown if spawned else Evidence((until_the_end(recording),))
     places = {one.turtle: (one.x_m, one.y_m) for one in reversed(spawned)}
     missing = [name for name in parameters.turtles if name not in places]
     off_m = {

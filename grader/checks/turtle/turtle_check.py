@@ -8,7 +8,7 @@ from grader.checks.check import Parameters, stop_if
 from grader.checks.need import Doubt, WithTurtles
 from grader.diagnosis.explanation import explain, mistaken
 from grader.diagnosis.turtle.astray import TurtleAstray, why_no_turtles
-from grader.findings.finding import Evidence, Finding
+from grader.findings.finding import Evidence, Finding, until_the_end
 from grader.findings.words import code
 from grader.measure.turtle.drawing import Line, drawn
 from grader.recording.model import Recording
@@ -34,8 +34,9 @@ class TurtleParameters(Parameters):
             seen = f"{code(self.turtle)} drew no line"
             has_moved = any((a.x_m, a.y_m) != (way[0].x_m, way[0].y_m) for a in way)
             service = code(f"/{self.turtle}/set_pen")
-            up = mistaken("turtle_no_line", f"{seen}: its pen is up", service=service)
-            stop_if(up if has_moved else astray(recording, seen, self.turtle))
+            shown = Evidence((until_the_end(recording),))
+            up = mistaken("turtle_no_line", f"{seen}: its pen is up", shown, service=service)
+            stop_if(up if has_moved else astray(recording, seen, self.turtle, evidence=shown))
         return found
 
 

@@ -5,7 +5,6 @@ Like that of a robot it comes from memory, and never from a topic or a service.
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from dataclasses import replace
@@ -18,43 +17,33 @@ from rclpy.context import Context
 from grader.assignment.simulation import read_scenario_world
 from grader.recording.interaction import Asked
 from grader.recording.model import NS
-from grader.recording.simulated import Incident, Truth, TurtleEvent
+from grader.recording.simulated import Incident
+from grader.run.cell.turtle_truth import TurtleTruth
 from grader.run.order import SimulatorOrder
 from grader.run.stimuli.filling import plain
 from sim.pacing import Lateness
-from sim.turtles.simulation import Act, Event, Step, Turtles
-from sim.turtles.turtle import REST
+from sim.turtles.simulation import Step, Turtles
 
 if TYPE_CHECKING:
-    from sim.turtles.bounds import Colour
     from sim.turtles.polling import Request
     from sim.turtles.rotating import RotationGoal
 
-WALL = "wall"
 _MOST_ASKED = 5_000
-_INCIDENTS = {Act.COMMAND_REJECTED: "not finite", Act.COMMAND_TIMEOUT: "none for 1 s"}
 
 
-class SimulatedTurtles:
+class SimulatedTurtles(TurtleTruth):
     """Turtles on their canvas, driven by what the student sends; keeps every step so far."""
 
     def __init__(self, context: Context, order: SimulatorOrder) -> None:
         # The interfaces of turtlesim may lie in an underlay that the cell has found by now.
         from sim.turtles.node import RosTurtles, make_node
 
+        super().__init__()
         world = read_scenario_world(Path(order.world), order.values)
         self._ros = RosTurtles(make_node(context), Turtles(world.turtles), self)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._ros.run, args=(self._stop,), daemon=True)
-        self.truth: list[Truth] = []
-        self.incidents: list[Incident] = []
-        self.events: list[TurtleEvent] = []
-        self._stamp_ns = 0
         self._asked: list[Asked] = []
-        self._background: Colour | None = None
-        self._ways_m: dict[str, float] = {}
-        self._last: dict[str, Truth] = {}
-        self._rest_since_ns = 0
 
     def start(self) -> None:
         """Let simulated time run, in a thread of its own."""
@@ -72,47 +61,13 @@ class SimulatedTurtles:
         return self._ros.services
 
     @property
-    def travelled_m(self) -> float:
-        """How far the one went that went the farthest."""
-        return max(self._ways_m.values(), default=0.0)
-
-    @property
     def in_contact_s(self) -> float:
         """A wall that is hit ends nothing: turtles go on along it."""
         return 0.0
 
-    @property
-    def at_rest_s(self) -> float:
-        """Simulated seconds at rest since one last moved; 0 while one moves or none has moved."""
-        return (self._stamp_ns - self._rest_since_ns) / NS if self._rest_since_ns else 0.0
-
     def on_step(self, step: Step, stamp_ns: int) -> None:
         """Keep the truth; called by the simulation."""
-        self._stamp_ns = stamp_ns
-        for event in step.events:
-            self._note(event, stamp_ns)
-        if self._background != self._ros.background:
-            self._background = self._ros.background
-            self.events.append(TurtleEvent(stamp_ns, "background", colour=self._background))
-        has_moved = False
-        for name, state in step.turtles.items():
-            pose, velocity = state.pose, state.velocity
-            now = Truth(
-                *(stamp_ns, pose.x_m, pose.y_m, pose.yaw_rad),
-                *(velocity.ahead_m_s, velocity.turn_rad_s) * 2,
-                contact=WALL if state.hits_wall else None,
-                robot=name,
-            )
-            self.truth.append(now)
-            before = self._last.get(name, now)
-            way_m = math.hypot(now.x_m - before.x_m, now.y_m - before.y_m)
-            self._ways_m[name] = self._ways_m.get(name, 0.0) + way_m
-            has_moved |= velocity != REST or way_m > 0.0
-            self._last[name] = now
-        if has_moved:
-            self._rest_since_ns = 0
-        elif not self._rest_since_ns and self.travelled_m > 0.0:
-            self._rest_since_ns = stamp_ns
+        self.keep(step, stamp_ns, self._ros.background)
 
     def on_answer(self, request: Request, response: Any) -> None:
         """Keep what was asked, and what the answer is."""
@@ -137,24 +92,7 @@ class SimulatedTurtles:
         """Note steps that are late because of the host; called by the simulation."""
         late_ms = lateness.late_ns / 1e6
         text = f"{lateness.steps} steps done {late_ms:.0f} ms late"
-        self.incidents.append(Incident(self._stamp_ns, "late", text, lateness.late_ns / NS))
-
-    def _note(self, event: Event, stamp_ns: int) -> None:
-        if event.act in _INCIDENTS:
-            text = _INCIDENTS[event.act]
-            self.incidents.append(Incident(stamp_ns, event.act.value, text, robot=event.turtle))
-            return
-        if event.pose is None or event.pen is None:
-            self.events.append(TurtleEvent(stamp_ns, event.act.value))
-            return
-        pose, pen = event.pose, event.pen
-        self.events.append(
-            TurtleEvent(
-                *(stamp_ns, event.act.value, event.turtle),
-                *(pose.x_m, pose.y_m, pose.yaw_rad),
-                *(pen.colour, pen.width, pen.is_down),
-            )
-        )
+        self.incidents.append(Incident(self.stamp_ns, "late", text, lateness.late_ns / NS))
 
 
 def _asked_goal(goal: RotationGoal) -> Asked:
