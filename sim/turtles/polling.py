@@ -87,7 +87,8 @@ class Inbox:
     @property
     def services(self) -> frozenset[str]:
         """Names of the services that it takes requests to."""
-        return frozenset(one.srv_name for one in [*self._services])
+        # rclpy names those of parameters without the slash in front.
+        return frozenset(f"/{one.srv_name.lstrip('/')}" for one in [*self._services])
 
     def forget(self, made: Any) -> None:
         """Take nothing from a subscription or a service any more, and destroy it."""

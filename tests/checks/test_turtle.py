@@ -9,7 +9,7 @@ from grader.measure.turtle.drawing import drawn
 from grader.recording.window import cut
 from sim.motion import Pose
 from sim.turtles.turtle import Jump, Pen, Velocity
-from tests.checks.builder import at, failing, judge, text
+from tests.checks.builder import at, failing, judge
 from tests.checks.turtles import MIDDLE, moves, swim
 
 X, Y = MIDDLE
@@ -175,44 +175,3 @@ def test_spawned_turtles_are_at_their_places():
     assert "1 m off" in failing("turtle.spawns", run, turtles={"bob": [2, 2]})
     found = judge("turtle.spawns", run, turtles={"bob": [2, 3], "amy": [1, 1]})
     assert (found.credit, found.observed) == (0.5, "no `amy`: only `bob`")
-
-
-def test_a_command_that_was_published_once_ran_out():
-    def script(turtles, time_s):
-        return Velocity(1.0) if time_s == 0.0 else None
-
-    found = text(judge("turtle.draws", swim(script, 5.0), **figure()))
-    assert "it stopped by itself 1 time, 1 s after a command on `/turtle1/cmd_vel`" in found
-    assert "timer" in found
-
-
-def test_degrees_are_told_from_radians():
-    def script(turtles, time_s):
-        return Velocity(1.0, 0.0, 90.0) if time_s < 1.0 else Velocity()
-
-    found = text(judge("turtle.draws", swim(script, 3.0), **figure()))
-    assert "angular.z was 90 rad/s" in found
-    assert "radians" in found
-
-    def jump(turtles, time_s):
-        if time_s == 0.0:
-            turtles.teleport("turtle1", Jump(Pose(8.0, 8.0, 90.0)))
-
-    assert "a heading of 90 rad" in failing("turtle.draws", swim(jump, 1.0), **figure())
-
-
-def test_a_wall_is_told():
-    run = swim(moves((2.0, 0.0, 5.0)))
-    assert "a wall at (11.09" in failing("turtle.no_wall", run)
-    assert "it ran into a wall" in failing("turtle.draws", run, **figure())
-
-
-def test_turning_for_ever_is_told():
-    run = swim(moves((0.0, 3.0, 8.0)), placed=POND)
-    assert "more than 2 times round on the spot" in failing("turtle.catches", run, **PREY)
-
-
-def test_a_turtle_that_is_never_commanded_is_told_by_its_topic():
-    found = failing("turtle.draws", swim(lambda turtles, time_s: None, 1.0), **figure())
-    assert "`turtle1` drew no line" in found
-    assert "/turtle1/cmd_vel" in found
