@@ -5,10 +5,10 @@ from __future__ import annotations
 import signal
 import sys
 import time
-from collections.abc import Sequence
-from contextlib import nullcontext, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import rclpy
 from pydantic import TypeAdapter, ValidationError
@@ -26,7 +26,12 @@ from sim.node import RosSimulator, make_node
 from sim.robot import MODELS
 from sim.screen import Screen
 from sim.simulation import Simulation
+from sim.turtles.screen import TurtleScreen
+from sim.turtles.simulation import Turtles
 from sim.world import World, read_world
+
+if TYPE_CHECKING:
+    from sim.turtles.node import RosTurtles
 
 _REFRESH_NS = NS // 10
 _LINE_NS = NS
@@ -53,6 +58,32 @@ def run(
         domain_id: ROS domain, or None for ROS_DOMAIN_ID.
         duration: End after so many simulated seconds, or None.
     """
+    with _context(domain_id) as context:
+        node: Any = make_node("rosgrade_sim", context)
+        screen = Screen(simulation)
+        simulator = RosSimulator(node, {"": simulation}, screen)
+        screen.robot = simulator.robots[""]
+        _loop(simulator, screen, duration)
+        node.destroy_node()
+
+
+def run_turtles(
+    turtles: Turtles, *, domain_id: int | None = None, duration: float | None = None
+) -> None:
+    """The same for turtles; the interfaces of turtlesim must be importable."""
+    from sim.turtles.node import RosTurtles
+    from sim.turtles.node import make_node as make_turtles_node
+
+    with _context(domain_id) as context:
+        node: Any = make_turtles_node(context)
+        screen = TurtleScreen()
+        _loop(RosTurtles(node, turtles, screen), screen, duration)
+        node.destroy_node()
+
+
+@contextmanager
+def _context(domain_id: int | None) -> Iterator[Context]:
+    """A context that signals do not end, but Ctrl-C and SIGTERM end what is done in it."""
     context = Context()
     # Ctrl-C is handled here: rclpy's handler would shut the context down within a step.
     rclpy.init(
@@ -63,19 +94,22 @@ def run(
     )
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        node: Any = make_node("rosgrade_sim", context)
-        screen = Screen(simulation)
-        simulator = RosSimulator(node, {"": simulation}, screen)
-        screen.robot = simulator.robots[""]
-        with suppress(KeyboardInterrupt):
-            _loop(simulator, screen, None if duration is None else round(duration * NS))
-        node.destroy_node()
+        yield context
     finally:
         signal.signal(signal.SIGTERM, before)
         context.try_shutdown()
 
 
-def _loop(simulator: RosSimulator, screen: Screen, end_ns: int | None) -> None:
+def _loop(
+    simulator: RosSimulator | RosTurtles, screen: Screen | TurtleScreen, duration: float | None
+) -> None:
+    with suppress(KeyboardInterrupt):
+        _keep_time(simulator, screen, None if duration is None else round(duration * NS))
+
+
+def _keep_time(
+    simulator: RosSimulator | RosTurtles, screen: Screen | TurtleScreen, end_ns: int | None
+) -> None:
     console = Console()
     # We refresh it ourselves between two steps; a thread of rich's would disturb them.
     live = Live(console=console, screen=True, auto_refresh=False, redirect_stdout=False)

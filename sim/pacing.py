@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from sim.simulation import STEP_NS
 
 LATE_NS = 5_000_000
-"""Being more than half a step behind is reported."""
+"""Being so far behind, which is half a step of a robot, is reported."""
 
 MAX_BATCH = 100
 """Most steps that are caught up at once, so that the loop can be ended in between."""
@@ -28,20 +28,21 @@ class Lateness:
 class Pacer:
     """Compares done steps with a clock: none is left out, and none is done before its end."""
 
-    def __init__(self, begin_ns: int) -> None:
+    def __init__(self, begin_ns: int, step_ns: int = STEP_NS) -> None:
         """Begin at a time of the steady clock."""
         self.begin_ns = begin_ns
+        self._step_ns = step_ns
         self.done = 0
         self._planned = 1
 
     @property
     def deadline_ns(self) -> int:
         """When the planned step is to be done, on the steady clock."""
-        return self.begin_ns + self._planned * STEP_NS
+        return self.begin_ns + self._planned * self._step_ns
 
     def due(self, now_ns: int) -> int:
         """How many steps are over and not yet done, at most :data:`MAX_BATCH`."""
-        return max(0, min((now_ns - self.begin_ns) // STEP_NS - self.done, MAX_BATCH))
+        return max(0, min((now_ns - self.begin_ns) // self._step_ns - self.done, MAX_BATCH))
 
     def lateness(self, now_ns: int) -> Lateness | None:
         """What is to be reported before the steps that are due are done, if anything."""
@@ -61,6 +62,6 @@ class Pacer:
             steps from here.
         """
         most = self.done + MAX_AHEAD
-        wanted = most if output_ns is None else min(output_ns // STEP_NS, most)
+        wanted = most if output_ns is None else min(output_ns // self._step_ns, most)
         self._planned = max(self.done + 1, wanted)
         return self.deadline_ns

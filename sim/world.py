@@ -23,7 +23,7 @@ The frame is fixed, x and y in metres, yaw counter-clockwise (REP-103). A world 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,9 +31,10 @@ from typing import Any
 from grader.errors import AssignmentError, Problem
 from grader.spec.document import Place
 from grader.spec.nearest_name import did_you_mean
-from grader.spec.source import Source, parse_source, read_source
+from grader.spec.source import Source, in_order, parse_source, read_source
 from sim.motion import ORIGIN, Pose
 from sim.shapes import Body, MovingObstacle, Shape, polygon, wall
+from sim.turtles.bounds import SIZE_M
 from sim.world_model import WorldModel
 
 MAX_SEGMENTS = 3_000
@@ -51,6 +52,7 @@ class World:
         bounds: x_min, y_min, x_max, y_max of the wall around it, or None for an open world.
             Its four walls are among the shapes.
         bodies: Other robots in it.
+        turtles: Names and poses of the turtles that are there instead of a robot.
     """
 
     shapes: tuple[Shape, ...] = ()
@@ -59,6 +61,7 @@ class World:
     start: Pose = ORIGIN
     file: Path = Path("world.yaml")
     bodies: tuple[Body, ...] = ()
+    turtles: tuple[tuple[str, Pose], ...] = ()
 
     def extent(self, *points: tuple[float, float]) -> tuple[float, float, float, float]:
         """The smallest upright rectangle around everything, as x_min, y_min, x_max, y_max."""
@@ -124,13 +127,40 @@ def world_of(source: Source, values: Values) -> World:
     if len(model.moving) > MAX_MOVING:
         text = f"{len(model.moving)} moving obstacles: at most {MAX_MOVING} are simulated"
         problems.append(source.problem(("moving",), text))
+    problems += _turtle_problems(model, source)
     if problems:
-        raise AssignmentError(source.file, problems)
+        raise AssignmentError(source.file, in_order(problems))
     moving = tuple(
         item.obstacle(f"moving[{i}]", source.line(("moving", i)))
         for i, item in enumerate(model.moving)
     )
-    return World(shapes, moving, model.bounds, model.start, source.file)
+    turtles = tuple((one.name, one.pose) for one in model.turtles)
+    return World(shapes, moving, model.bounds, model.start, source.file, turtles=turtles)
+
+
+def turtle_names(source: Source) -> tuple[str, ...]:
+    """Names of the turtles in a world file, which may have any mistakes."""
+    found = source.data.get("turtles")
+    entries = found if isinstance(found, list) else ()
+    names = (entry.get("name") for entry in entries if isinstance(entry, dict))
+    return tuple(name for name in names if isinstance(name, str))
+
+
+def _turtle_problems(model: WorldModel, source: Source) -> Iterator[Problem]:
+    """What does not fit to turtles: a robot's world, a place beyond the walls, two of one name."""
+    if not model.turtles:
+        return
+    for key in source.data.keys() - {"turtles", "values"}:
+        text = f"a world has turtles or a robot, not both: leave {key!r} or 'turtles' out"
+        yield source.problem((key,), text)
+    yield from source.duplicates("name", "turtles")
+    for index, one in enumerate(model.turtles):
+        if not (0.0 <= one.pose.x_m <= SIZE_M and 0.0 <= one.pose.y_m <= SIZE_M):
+            text = (
+                f"{one.name} cannot be at ({one.pose.x_m:g}, {one.pose.y_m:g}): the walls of "
+                f"turtles are at 0 and {SIZE_M:.4g} m"
+            )
+            yield source.problem(("turtles", index, "pose"), text)
 
 
 def _shapes(model: WorldModel, source: Source) -> tuple[Shape, ...]:

@@ -21,6 +21,9 @@ from sim.coordinates import (
 )
 from sim.motion import NS, ORIGIN, Pose, relative
 from sim.shapes import MAX_SPEED_M_S, MovingObstacle, Shape, Waypoint, box, circle, polygon
+from sim.turtles.bounds import CENTRE_M
+
+TURTLE_NAME = r"[A-Za-z][A-Za-z0-9_]*"
 
 
 class CornerModel(Model):
@@ -128,6 +131,19 @@ class MovingModel(Model):
         )
 
 
+class TurtleModel(Model):
+    """A turtle of turtlesim.
+
+    Its topics, services and the action begin with its name: `/turtle1/cmd_vel`, `/turtle1/pose`.
+    """
+
+    name: str = Field(pattern=f"^{TURTLE_NAME}$", description="Its name, such as `turtle1`.")
+    pose: PoseInPlane = Field(
+        Pose(CENTRE_M, CENTRE_M, 0.0),
+        description="Where it starts, from the lower left corner; by default in the middle.",
+    )
+
+
 class WorldModel(Model):
     """A world file."""
 
@@ -144,6 +160,11 @@ class WorldModel(Model):
     circles: tuple[CircleModel, ...] = Field((), description="Round pillars.")
     polygons: tuple[PolygonModel, ...] = Field((), description="Filled polygons.")
     moving: tuple[MovingModel, ...] = Field((), description="Obstacles that move.")
+    turtles: tuple[TurtleModel, ...] = Field(
+        (),
+        description="Turtles in place of a robot and all other keys but `values`: the canvas of "
+        "turtlesim, with its services `/spawn`, `/kill`, `/clear` and `/reset`.",
+    )
 
 
 def _ns(seconds: float) -> int:

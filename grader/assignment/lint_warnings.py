@@ -9,6 +9,7 @@ from grader.assignment.model import Assignment, Visibility
 from grader.assignment.mutant import Mutant
 from grader.spec.nearest_name import did_you_mean
 from grader.submission.read.dependencies import is_known, meant
+from sim.turtles.interfaces import published
 
 
 def lint_warnings(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) -> Iterator[str]:
@@ -33,7 +34,7 @@ def _unknown_topics(loaded: LoadedAssignment) -> Iterator[str]:
         kept_free = getattr(bound.parameters, "topics", ()) if stated else ()
         for scenario in loaded.scenarios_of(bound):
             exchanged = {one.exchanged[0] for one in scenario.stimuli if one.exchanged}
-            known = {*scenario.recorded_types, *exchanged}
+            known = {*scenario.recorded_types, *exchanged, *published(scenario.turtles)}
             suspects = [name for name in named if isinstance(name, str)]
             suspects += [name for name in kept_free if did_you_mean(name, known)]
             for topic in suspects:

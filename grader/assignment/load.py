@@ -145,7 +145,7 @@ def bound_checks(
     source: Source, catalogue: Mapping[str, Check] = CATALOGUE
 ) -> tuple[Assignment, list[BoundCheck | None], list[Problem]]:
     """Read an assignment and its checks, with what is wrong in them; None for such a check."""
-    assignment = source.read(Assignment)
+    assignment = simulation.with_turtles(source.read(Assignment), source.file.parent)
     try:
         own = lesson_checks(source.file.parent)
     except ValueError as error:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Any, Literal
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, PrivateAttr, model_validator
 
 from grader.assignment.bag import BagOptions
 from grader.assignment.contract.model import Contract
@@ -35,6 +35,7 @@ from grader.spec.source import Model
 from grader.spec.unit import parse_any
 from sim.description import LidarOptions, OdometryOptions, RobotOptions, SimulatorOptions, Topics
 from sim.sensor_options import BatteryOptions, ImuOptions, JointOptions, RangeOptions
+from sim.turtles.interfaces import commands
 
 
 class RandomRange(Model):
@@ -245,10 +246,12 @@ class Until(Model):
     )
     elapsed: Duration | None = Field(None, description="Time since the first match.")
     at_rest: Duration | None = Field(
-        None, description="Time at rest of the simulated robot, after it has moved."
+        None, description="Time at rest of the simulated robot or turtles, after they have moved."
     )
     travelled: PositiveLength | None = Field(
-        None, description="Distance that the simulated robot has driven, along its path."
+        None,
+        description="Distance that the simulated robot has driven, along its path; of turtles the "
+        "one that went the farthest.",
     )
     stimuli: Literal["done"] | None = Field(
         None,
@@ -290,8 +293,9 @@ class Scenario(Model):
     world: str | None = Field(
         None,
         description="World file, relative to the assignment's folder. A world adds a simulated "
-        "robot to the scenario. Its topics are recorded too. Simulated time begins at "
-        "the first match. The run ends 1 s after a contact.",
+        "robot to the scenario, or turtles. Its topics are recorded too, and the `cmd_vel` of each "
+        "of its turtles. Simulated time begins at the first match. The run ends 1 s after a "
+        "contact of the robot.",
     )
     robot: RobotOptions = Field(default_factory=RobotOptions, description="The simulated robot.")
     robots: dict[NodeName, RobotOptions] = Field(
@@ -344,12 +348,24 @@ class Scenario(Model):
     limits: LimitOptions | None = Field(
         None, description="Limits of the student's processes; by default the assignment's."
     )
+    _turtles: tuple[str, ...] = PrivateAttr(())
+
+    @property
+    def turtles(self) -> tuple[str, ...]:
+        """Names of the turtles in its world, which has no robot then."""
+        return self._turtles
+
+    def with_turtles(self, names: tuple[str, ...]) -> Scenario:
+        """The same scenario, whose world was looked into."""
+        copy = self.model_copy()
+        copy._turtles = names
+        return copy
 
     @property
     def transform_topics(self) -> dict[str, Durability]:
         """The robot's topics of transforms, if the scenario names them; with their durability."""
         tf = self.topics.tf
-        named = self.world is not None and "tf" in self.topics.model_fields_set and tf.enabled
+        named = self.simulated and "tf" in self.topics.model_fields_set and tf.enabled
         return {tf.topic: tf.durability, tf.static_topic: "transient_local"} if named else {}
 
     @property
@@ -361,17 +377,19 @@ class Scenario(Model):
     @property
     def simulated(self) -> dict[str, SimulatorOptions]:
         """The robots in its world by their names, which is empty for the only one."""
-        return {} if self.world is None else self.simulator.each(self.robots)
+        has_robots = self.world is not None and not self.turtles
+        return self.simulator.each(self.robots) if has_robots else {}
 
     @property
     def has_robot(self) -> bool:
         """Whether a robot's motion is known: a simulated one's, or by the odometry in a bag."""
-        return self.world is not None or (self.bag is not None and self.odometry.enabled)
+        return bool(self.simulated) or (self.bag is not None and self.odometry.enabled)
 
     @property
     def recorded_types(self) -> dict[str, str]:
         """Topic -> type of all that is recorded: `record`, and the robot's topics."""
         found = {one.topic: one.type for one in self.record}
+        found = commands(self.turtles) | found
         if self.bag is not None and self.has_robot:
             found.setdefault(self.topics.command.topic, self.topics.command.type)
             found[self.topics.odometry.topic] = ODOMETRY

@@ -31,6 +31,8 @@ from grader.spec.unit import format_duration
 from grader.submission.read.lint import find_ruff, known_rules
 from grader.submission.read.rosdistro import PACKAGES
 from sim.description import SimulatorOptions
+from sim.turtles.interfaces import commands as turtle_commands
+from sim.turtles.interfaces import servers as turtle_servers
 
 _Lack = tuple[Place, str]
 """A place below the entry of a check, and what is wrong there."""
@@ -101,10 +103,13 @@ def _scenario(assignment: Assignment, scenario: Scenario) -> Iterator[tuple[Plac
     for key in ("messages", "quiet"):
         if not topics and getattr(until, key) is not None:
             yield ("until", key), "no topic is recorded: 'record' is missing"
-    if scenario.world is None and scenario.bag is None:
+    if scenario.bag is None and not scenario.simulated:
+        lacks = "needs a 'world', which is missing"
+        lacks = "is not in a world with turtles" if scenario.turtles else lacks
         for key in ("robots", *SimulatorOptions.model_fields):
             if key in scenario.model_fields_set:
-                yield (key,), "a simulated robot needs a 'world', which is missing"
+                yield (key,), f"a simulated robot {lacks}"
+    if scenario.world is None and scenario.bag is None:
         for key in ("at_rest", "travelled"):
             if any(getattr(one, key) is not None for one in (until, *until.any)):
                 text = f"{key!r} is about the simulated robot: 'world' is missing"
@@ -321,9 +326,18 @@ def _(need: needs.SimulatedRobot, user: _User) -> Iterator[_Lack]:
             text = f"the scenario {scenario.id!r} has several robots: say which 'robot' it judges"
             yield (), f"{text} ({names})"
         if not scenario.has_robot:
-            text = f"the scenario {scenario.id!r} has no 'world', and so no simulated robot"
+            what = "turtles in its world" if scenario.turtles else "no 'world'"
+            text = f"the scenario {scenario.id!r} has {what}, and so no simulated robot"
             if scenario.bag is not None:
                 text = f"the odometry of the scenario {scenario.id!r} is not enabled"
+            yield ("uses",), text
+
+
+@_lacks.register
+def _(need: needs.WithTurtles, user: _User) -> Iterator[_Lack]:
+    for scenario in user.scenarios:
+        if not scenario.turtles:
+            text = f"the scenario {scenario.id!r} has no 'world' with turtles"
             yield ("uses",), text
 
 
@@ -352,6 +366,7 @@ def _(need: needs.SentOrOwn, user: _User) -> Iterator[_Lack]:
     for scenario in user.scenarios:
         given = {one.subject for one in _doing(needs.Act.PUBLISH, scenario)}
         commands = {one.topics.command.topic for one in scenario.simulated.values()}
+        commands |= {*turtle_commands(scenario.turtles)}
         given |= {*scenario.model_copy(update={"record": ()}).recorded_types} - commands
         recorded = {*scenario.recorded_types} - given
         if own and topic not in recorded:
@@ -390,6 +405,9 @@ def _(need: needs.Stimulated, user: _User) -> Iterator[_Lack]:
         able = _doing(need.act, scenario)
         mine = [one for one in able if one.subject == wanted]
         does = f"no stimulus of the scenario {scenario.id!r} {need.act.value} {wanted!r}"
+        served = turtle_servers(scenario.turtles) if scenario.turtles else {}
+        if need.act is needs.Act.SERVE and wanted in served:
+            continue
         if not mine:
             yield key, f"{does}." + nearest_or_all(wanted, [one.subject for one in able])
         elif need.having and not any(one.differs_in(having) for one in mine):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from grader.assignment.interfaces import Interfaces
@@ -14,7 +15,7 @@ from grader.spec.document import Place
 from grader.spec.source import Source, read_source
 from grader.spec.unit import format_duration
 from sim.robot import starting
-from sim.world import World, world_of
+from sim.world import World, turtle_names, world_of
 
 _TRIED_SEEDS = range(20)
 
@@ -22,6 +23,20 @@ _TRIED_SEEDS = range(20)
 def read_scenario_world(file: Path, values: dict[str, str]) -> World:
     """Read a world; a scenario may have random values that its world does not use."""
     return _scenario_world(read_source(file), values)
+
+
+def with_turtles(assignment: Assignment, folder: Path) -> Assignment:
+    """The same assignment, whose scenarios know the turtles in their worlds."""
+
+    def known(scenario: Scenario) -> Scenario:
+        names: tuple[str, ...] = ()
+        # A world that cannot be read is told later.
+        with suppress(AssignmentError, UsageError):
+            names = turtle_names(read_source(folder / str(scenario.world)))
+        return scenario.with_turtles(names) if names else scenario
+
+    worlds = [known(one) if one.world is not None else one for one in assignment.scenarios]
+    return assignment.model_copy(update={"scenarios": tuple(worlds)})
 
 
 def _scenario_world(world: Source, values: dict[str, str]) -> World:

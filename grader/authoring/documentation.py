@@ -108,6 +108,7 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "moving: circle": world_model.RoundModel,
         "moving: box": world_model.CornerModel,
         "moving: path": world_model.WaypointModel,
+        "turtles": world_model.TurtleModel,
     },
 }
 _HEADINGS = {

@@ -52,6 +52,13 @@ class SimulatedRobot(Need):
 
 
 @dataclass(frozen=True)
+class WithTurtles(Need):
+    """Turtles in the ``world`` of each scenario."""
+
+    words = "a `world` with `turtles`"
+
+
+@dataclass(frozen=True)
 class Recorded(Need):
     """A topic that each scenario records."""
 

@@ -145,7 +145,10 @@ def jump(work: Work) -> Iterator[Question]:
                 "Which line does that, and what made it do so just then?"
             )
             poses = (one for one in recording.truth if one.time_ns >= messages[at].stamp_ns)
-            seen = [f"the robot was at ({one.x_m:.2f}, {one.y_m:.2f}) m" for one in poses][:1]
+            seen = [
+                f"{one.robot or 'the robot'} was at ({one.x_m:.2f}, {one.y_m:.2f}) m"
+                for one in poses
+            ][:1]
             yield Question(text, (*work.evidence(rf"\b{re.escape(field)}\s*=[^=]"), *seen), 4)
 
 

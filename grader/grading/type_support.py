@@ -124,5 +124,7 @@ class TypeSupport:
         if for_probe:
             types = [type for one in assignment.scenarios for type in one.recorded_types.values()]
             named = _WORD.findall(" ".join([assignment.model_dump_json(), *types]))
+            if any(one.turtles for one in assignment.scenarios):
+                named.append("turtlesim")
             ros = store.completed(ros, named)
         return ros

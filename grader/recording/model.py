@@ -18,7 +18,7 @@ from typing import Any
 
 from grader.recording.event import Breach, Disturbance, Intervention, Pause, Wait
 from grader.recording.interaction import Asked, Goal, Service
-from grader.recording.simulated import Incident, Scene, Truth
+from grader.recording.simulated import Incident, Scene, Truth, TurtleEvent
 from grader.recording.submission import SubmissionRecord
 from grader.spec.names import NO_NAMES, Names
 
@@ -319,6 +319,7 @@ class Recording:
         truth: The simulated robots, step by step; empty in a scenario without a world.
         incidents: What the simulator noted.
         scenes: World and robot by the name of the robot, which is empty for the only one.
+        turtles: What happened to the turtles of the scenario besides their motion, in order.
         values: Values of the scenario by name, fixed and random ones, in SI units.
         environment: ``ros_distro``, ``rmw``, ``python``, ``domain_id``, ``sandbox``, ...; the
             ``ros_imports`` that are installed; the ``parameters`` of the launch, by name;
@@ -362,6 +363,7 @@ class Recording:
     truth: tuple[Truth, ...] = ()
     incidents: tuple[Incident, ...] = ()
     scenes: Mapping[str, Scene] = field(default_factory=dict)
+    turtles: tuple[TurtleEvent, ...] = ()
     values: Mapping[str, float] = field(default_factory=dict)
     environment: Mapping[str, str] = field(default_factory=dict)
     names: Names = NO_NAMES

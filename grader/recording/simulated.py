@@ -60,6 +60,35 @@ class Incident:
 
 
 @dataclass(frozen=True)
+class TurtleEvent:
+    """What happened to a turtle besides its motion, which is in the truth.
+
+    Attributes:
+        time_ns: End of the step before whose motion it happened.
+        kind: ``placed`` (it was there at first, or is there after a reset), ``spawned``,
+            ``killed``, ``pen``, ``teleported``; of no turtle: ``cleared`` (all lines are gone),
+            ``reset`` (all lines and turtles are gone), ``background``.
+        turtle: Its name; empty for what is about all.
+        x_m: Where the turtle is then, from the lower left corner.
+        y_m: The same, upwards.
+        yaw_rad: Its heading, counter-clockwise from the x axis.
+        colour: Of its pen, or of the background: red, green and blue, from 0 to 255.
+        width: Of the lines that it draws, in pixels; 45 pixels are 1 m.
+        is_down: Whether its pen draws.
+    """
+
+    time_ns: int
+    kind: str
+    turtle: str = ""
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_rad: float = 0.0
+    colour: tuple[int, int, int] = (0, 0, 0)
+    width: int = 0
+    is_down: bool = True
+
+
+@dataclass(frozen=True)
 class Scene:
     """World and robot of a run, for drawing and judging.
 

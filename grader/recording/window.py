@@ -44,6 +44,8 @@ def cut(recording: Recording, begin_ns: int, end_ns: int) -> Recording:
             if item.kind != "ran" or begin_ns <= item.time_ns < end_ns
         ),
         truth=inside(recording.truth, attrgetter("time_ns")),
+        # What was done to a turtle before holds in the window, such as the colour of its pen.
+        turtles=tuple(one for one in recording.turtles if one.time_ns < end_ns),
         incidents=inside(recording.incidents, attrgetter("time_ns")),
         calls=inside(recording.calls, attrgetter("requested_ns")),
         goals=inside(recording.goals, attrgetter("sent_ns")),

@@ -78,7 +78,7 @@ class UntilOrder:
 
 @dataclass(frozen=True)
 class SimulatorOrder:
-    """The simulated robots of a scenario; ``values`` stand for ``$name`` in its world.
+    """The simulated robots or turtles of a scenario; ``values`` stand for ``$name`` in its world.
 
     Attributes:
         robots: Name -> its own options, as JSON; empty for one robot without a name.
@@ -89,6 +89,7 @@ class SimulatorOrder:
     options: str
     seed: int
     robots: dict[str, str] = field(default_factory=dict)
+    has_turtles: bool = False
 
 
 @dataclass(frozen=True)

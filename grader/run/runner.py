@@ -25,7 +25,7 @@ from grader.recording.submission import SubmissionRecord
 from grader.run.admission import Admission
 from grader.run.cell.cell_process import SCRATCH, CellProcess
 from grader.run.cell.middleware_hang import MiddlewareHung, hung_recording
-from grader.run.cell.prefork_server import SIMULATOR_MODULE, PreforkServer
+from grader.run.cell.prefork_server import SIMULATOR_MODULE, TURTLES_MODULE, PreforkServer
 from grader.run.compiled_tracer import compiled_tracer, has_compiled_programs
 from grader.run.environment import RMW, student_environment
 from grader.run.imposing.mistake import Mistake, with_mistakes
@@ -34,6 +34,7 @@ from grader.run.sandboxed_order import sandboxed
 from grader.sandbox.python_tree import unlisted
 from grader.spec.name import FIND_SHARE
 from grader.spec.names import NO_NAMES, Names, Thing
+from sim.turtles.interfaces import commands
 
 if TYPE_CHECKING:
     from grader.assignment.model import Assignment, Launch, Scenario, Until
@@ -172,15 +173,17 @@ def _program(ros: RosInstallation, file: Path) -> tuple[str, ...]:
 
 
 def _topics(scenario: Scenario) -> tuple[Topic, ...]:
-    """What is recorded: the author's topics, and those of the simulated robot."""
+    """What is recorded: the author's topics, and those of the simulated robot or turtles."""
     found = {
         one.topic: Topic(one.topic, one.type, one.reliability, one.durability, one.depth)
         for one in scenario.record
     }
+    for name, type in commands(scenario.turtles).items():
+        found.setdefault(name, Topic(name, type, "reliable", "volatile", 100))
     for robot in scenario.simulated.values():
         command = robot.topics.command
-        commands = Topic(command.topic, command.type, "reliable", "volatile", 100)
-        found.setdefault(command.topic, commands)
+        own = Topic(command.topic, command.type, "reliable", "volatile", 100)
+        found.setdefault(command.topic, own)
         for options in (robot.topics.odometry, robot.topics.scan, *robot.sensors):
             name = options.topic
             if name in scenario.recorded_types:
@@ -218,6 +221,7 @@ def _simulator(
         options=scenario.simulator.model_dump_json(),
         robots={name: one.model_dump_json() for name, one in scenario.robots.items()},
         seed=seed,
+        has_turtles=bool(scenario.turtles),
     )
 
 
@@ -380,7 +384,7 @@ class Runner:
     def _take_cell(self, scenario: Scenario) -> CellProcess:
         imports = {*scenario.recorded_types.values()}
         if scenario.world is not None:
-            imports.add(SIMULATOR_MODULE)
+            imports.add(TURTLES_MODULE if scenario.turtles else SIMULATOR_MODULE)
         with self._lock:
             if self._aborted:
                 raise GraderFault("interrupted")

@@ -299,3 +299,50 @@ def test_a_check_of_motion_says_which_of_several_robots(
 )
 def test_robots_that_cannot_be_are_refused(tmp_path: Path, old: str, new: str, reason: str) -> None:
     assert reason in refused(tmp_path, PAIR.replace(old, new))
+
+
+POND = "turtles: [{name: turtle1}, {name: bob, pose: [1, 2, 0 deg]}]\n"
+
+
+def test_a_world_with_turtles_has_their_topics_and_no_robot(tmp_path: Path) -> None:
+    yaml = YAML.replace("/cmd_vel", "/bob/cmd_vel")
+    (scenario,) = load_assignment(lesson(tmp_path, yaml, POND)).assignment.scenarios
+    assert scenario.turtles == ("turtle1", "bob")
+    assert scenario.recorded_types == {
+        "/turtle1/cmd_vel": "geometry_msgs/msg/Twist",
+        "/bob/cmd_vel": "geometry_msgs/msg/Twist",
+    }
+    assert scenario.simulated == {}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("    timeout", "    lidar: {beams: 90}\n    timeout"), "is not in a world with turtles"),
+        (
+            ("node.alive", "motion.no_contact"),
+            "the scenario 'run' has turtles in its world, and so no simulated robot",
+        ),
+    ],
+)
+def test_what_needs_a_robot_is_refused_in_a_world_with_turtles(
+    tmp_path: Path, change: tuple[str, str], message: str
+) -> None:
+    yaml = YAML.replace("/cmd_vel", "/bob/cmd_vel").replace(*change)
+    assert message in refused(tmp_path, yaml, POND)
+
+
+def test_what_needs_turtles_is_refused_in_a_world_of_a_robot(tmp_path: Path) -> None:
+    yaml = YAML.replace("uses: node.alive", "uses: turtle.closes")
+    assert "assignment.yaml:12: checks[0].uses: the scenario 'run' has no 'world' with turtles" in (
+        refused(tmp_path, yaml)
+    )
+
+
+def test_turtles_serve_what_a_contract_lets_a_node_call(tmp_path: Path) -> None:
+    more = "  - {id: asks, uses: client.asks, with: {server: /bob/set_pen}, points: 1}\n"
+    yaml = YAML.replace("/cmd_vel", "/bob/cmd_vel") + more
+    assert load_assignment(lesson(tmp_path, yaml, POND))
+    (tmp_path / "lesson" / "assignment.yaml").write_text(yaml.replace("/bob/set_pen", "/amy/x"))
+    with pytest.raises(AssignmentError, match="serves '/amy/x'"):
+        load_assignment(tmp_path / "lesson")

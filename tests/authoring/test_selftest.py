@@ -30,6 +30,8 @@ COMPILED = (
     "custom_interface",
     "group_project",
     "rescue_team",
+    "turtle_catch",
+    "turtle_square",
     "victim_report",
     "waypoints",
 )

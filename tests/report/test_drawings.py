@@ -15,7 +15,11 @@ from grader.report.drawing.frames import draw_frames
 from grader.report.drawing.plot import draw_plot
 from grader.report.drawing.svg import NARROW, WIDE
 from grader.report.drawing.timeline import Flag, draw_timeline, place
+from grader.report.drawing.turtles import draw_turtles
+from sim.motion import Pose
+from sim.turtles.turtle import Pen, Velocity
 from tests.checks.test_tf import TF, TF_STATIC, TIMES, on, run, transform
+from tests.checks.turtles import swim
 from tests.report.page import description, is_finite, marks, of_class, words
 from tests.report.sample import PROCESS, at, make_run
 
@@ -202,3 +206,27 @@ class TestFrames:
 
     def test_a_run_without_transforms_has_no_tree(self):
         assert draw_frames(make_run(), "f") is None
+
+
+class TestTurtles:
+    def test_the_canvas_shows_lines_turtles_and_who_was_killed(self):
+        def script(turtles, time_s):
+            if time_s == 0.0:
+                turtles.set_pen("turtle1", Pen((255, 0, 0), 9))
+                turtles.spawn(Pose(2.0, 2.0, 0.0), "bob")
+            if time_s == 0.8:
+                turtles.kill("bob")
+            return Velocity(1.0)
+
+        figure = draw_turtles(swim(script, 1.6), [((5.5, 5.5), (7.5, 5.5))], "t")
+        for drawing in (figure.wide, figure.narrow):
+            assert 'stroke="rgb(255 0 0)"' in drawing
+            assert 'fill="rgb(69 86 255)"' in drawing
+            assert {"turtle1", "1. bob"} <= set(words(drawing).splitlines()) or (
+                "turtle1" in words(drawing) and "1. bob" in words(drawing)
+            )
+            assert is_finite(drawing)
+        assert figure.caption.startswith("turtle1 drew 1.6 m; the dashed figure was asked for; 1 ")
+
+    def test_there_is_none_without_turtles(self):
+        assert draw_turtles(make_run(), [], "t") is None

@@ -128,3 +128,12 @@ def test_a_pose_may_have_units() -> None:
     assert parse_pose("[0, 0, 1 rad]") == Pose(0.0, 0.0, 1.0)
     with pytest.raises(UsageError, match="--pose: yaw: '90' has no unit"):
         parse_pose("0, 0, 90")
+
+
+@pytest.mark.compiles
+def test_turtles_run_too(tmp_path: Path, domain: str, capsys: pytest.CaptureFixture[str]) -> None:
+    world = tmp_path / "pond.yaml"
+    world.write_text("turtles: [{name: bob, pose: [1, 2, 90 deg]}]\n", encoding="utf-8")
+    arguments = ["sim", str(world), "--domain-id", domain, "--duration", "1.2"]
+    app(arguments, standalone_mode=False)
+    assert "bob x 1.00 m y 2.00 m theta +90 deg" in capsys.readouterr().out

@@ -195,3 +195,40 @@ def test_the_extent_holds_everything() -> None:
     world = parse_world(text)
     assert world.extent() == pytest.approx((-1.0, 0.0, 1.5, 3.1))
     assert world.extent((-4.0, 9.0)) == pytest.approx((-4.0, 0.0, 1.5, 9.0))
+
+
+POND = "turtles:\n  - name: turtle1\n  - {name: bob, pose: [1, 2, 90 deg]}\n"
+
+
+def test_a_world_has_turtles_instead_of_a_robot() -> None:
+    (first, at), (name, pose) = parse_world(POND).turtles
+    assert (first, at.x_m, name, pose.x_m) == ("turtle1", pytest.approx(5.5444, abs=1e-3), "bob", 1)
+    world = parse_world("values: {x: 3}\nturtles: [{name: a, pose: [$x, 1, 0 deg]}]")
+    assert world.turtles[0][1].x_m == 3.0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            POND + "start: [0, 0, 0 deg]\n",
+            "w.yaml:4: start: a world has turtles or a robot, not both: leave 'start' or 'turtles' "
+            "out",
+        ),
+        (
+            "turtles:\n  - {name: a, pose: [12, 1, 0 deg]}\n",
+            "w.yaml:2: turtles[0].pose: a cannot be at (12, 1): the walls of turtles are at 0 and "
+            "11.09 m",
+        ),
+        (
+            "turtles:\n  - name: a\n  - name: a\n",
+            "w.yaml:3: turtles[1].name: 'a' stands twice (first in line 2)",
+        ),
+        ("turtles:\n  - name: 1a\n", "w.yaml:2: turtles[0].name: "),
+    ],
+)
+def test_mistakes_in_a_world_with_turtles_have_one_error_each(text: str, message: str) -> None:
+    with pytest.raises(AssignmentError) as caught:
+        parse_world(text, Path("w.yaml"))
+    assert str(caught.value).startswith(message)
+    assert len(str(caught.value).splitlines()) == 1

@@ -24,6 +24,7 @@ from grader.report.drawing.path import draw_path, targets
 from grader.report.drawing.plot import draw_plot
 from grader.report.drawing.svg import Figure
 from grader.report.drawing.timeline import draw_timeline
+from grader.report.drawing.turtles import draw_turtles, figures
 from grader.report.html.page import render_page
 from grader.report.html.replay import Replay, embedded, make_replay, with_goals
 from grader.report.html.source_code import ShownSource
@@ -166,6 +167,8 @@ def render_report(
         draw_path=draw_path,
         draw_timeline=draw_timeline,
         each_robot=each_robot,
+        draw_turtles=draw_turtles,
+        figures=partial(figures, assignment),
         pairs=pairs,
         targets=partial(targets, assignment),
         shorten=shorten,

@@ -34,6 +34,7 @@ from grader.spec.unit import format_duration
 
 if TYPE_CHECKING:
     from grader.run.cell.simulator import Simulator
+    from grader.run.cell.turtles import SimulatedTurtles
 
 _TICK_S = 0.05
 _CALM_TICK_S = 0.1
@@ -100,7 +101,12 @@ class Cell:
         self._exit_barrier = ExitBarrier(self._output, self._graph, self._students)
         self._waits: list[Wait] = []
         self._simulator: Simulator | None = None
-        if order.simulator is not None:
+        self._turtles: SimulatedTurtles | None = None
+        if order.simulator is not None and order.simulator.has_turtles:
+            from grader.run.cell.turtles import SimulatedTurtles
+
+            self._turtles = SimulatedTurtles(probe.node.context, order.simulator)
+        elif order.simulator is not None:
             from grader.run.cell.simulator import Simulator
 
             self._simulator = Simulator(probe.node, order.simulator)
@@ -116,8 +122,10 @@ class Cell:
             self._faults,
             self._simulator.robots if self._simulator is not None else {},
         )
+        self._simulated = self._simulator or self._turtles
         self._player = Player(order.stimuli, self._context)
-        self._ending = EndingConditions(probe, self._output, self._context.robots, self._player)
+        robots = [*self._context.robots.values(), *([self._turtles] if self._turtles else ())]
+        self._ending = EndingConditions(probe, self._output, robots, self._player)
         self._later: list[ProcessCommand] = []
         self._next_graph = 0.0
         self._launched_ns = 0
@@ -135,9 +143,9 @@ class Cell:
             self._probe.recording = False
             stop_ns = time.time_ns()
             self._player.finish()
-            if self._simulator is not None:
+            if self._simulated is not None:
                 # With its last command it would drive on while nothing steers it.
-                self._simulator.stop()
+                self._simulated.stop()
             pauses = self._pause() if self._order.pauses else ()
             tell("stopping")
             self._students.stop(self._order.limits)
@@ -183,7 +191,7 @@ class Cell:
             calls=tuple(sorted(calls, key=lambda call: call.requested_ns)),
             services=self._graph.services,
             clients=self._graph.clients,
-            asked=tuple(self._context.asked),
+            asked=(*self._context.asked, *(self._turtles.asked if self._turtles else ())),
             goals=tuple(self._context.goals),
             waits=tuple(self._waits),
             joins=tuple(self._context.joins.values()),
@@ -194,9 +202,10 @@ class Cell:
             answers=self._player.answers,
             disturbance=disturbance,
             faults=tuple(dict.fromkeys(self._faults)),
-            truth=self._simulator.truth if self._simulator else (),
-            incidents=self._simulator.incidents if self._simulator else (),
+            truth=tuple(self._simulated.truth) if self._simulated else (),
+            incidents=tuple(self._simulated.incidents) if self._simulated else (),
             scenes=self._simulator.scenes if self._simulator else {},
+            turtles=tuple(self._turtles.events) if self._turtles else (),
             values=self._order.values,
             names=self._order.names,
             environment={
@@ -252,8 +261,8 @@ class Cell:
         if ending is None:
             tell("matched", limit_s=self._order.limits.timeout_s)
             self._player.begin()
-            if self._simulator is not None:
-                self._simulator.start()
+            if self._simulated is not None:
+                self._simulated.start()
             ending = self._await_until()
         if self._order.process_sandbox is not None:
             self._other_domains = tuple(d for d in joined_domains() if d != self._domain_id)
@@ -392,7 +401,8 @@ class Cell:
         matching: list[Any] = [e for e in self._graph.endpoints if self._probe.matches(e)]
         for endpoint in matching:
             self._probe.subscribe_leniently(endpoint)
-        matching += [one for one in self._graph.clients if one.name in self._player.servers]
+        servers = {*self._player.servers, *(self._turtles.services if self._turtles else ())}
+        matching += [one for one in self._graph.clients if one.name in servers]
         for topic in self._player.topics:
             matching += self._context.endpoints(Kind.SUBSCRIPTION, topic)
         if matching and self._matched_ns is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from grader.recording.model import NS, Owner
@@ -16,6 +16,7 @@ from grader.run.process.student import StudentProcesses
 if TYPE_CHECKING:
     from grader.run.cell.probe import Probe
     from grader.run.cell.simulator import SimulatedRobot
+    from grader.run.cell.turtles import SimulatedTurtles
     from grader.run.stimuli.player import Player
 
 _AFTER_CONTACT_S = 1.0
@@ -28,13 +29,13 @@ class EndingConditions:
         self,
         probe: Probe,
         output: OutputReader,
-        robots: Mapping[str, SimulatedRobot],
+        robots: Iterable[SimulatedRobot | SimulatedTurtles],
         player: Player,
     ) -> None:
         self._player = player
         self._probe = probe
         self._output = output
-        self._robots = tuple(robots.values())
+        self._robots = tuple(robots)
 
     def is_over(self) -> bool:
         """Whether a robot has touched something: no verdict can change any more."""

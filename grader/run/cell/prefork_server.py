@@ -60,6 +60,8 @@ _ALWAYS = (
 )
 SIMULATOR_MODULE = "grader.run.cell.simulator"
 """Module that a cell with a simulated robot imports in addition."""
+TURTLES_MODULE = "grader.run.cell.turtles"
+"""The same for turtles."""
 
 
 def readable(descriptors: Collection[int], limit_s: float | None = None) -> set[int]:

@@ -1,0 +1,1 @@
+"""Checks of turtles: what they draw and with which pen, who is spawned and caught."""

@@ -1,0 +1,131 @@
+"""The check of who is caught, and in which order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from enum import Enum
+
+from pydantic import Field
+
+from grader.checks.check import Subject, check, stop_if
+from grader.checks.turtle.turtle_check import TurtleParameters, astray
+from grader.diagnosis.explanation import mistaken
+from grader.diagnosis.turtle.astray import why_no_turtles
+from grader.findings.finding import Evidence, Finding, moment, until_the_end
+from grader.findings.words import code, codes, counted, metres
+from grader.measure.turtle.hunt import Catch, Hunt
+from grader.recording.model import Recording
+from grader.spec.quantity import PositiveLength
+
+_NEAR_M = 0.5
+_MARGIN_M = 0.2
+"""Of two that are nearly as near, either is the nearest."""
+
+
+class Order(str, Enum):
+    """In which order turtles are caught."""
+
+    ANY = "any"
+    LISTED = "listed"
+    NEAREST = "nearest"
+
+
+class Catches(TurtleParameters):
+    """Parameters of turtle.catches."""
+
+    prey: tuple[str, ...] = Field(min_length=1, description="Names of the turtles to catch.")
+    within: PositiveLength | None = Field(
+        None, description="How near `turtle` must be when one is killed; by default anywhere."
+    )
+    order: Order = Field(
+        Order.ANY,
+        description="`listed`: as in `prey`; `nearest`: always the one that is the nearest to "
+        "`turtle` when the one before is killed.",
+    )
+
+    def _asked(self) -> str:
+        how = {Order.LISTED: " in this order", Order.NEAREST: ", always the nearest"}
+        near = f", each within {metres(self.within)} of {code(self.turtle)}" if self.within else ""
+        return f"{codes(self.prey)} are killed{how.get(self.order, '')}{near}"
+
+
+@check("turtle.catches", Subject.RECORDING, Catches)
+def catches(recording: Recording, parameters: Catches) -> Finding:
+    """Turtles are caught: killed when the hunter is near, in the order.
+
+    Each that is caught rightly, before the first that is not, gives an equal share of the points.
+    """
+    stop_if(why_no_turtles(recording))
+    hunt = Hunt(recording, parameters.turtle, parameters.prey)
+    caught, evidence = hunt.catches, _evidence(recording, hunt.catches)
+    wrong = next((n for n, one in enumerate(caught) if not _is_right(one, n, parameters)), None)
+    credit = (len(caught) if wrong is None else wrong) / len(parameters.prey)
+    if wrong is not None:
+        found = _mistake(caught[wrong], wrong, parameters, evidence)
+    elif len(caught) < len(parameters.prey):
+        found = _missing(hunt, parameters, evidence)
+    else:
+        return Finding.as_asked(f"{codes(one.name for one in caught)} in this order", evidence)
+    return replace(found, credit=credit)
+
+
+def _evidence(recording: Recording, caught: tuple[Catch, ...]) -> Evidence:
+    return Evidence(tuple(moment(recording, f"{one.name} killed", one.time_ns) for one in caught))
+
+
+def _is_right(one: Catch, number: int, asked: Catches) -> bool:
+    if _is_far(one, asked):
+        return False
+    if asked.order is Order.LISTED:
+        return one.name == asked.prey[number]
+    return asked.order is Order.ANY or not _has_nearer(one)
+
+
+def _is_far(one: Catch, asked: Catches) -> bool:
+    return asked.within is not None and (one.distance_m is None or one.distance_m > asked.within)
+
+
+def _is_near(away_m: float | None, asked: Catches) -> bool:
+    return away_m is not None and away_m <= (asked.within or _NEAR_M)
+
+
+def _has_nearer(one: Catch) -> bool:
+    if one.nearest is None or one.begin_m is None:
+        return False
+    return one.begin_m > one.nearest[1] + _MARGIN_M
+
+
+def _mistake(one: Catch, number: int, asked: Catches, evidence: Evidence) -> Finding:
+    name = code(one.name)
+    if _is_far(one, asked):
+        away = f"{metres(one.distance_m)} away" if one.distance_m is not None else "not there"
+        seen = f"{name} was killed when {code(asked.turtle)} was {away}"
+        return mistaken("turtle_from_afar", seen, evidence)
+    if asked.order is Order.LISTED:
+        seen = f"{name} was killed before {code(asked.prey[number])}"
+        return mistaken("turtle_other_order", seen, evidence)
+    assert one.nearest is not None and one.begin_m is not None
+    other, away_m = one.nearest
+    before = f"{code(other)}, {metres(away_m)} away"
+    seen = f"{name}, {metres(one.begin_m)} away, was hunted before {before}"
+    return mistaken("turtle_other_order", seen, evidence)
+
+
+def _missing(hunt: Hunt, asked: Catches, evidence: Evidence) -> Finding:
+    """Why some were not caught."""
+    recording = hunt.recording
+    evidence = replace(evidence, moments=(*evidence.moments, until_the_end(recording)))
+    caught = {one.name for one in hunt.catches}
+    left = [name for name in asked.prey if name not in caught]
+    number = f"{len(caught)} of {counted(len(asked.prey), 'turtle')}"
+    absent = [name for name in left if name not in hunt.ways]
+    if absent:
+        seen = f"{number} killed; {codes(absent)} never there"
+        return mistaken("turtle_not_spawned", seen, evidence)
+    end_ns = recording.truth[-1].time_ns
+    seen = f"{number} killed; not {codes(left, 'or')}"
+    reached = [name for name in left if _is_near(hunt.distance_m(name, end_ns), asked)]
+    if reached:
+        near = f"{seen}, although {code(asked.turtle)} was at {code(reached[0])} at the end"
+        return mistaken("turtle_not_killed", near, evidence)
+    return astray(recording, seen, asked.turtle, evidence=evidence)

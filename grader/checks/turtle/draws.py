@@ -1,0 +1,79 @@
+"""The check of a drawn figure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pydantic import Field
+
+from grader.checks.check import Subject, check
+from grader.checks.turtle.turtle_check import TurtleParameters, astray
+from grader.diagnosis.explanation import mistaken
+from grader.findings.finding import Finding, evidence_at
+from grader.findings.words import code, counted, metres, percent, point
+from grader.measure.turtle.drawing import distances_m, sampled
+from grader.recording.model import Recording
+from grader.spec.quantity import PositiveLength
+from sim.coordinates import Point
+
+
+class Draws(TurtleParameters):
+    """Parameters of turtle.draws."""
+
+    figure: tuple[Point, ...] = Field(
+        min_length=2, description="Corners `[x, y]` of the figure, from the lower left corner."
+    )
+    closed: bool = Field(False, description="Whether the last corner is joined to the first.")
+    tolerance: PositiveLength = Field(
+        0.15, description="How far the line may be from the figure, and the figure from the line."
+    )
+    teleports: bool = Field(True, description="Whether a teleport may draw a part of it.")
+
+    def _asked(self) -> str:
+        what = "closed figure" if self.closed else "line"
+        corners = ", ".join(point(*one) for one in self.figure)
+        return f"draws the {what} {corners}, within {metres(self.tolerance)}"
+
+
+@check("turtle.draws", Subject.RECORDING, Draws)
+def draws(recording: Recording, parameters: Draws) -> Finding:
+    """A turtle draws the figure.
+
+    Judged by the lines on the canvas at the end, whatever their colour: each point of a line is
+    near the figure, and each point of the figure is near a line. A part of the figure, and nothing
+    beside it, gives its share of the points.
+    """
+    lines = parameters.lines(recording)
+    jump = next((line for line in lines if line.is_jump), None)
+    if jump is not None and not parameters.teleports:
+        seen = f"a teleport drew a line of {metres(jump.length_m)}"
+        shown = evidence_at(recording, "teleported", jump.times_ns[0])
+        service = code(f"/{parameters.turtle}/set_pen")
+        return mistaken("turtle_jumped", seen, shown, service=service)
+    corners = [*parameters.figure, *parameters.figure[: parameters.closed]]
+    wanted, paths = sampled(corners), [line.points for line in lines]
+    missing = [one for one in distances_m(wanted, paths) if one > parameters.tolerance]
+    share = 1.0 - len(missing) / len(wanted)
+    worst = max(
+        (
+            (off_m, place, line)
+            for line in lines
+            for places in [sampled(line.points)]
+            for off_m, place in zip(distances_m(places, [corners]), places, strict=True)
+        ),
+        key=lambda one: one[0],
+    )
+    off_m, place, line = worst
+    evidence = evidence_at(recording, f"the line with {point(*place)} begins", line.times_ns[0])
+    length_m = sum(one.length_m for one in lines)
+    seen = f"{metres(length_m)} in {counted(len(lines), 'line')}"
+    if not missing and off_m <= parameters.tolerance:
+        return Finding.as_asked(f"{seen}, at most {metres(off_m)} off", evidence)
+    if off_m > parameters.tolerance:
+        seen += f": at {point(*place)} it is {metres(off_m)} off the figure"
+        mistake = "turtle_off_figure"
+    else:
+        seen += f", which are {percent(round(share, 2))} of the figure"
+        mistake = "turtle_part_only"
+    found = astray(recording, seen, parameters.turtle, mistake, evidence)
+    return replace(found, credit=share if off_m <= parameters.tolerance else 0.0)

@@ -1,0 +1,1 @@
+"""Why a turtle did not do what was asked for."""

@@ -1,0 +1,160 @@
+"""Why a turtle went another way than was asked for, or none: one cause, the deepest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+from grader.diagnosis.explanation import explanation, mistaken
+from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.no_node import why_no_node
+from grader.diagnosis.process.process_exit import NotDone, process_ended
+from grader.findings.finding import Evidence, Finding, evidence_at
+from grader.findings.words import code, counted
+from grader.measure.motion.command import VelocityCommand, number
+from grader.recording.model import Recording
+from grader.recording.simulated import Truth
+from sim.motion import Twist
+
+_DEGREES_RAD_S = 25.0
+"""Four turns in a second: nobody means that."""
+_DEGREES_RAD = 6.5
+"""More than a full turn."""
+_TURNS = 2.0
+_SPOT_M = 0.1
+
+
+def why_no_turtles(recording: Recording) -> Finding | None:
+    """Why there is nothing to judge at all; None if there is."""
+    if recording.turtles:
+        return None
+    missing = why_no_node(recording)
+    if missing is not None:
+        return missing
+    if recording.matched_ns is None:
+        return why_silent(recording, "/turtle1/cmd_vel")
+    return Finding.ours("there are no turtles in this scenario: its `world` needs `turtles`")
+
+
+@dataclass(frozen=True)
+class TurtleAstray(NotDone):
+    """A turtle did not go where it should.
+
+    Attributes:
+        what: What was seen, in words.
+        turtle: Its name.
+        shown: What the check shows for it.
+    """
+
+    what: str
+    turtle: str
+    shown: Evidence
+
+    @property
+    def seen(self) -> str:
+        """The symptom in words."""
+        return self.what
+
+    @property
+    def topic(self) -> str:
+        """Of its commands."""
+        return f"/{self.turtle}/cmd_vel"
+
+    @cached_property
+    def way(self) -> tuple[Truth, ...]:
+        """Its truth."""
+        return tuple(one for one in self.recording.truth if one.robot == self.turtle)
+
+    @cached_property
+    def sent(self) -> tuple[VelocityCommand, ...]:
+        """Its commands."""
+        return tuple(_commands(self.recording, self.topic))
+
+    @cached_property
+    def jumps(self) -> tuple[float, ...]:
+        """Headings of its teleports."""
+        events = self.recording.turtles
+        return tuple(
+            one.yaw_rad for one in events if one.kind == "teleported" and one.turtle == self.turtle
+        )
+
+    def cause(self, name: str, words: str, time_ns: int | None = None, **values: object) -> Finding:
+        """What it did instead, and when."""
+        evidence = self.shown
+        if time_ns is not None:
+            at = evidence_at(self.recording, words, time_ns)
+            evidence = Evidence(moments=(*at.moments, *evidence.moments), plots=evidence.plots)
+        return mistaken(name, f"{self.what}; {words}", evidence, **values)
+
+
+def _commands(recording: Recording, topic: str) -> Iterator[VelocityCommand]:
+    for message in recording.on(topic):
+        linear = number(message.value, "linear", "x")
+        angular = number(message.value, "angular", "z")
+        if linear is not None and angular is not None:
+            yield VelocityCommand(message.stamp_ns, Twist(linear, angular))
+
+
+@explanation(TurtleAstray, after=(process_ended,))
+def never_commanded(symptom: TurtleAstray) -> Finding | None:
+    """Nothing was published on the topic of its commands, and it was not teleported."""
+    if symptom.sent or symptom.jumps:
+        return None
+    return why_silent(symptom.recording, symptom.topic).after(symptom.what)
+
+
+@explanation(TurtleAstray)
+def angle_in_degrees(symptom: TurtleAstray) -> Finding | None:
+    """An angle is given in degrees."""
+    fast = [one for one in symptom.sent if abs(one.twist.angular_rad_s) > _DEGREES_RAD_S]
+    if fast:
+        value = fast[0].twist.angular_rad_s
+        words = f"angular.z was {value:g} rad/s"
+        return symptom.cause("turtle_degrees", words, fast[0].time_ns, value=f"{value:g}")
+    far = [one for one in symptom.jumps if abs(one) > _DEGREES_RAD]
+    if far:
+        words = f"it was teleported to a heading of {far[0]:g} rad"
+        return symptom.cause("turtle_degrees", words, value=f"{far[0]:g}")
+    return None
+
+
+@explanation(TurtleAstray)
+def command_ran_out(symptom: TurtleAstray) -> Finding | None:
+    """A command was published once, and turtles stop after a second."""
+    outs = [
+        one
+        for one in symptom.recording.incidents
+        if one.kind == "command_timeout" and one.robot == symptom.turtle
+    ]
+    moving = [one for one in symptom.sent if one.twist != Twist(0.0, 0.0)]
+    if not outs or len(outs) < len(moving):
+        return None
+    times = counted(len(outs), "time")
+    words = f"it stopped by itself {times}, 1 s after a command on {code(symptom.topic)}"
+    return symptom.cause("turtle_ran_out", words, outs[0].time_ns)
+
+
+@explanation(TurtleAstray)
+def hit_the_wall(symptom: TurtleAstray) -> Finding | None:
+    """It ran into a wall."""
+    hit = next((step for step in symptom.way if step.contact), None)
+    if hit is None:
+        return None
+    return symptom.cause("turtle_wall", "it ran into a wall", hit.time_ns)
+
+
+@explanation(TurtleAstray)
+def turns_for_ever(symptom: TurtleAstray) -> Finding | None:
+    """It turns round and round on the spot: the difference of two headings is not wrapped."""
+    turned_rad, place = 0.0, symptom.way[:1]
+    for before, step in pairwise(symptom.way):
+        if math.dist((step.x_m, step.y_m), (place[0].x_m, place[0].y_m)) > _SPOT_M:
+            turned_rad, place = 0.0, (step,)
+        turned_rad += math.remainder(step.yaw_rad - before.yaw_rad, math.tau)
+        if abs(turned_rad) > _TURNS * math.tau:
+            words = f"it turned more than {_TURNS:g} times round on the spot"
+            return symptom.cause("turtle_spins", words, place[0].time_ns)
+    return None

@@ -1,0 +1,1 @@
+"""What turtles did and drew, read from their truth."""

@@ -1,0 +1,265 @@
+"""Turtles on ROS topics: a thin layer that only converts messages and keeps time.
+
+Like :mod:`sim.node` it needs no executor and does fixed steps: a command or a request acts from the
+first step that begins after the middleware had received it.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import rclpy
+from geometry_msgs.msg import Twist
+from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
+from rclpy.context import Context
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.validate_full_topic_name import validate_full_topic_name
+from std_srvs.srv import Empty
+from turtlesim.msg import Color
+from turtlesim.msg import Pose as PoseMessage
+from turtlesim.srv import Kill, SetPen, Spawn, TeleportAbsolute, TeleportRelative
+
+from sim.motion import NS, Pose
+from sim.pacing import Lateness, Pacer
+from sim.turtles.bounds import Colour
+from sim.turtles.polling import Inbox, Request
+from sim.turtles.rotating import RotationGoal, RotationServer
+from sim.turtles.simulation import State, Step, Turtles
+from sim.turtles.turtle import STEP_NS, Jump, Pen, Velocity
+
+NODE = "turtlesim"
+BACKGROUND: Colour = (69, 86, 255)
+_DEPTH = 7
+_LEAST_QUEUE = 100
+_LONGEST_NAME = 60
+
+
+class Sink(Protocol):
+    """Receiver of the truth, such as a recording; called from the loop, so it must be quick."""
+
+    def on_step(self, step: Step, stamp_ns: int) -> None:
+        """Called after each step."""
+
+    def on_late(self, lateness: Lateness) -> None:
+        """Called when steps are late, which are done right after this call."""
+
+    def on_answer(self, request: Request, response: Any) -> None:
+        """Called before a request to a service of the turtles is answered."""
+
+
+@dataclass
+class _Ends:
+    """The topics, services and the action of one turtle."""
+
+    pose: Any
+    colour: Any
+    taken: list[Any]
+    rotation: RotationServer
+
+
+class RosTurtles:
+    """Turtles that listen and publish; see :class:`sim.node.RosSimulator` for its loop."""
+
+    def __init__(
+        self,
+        node: Node,
+        turtles: Turtles,
+        sink: Sink | None = None,
+        steady_ns: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        """Offer everything in a node of the caller, see :func:`make_node`; nothing moves yet."""
+        self._node: Any = node
+        self._turtles, self._sink, self._steady_ns = turtles, sink, steady_ns
+        self._inbox = Inbox(node, self._tell)
+        self._inbox.serve_own()
+        self._inbox.serve(Spawn, "/spawn", self._spawn)
+        self._inbox.serve(Kill, "/kill", self._kill)
+        self._inbox.serve(Empty, "/clear", lambda request: self._do(request, turtles.clear))
+        self._inbox.serve(Empty, "/reset", lambda request: self._do(request, turtles.reset))
+        self._ends: dict[str, _Ends] = {}
+        self.goals: list[RotationGoal] = []
+        """Goals of the action rotate_absolute so far."""
+        self._pacer: Pacer | None = None
+        self._stamp_ns = 0
+        self._meet()
+
+    @property
+    def background(self) -> Colour:
+        """The colour below the lines."""
+        red, green, blue = (self._node.get_parameter(f"background_{one}").value for one in "rgb")
+        return red, green, blue
+
+    @property
+    def services(self) -> frozenset[str]:
+        """Names of what can be called."""
+        return self._inbox.services
+
+    def start(self) -> int:
+        """Let simulated time begin now."""
+        self._pacer = Pacer(self._steady_ns(), STEP_NS)
+        # Not the node's clock, for a student may set its parameter use_sim_time.
+        self._stamp_ns = time.time_ns()
+        return self._pacer.deadline_ns
+
+    def catch_up(self) -> int:
+        """Do every step that is over; returns when to call again, on the steady clock."""
+        if self._pacer is None:
+            return self.start()
+        pacer, now_ns = self._pacer, self._steady_ns()
+        due = pacer.due(now_ns)
+        if not due:
+            return pacer.deadline_ns
+        lateness = pacer.lateness(now_ns)
+        if lateness is not None and self._sink is not None:
+            self._sink.on_late(lateness)
+        self._inbox.take(self._stamp_ns, now_ns - pacer.begin_ns)
+        for _ in range(due):
+            self._inbox.act(self._turtles.time_ns)
+            self._meet()
+            step = self._turtles.advance()
+            pacer.done += 1
+            self._publish(step)
+        return pacer.plan(0)
+
+    def run(self, stop: threading.Event) -> None:
+        """Keep time until ``stop`` is set or the node's context is shut down."""
+        deadline_ns = self.start()
+        while not stop.is_set() and self._node.context.ok():
+            wait_s = (deadline_ns - self._steady_ns()) / NS
+            if wait_s > 0.0 and stop.wait(wait_s):
+                return
+            try:
+                deadline_ns = self.catch_up()
+            except RuntimeError:  # the base of rclpy's RCLError
+                if self._node.context.ok():
+                    raise
+                return  # the context was shut down within the step
+
+    def _publish(self, step: Step) -> None:
+        if self._sink is not None:
+            self._sink.on_step(step, self._stamp_ns + step.time_ns)
+        for name, state in step.turtles.items():
+            ends = self._ends[name]
+            ends.rotation.tell()
+            ends.pose.publish(_pose_message(state))
+            red, green, blue = state.colour
+            ends.colour.publish(Color(r=red, g=green, b=blue))
+
+    def _meet(self) -> None:
+        """Offer what belongs to each turtle that is there, and to no other."""
+        for name in self._ends.keys() - self._turtles.turtles.keys():
+            ends = self._ends.pop(name)
+            # Who waits for a result must hear that it was aborted.
+            ends.rotation.tell()
+            for made in (*ends.taken, *ends.rotation.services):
+                self._inbox.forget(made)
+            for publisher in (ends.pose, ends.colour, *ends.rotation.publishers):
+                self._node.destroy_publisher(publisher)
+        for name in self._turtles.turtles.keys() - self._ends.keys():
+            self._ends[name] = self._offer(name)
+
+    def _offer(self, name: str) -> _Ends:
+        node, inbox, turtles = self._node, self._inbox, self._turtles
+
+        def pen(asked: Any) -> None:
+            colour, width = (asked.r, asked.g, asked.b), asked.width or Pen().width
+            turtles.set_pen(name, Pen(colour, width, is_down=not asked.off))
+
+        def teleport(asked: Any) -> None:
+            turtles.teleport(name, Jump(Pose(asked.x, asked.y, asked.theta)))
+
+        def move(asked: Any) -> None:
+            turtles.teleport(name, Jump(Pose(0.0, 0.0, asked.angular), asked.linear))
+
+        def command(twist: Twist) -> None:
+            # turtlesim hears linear.y too, if its parameter holonomic is true.
+            left_m_s = twist.linear.y if node.get_parameter("holonomic").value else 0.0
+            turtles.command(name, Velocity(twist.linear.x, left_m_s, twist.angular.z))
+
+        def there(act: Callable[[Any], None]) -> Callable[[Any], None]:
+            return lambda message: act(message) if name in turtles.turtles else None
+
+        def serve(kind: Any, service: str, act: Callable[[Any], None]) -> Any:
+            def answer(request: Request) -> None:
+                self._do(request, lambda: there(act)(request.message))
+
+            return inbox.serve(kind, f"/{name}/{service}", answer)
+
+        taken = [
+            inbox.subscribe(Twist, f"/{name}/cmd_vel", _LEAST_QUEUE, there(command)),
+            serve(SetPen, "set_pen", pen),
+            serve(TeleportAbsolute, "teleport_absolute", teleport),
+            serve(TeleportRelative, "teleport_relative", move),
+        ]
+        rotation = RotationServer(
+            node, inbox, name, lambda theta: turtles.rotate(name, theta), self.goals
+        )
+        pose = node.create_publisher(PoseMessage, f"/{name}/pose", _DEPTH)
+        colour = node.create_publisher(Color, f"/{name}/color_sensor", _DEPTH)
+        return _Ends(pose, colour, taken, rotation)
+
+    def _tell(self, request: Request, response: Any) -> None:
+        if self._sink is not None:
+            self._sink.on_answer(request, response)
+
+    def _do(self, request: Request, act: Callable[[], None]) -> None:
+        act()
+        request.answer()
+
+    def _spawn(self, request: Request) -> None:
+        asked = request.message
+        name = ""
+        if not asked.name or _is_name(asked.name):
+            name = self._turtles.spawn(Pose(asked.x, asked.y, asked.theta), asked.name)
+        request.answer(Spawn.Response(name=name))
+
+    def _kill(self, request: Request) -> None:
+        self._turtles.kill(request.message.name)
+        request.answer()
+
+
+def make_node(context: Context) -> Node:
+    """The node turtlesim with its parameters; it takes no arguments, and writes no log."""
+    parameter: Any = Parameter  # rclpy is typed in parts only
+    node: Any = rclpy.create_node(
+        NODE,
+        context=context,
+        use_global_arguments=False,
+        enable_rosout=False,
+        parameter_overrides=[parameter("start_type_description_service", value=False)],
+    )
+    shades = [IntegerRange(from_value=0, to_value=255, step=1)]
+    for letter, word, value in zip("rgb", ("Red", "Green", "Blue"), BACKGROUND, strict=True):
+        text = f"{word} part of the background's colour"
+        described = ParameterDescriptor(description=text, integer_range=shades)
+        node.declare_parameter(f"background_{letter}", value, described)
+    text = "Whether turtles obey linear.y too"
+    node.declare_parameter("holonomic", False, ParameterDescriptor(description=text))
+    found: Node = node
+    return found
+
+
+def _is_name(name: str) -> bool:
+    """Whether a turtle can have it: it becomes a part of the names of topics."""
+    try:
+        validate_full_topic_name(f"/{name}")
+    except InvalidTopicNameException:
+        return False
+    return "/" not in name and len(name) <= _LONGEST_NAME
+
+
+def _pose_message(state: State) -> PoseMessage:
+    pose, velocity = state.pose, state.velocity
+    return PoseMessage(
+        x=pose.x_m,
+        y=pose.y_m,
+        theta=pose.yaw_rad,
+        linear_velocity=velocity.speed_m_s,
+        angular_velocity=velocity.turn_rad_s,
+    )
