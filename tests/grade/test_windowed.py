@@ -293,6 +293,8 @@ def test_all_that_happens_outside_of_a_window_is_cut_and_facts_stay() -> None:
     stays |= {"joins", "pauses", "unreadable", "nodes", "endpoints", "processes", "declarations"}
     stays |= {"services", "clients", "waits", "interventions", "breaches", "disturbance"}
     stays |= {"faults", "scenes", "values", "environment", "names"}
+    # Which turtles there are follows from what was before.
+    stays |= {"turtles"}
     moment = SimpleNamespace(
         time_ns=at(1), stamp_ns=at(1), requested_ns=at(1), sent_ns=at(1), asked_ns=at(1), text=""
     )
