@@ -1,4 +1,4 @@
-"""The YAML options of the simulator: ``robot``, ``lidar``, ``odometry`` and ``topics``.
+"""The YAML options of the simulator: ``robot``, ``lidar``, ``odometry``, ``camera``, ``topics``.
 
 Defaults are those of TurtleBot3 in Gazebo, or the text says why not:
 
@@ -13,6 +13,7 @@ Defaults are those of TurtleBot3 in Gazebo, or the text says why not:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from enum import Enum
 from pathlib import Path
@@ -31,6 +32,7 @@ from grader.spec.quantity import (
 )
 from grader.spec.source import Model, read_source
 from grader.spec.unit import Dimension
+from sim.camera_options import CameraOptions
 from sim.coordinates import Metres, PoseInPlane, PositiveMetres
 from sim.motion import ORIGIN, Pose
 from sim.sensor_options import (
@@ -263,8 +265,15 @@ class Topics(Model):
 
 # Heights above base_link in turtlebot3_description/urdf/turtlebot3_{burger,waffle}.urdf of
 # ROBOTIS-GIT/turtlebot3, where base_link is 1 cm above base_footprint.
-_BASE_Z_M = 0.010
+BASE_Z_M = 0.010
 _SCAN_Z_M = {"burger": 0.172, "waffle": 0.122}
+
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+_OPTICAL: Quaternion = (-0.5, 0.5, -0.5, 0.5)
+"""From x ahead, y left, z up to z ahead, x right, y down."""
 
 
 class SimulatorOptions(Model):
@@ -277,6 +286,7 @@ class SimulatorOptions(Model):
     joint_states: JointOptions | None = Field(None)
     battery: BatteryOptions | None = Field(None)
     ranges: tuple[RangeOptions, ...] = Field(())
+    camera: CameraOptions | None = Field(None)
     topics: Topics = Field(default_factory=Topics)
     _prefix: str = PrivateAttr("")
 
@@ -285,9 +295,18 @@ class SimulatorOptions(Model):
         """What /tf_static says: parent, child, pose and height of the child, in metres."""
         base, link = self.odometry.child_frame, f"{self._prefix}base_link"
         scan = (link, self.lidar.frame, self.lidar.pose, _SCAN_Z_M[self.robot.model])
-        found = [(base, link, ORIGIN, _BASE_Z_M)] if base != link else []
+        found = [(base, link, ORIGIN, BASE_Z_M)] if base != link else []
         own = (one for one in self.sensors if one.frame != link)
         return [*found, scan, *((link, one.frame, one.pose, one.height_m) for one in own)]
+
+    @property
+    def camera_frames(self) -> list[tuple[str, str, Vector, Quaternion]]:
+        """What /tf_static says of the camera: parent, child, position, quaternion (x, y, z, w)."""
+        if self.camera is None:
+            return []
+        down = (0.0, math.sin(0.5 * self.camera.pitch), 0.0, math.cos(0.5 * self.camera.pitch))
+        body = (f"{self._prefix}base_link", self.camera.link, self.camera.position, down)
+        return [body, (self.camera.link, self.camera.frame, (0.0, 0.0, 0.0), _OPTICAL)]
 
     @property
     def sensors(self) -> tuple[SensorOptions, ...]:
@@ -300,7 +319,8 @@ class SimulatorOptions(Model):
         """Parent and child of each transform that the robot publishes."""
         if not self.topics.tf.enabled:
             return set()
-        fixed = {(parent, child) for parent, child, _, _ in self.fixed_frames}
+        fixed = {(parent, child) for parent, child, *_ in self.fixed_frames}
+        fixed |= {(parent, child) for parent, child, *_ in self.camera_frames}
         return {(self.odometry.frame, self.odometry.child_frame), *fixed}
 
     def each(self, robots: Mapping[str, RobotOptions]) -> dict[str, SimulatorOptions]:
@@ -331,6 +351,7 @@ class SimulatorOptions(Model):
             joint_states=self.joint_states and self.joint_states.of(name),
             battery=self.battery and self.battery.of(name),
             ranges=tuple(one.of(name) for one in self.ranges),
+            camera=self.camera and self.camera.of(name),
             topics=self.topics.model_copy(update=topics),
         )
         found._prefix = f"{name}/"

@@ -124,7 +124,7 @@ class TransformPublisher:
         topic = options.topics.tf
         self._moving = TransformStamped(child_frame_id=options.odometry.child_frame)
         self._moving.header.frame_id = options.odometry.frame
-        self._fixed = options.fixed_frames
+        self._fixed, self._of_camera = options.fixed_frames, options.camera_frames
         self._type = tf
         self._message = tf(transforms=[self._moving])
         self.publisher = make_publisher(node, tf, topic.topic, topic)
@@ -139,6 +139,14 @@ class TransformPublisher:
             transform.header.frame_id = parent
             transform.transform.translation.z = z_m
             _set_transform(transform, pose, stamp_ns)
+            message.transforms.append(transform)
+        for parent, child, position, rotation in self._of_camera:
+            transform = TransformStamped(child_frame_id=child)
+            transform.header.frame_id = parent
+            set_time(transform.header.stamp, stamp_ns)
+            moved, turned = transform.transform.translation, transform.transform.rotation
+            moved.x, moved.y, moved.z = position
+            turned.x, turned.y, turned.z, turned.w = rotation
             message.transforms.append(transform)
         self.static_publisher.publish(message)
 

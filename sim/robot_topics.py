@@ -10,6 +10,7 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 
+from sim.camera_publisher import CameraPublisher
 from sim.motion import Twist
 from sim.publishers import (
     OdometryPublisher,
@@ -49,6 +50,8 @@ class RobotTopics:
         self.odometry = OdometryPublisher(node, topics.odometry, options.odometry)
         self.scan = ScanPublisher(node, topics.scan, simulation.lidar)
         self.sensors = {one: SensorPublisher(node, one) for one in simulation.sensors}
+        camera = simulation.camera
+        self.camera = CameraPublisher(node, camera) if camera is not None else None
         tf = transform_type() if topics.tf.enabled else None
         self._transforms = tf and TransformPublisher(node, options, tf)
         package, _, name = topics.command.type.split("/")
@@ -76,6 +79,7 @@ class RobotTopics:
             scans=self._is_heard(self.scan),
             odometry=self._transforms is not None or self._is_heard(self.odometry),
             others=[one for one, publisher in self.sensors.items() if self._is_heard(publisher)],
+            pictures=self.camera is not None and self.camera.is_heard,
         )
 
     def _is_heard(self, sensor: OdometryPublisher | ScanPublisher | SensorPublisher) -> bool:
@@ -127,6 +131,8 @@ class RobotTopics:
             self.scan.publish(step.scan, stamp_ns)
         for sensor, reading in step.readings:
             self.sensors[sensor].publish(reading, stamp_ns)
+        if step.is_pictured and self.camera is not None:
+            self.camera.publish(step.pose, step.time_ns, stamp_ns)
 
     @property
     def unheard(self) -> tuple[str, ...]:

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import attrgetter
 
+from sim.colour import Rgb
 from sim.motion import Pose, wrap_angle
 
 Capsule = tuple[float, float, float, float, float]
@@ -23,6 +24,14 @@ MAX_SPEED_M_S = 5.0
 
 
 ROBOTS = "robots"
+HEIGHT_M = 0.5
+"""How high things are for a camera, unless the YAML says so: higher than any robot."""
+PAINT: Rgb = (150, 150, 150)
+"""Their colour, unless the YAML says so."""
+ROBOT_HEIGHT_M = 0.19
+"""How high the other robots are for a camera: about a Burger."""
+ROBOT_PAINT: Rgb = (70, 70, 70)
+
 _WORDS = {
     "bounds": "the wall around the world",
     "segments": "a wall",
@@ -48,12 +57,16 @@ class Shape:
         line: Its line in the file, or None for a shape that was not read from one.
         corners: Corners of the area that it fills, in order; empty for a wall without an
             inside and for a circle.
+        height_m: As a camera sees it; for a robot and a LiDAR everything is high enough.
+        colour: As a camera sees it.
     """
 
     label: str
     capsules: tuple[Capsule, ...]
     line: int | None = None
     corners: tuple[tuple[float, float], ...] = ()
+    height_m: float = HEIGHT_M
+    colour: Rgb = PAINT
 
     def clearance_m(self, x_m: float, y_m: float) -> float:
         """Distance from a point to the shape, negative inside it."""
@@ -110,7 +123,17 @@ class Body:
     @property
     def shape(self) -> Shape:
         """Where it is now."""
-        return circle(f"{ROBOTS}[{self.name}]", self.pose.x_m, self.pose.y_m, self.radius_m)
+        shape = circle(f"{ROBOTS}[{self.name}]", self.pose.x_m, self.pose.y_m, self.radius_m)
+        return replace(shape, height_m=ROBOT_HEIGHT_M, colour=ROBOT_PAINT)
+
+
+@dataclass(frozen=True, slots=True)
+class FloorLine:
+    """A line on the floor: only cameras see it."""
+
+    points: tuple[tuple[float, float], ...]
+    width_m: float
+    colour: Rgb
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +155,8 @@ class MovingObstacle:
         radius_m: Of a circle, or None.
         size_m: Length and width of a box, or None.
         disappears_ns: It is gone from this time on, or None.
+        height_m: As a camera sees it.
+        colour: As a camera sees it.
     """
 
     label: str
@@ -142,6 +167,8 @@ class MovingObstacle:
     disappears_ns: int | None = None
     repeat: bool = False
     line: int | None = None
+    height_m: float = HEIGHT_M
+    colour: Rgb = PAINT
 
     @property
     def reach_m(self) -> float:
@@ -178,8 +205,10 @@ class MovingObstacle:
     def shape_at(self, pose: Pose) -> Shape:
         """Its outline when it is at a pose."""
         if self.radius_m is not None:
-            return circle(self.label, pose.x_m, pose.y_m, self.radius_m, self.line)
-        return box(self.label, pose, self.size_m or (0.0, 0.0), self.line)
+            shape = circle(self.label, pose.x_m, pose.y_m, self.radius_m, self.line)
+        else:
+            shape = box(self.label, pose, self.size_m or (0.0, 0.0), self.line)
+        return replace(shape, height_m=self.height_m, colour=self.colour)
 
 
 def point_clearance_m(x_m: float, y_m: float, capsule: Capsule) -> float:

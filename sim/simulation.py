@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from sim.camera import Camera
 from sim.contact import ContactFinder
 from sim.description import LidarOptions, OdometryOptions, SimulatorOptions
 from sim.lidar import Lidar, Scan
@@ -61,6 +62,8 @@ class Step:
         command: What was asked for, before any limit; zero after a rejected command.
         contact: What the robot touches, such as ``boxes[2]``, or None.
         readings: Of the other sensors, those that are due.
+        is_pictured: Whether a picture of the camera is due. Who wants it takes it, for most
+            pictures are seen by nobody: taking one changes nothing.
     """
 
     index: int
@@ -73,6 +76,7 @@ class Step:
     scan: Scan | None = None
     odometry: OdometrySample | None = None
     readings: tuple[tuple[Sensor, Any], ...] = ()
+    is_pictured: bool = False
 
 
 class Schedule:
@@ -117,12 +121,13 @@ class Simulation:
 
         Args:
             body: Its footprint, by which others know where it is.
-            seed: Of the noise of the LiDAR and the drift of odometry, which are drawn
-                independently of each other.
+            seed: Of the noise of the LiDAR, the drift of odometry and the noise of the camera,
+                which are drawn independently of each other.
         """
         self.world, self.options = world, options
         self.model = robot_model(options.robot)
         self.lidar = Lidar(world, options.lidar)
+        self.camera = Camera(world, options.camera, seed) if options.camera else None
         self.body = body
         lidar_seed, odometry_seed, *seeds = np.random.SeedSequence(seed).spawn(
             3 + len(options.ranges)
@@ -139,6 +144,7 @@ class Simulation:
         self._samples = Schedule(options.odometry) if options.odometry.enabled else None
         sensors = sensors_of(world, options, self.model.wheel_separation_m, seeds)
         self.sensors = {sensor: Schedule(sensor.options) for sensor in sensors}
+        self._pictures = Schedule(options.camera) if options.camera else None
         self._drives = deque(sorted(options.robot.drives, key=lambda drive: drive.at))
         self._pushes = deque(sorted(options.robot.pushes, key=lambda push: push.after))
         self._pushed: tuple[int, Twist] = (0, REST)
@@ -161,10 +167,15 @@ class Simulation:
         return self._index * STEP_NS
 
     def next_output_ns(
-        self, *, scans: bool = True, odometry: bool = True, others: Iterable[Sensor] = ()
+        self,
+        *,
+        scans: bool = True,
+        odometry: bool = True,
+        pictures: bool = True,
+        others: Iterable[Sensor] = (),
     ) -> int | None:
         """Simulated time of the next step that brings data of these sensors, or None for never."""
-        wanted = [scans and self._scans, odometry and self._samples]
+        wanted = [scans and self._scans, odometry and self._samples, pictures and self._pictures]
         wanted += [self.sensors[one] for one in others]
         return min((one.next_ns for one in wanted if one), default=None)
 
@@ -202,6 +213,7 @@ class Simulation:
         for sensor in self.sensors:
             sensor.take_part(self._motion, STEP_S)
         due = tuple(one for one, schedule in self.sensors.items() if schedule.is_due(time_ns))
+        is_pictured = self._pictures is not None and self._pictures.is_due(time_ns)
         return Step(
             self._index,
             time_ns,
@@ -213,6 +225,7 @@ class Simulation:
             scan,
             sample,
             tuple((one, one.read(self.pose, time_ns)) for one in due),
+            is_pictured,
         )
 
     def _obey(self, command: Twist | None, events: list[Event]) -> None:

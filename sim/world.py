@@ -19,12 +19,15 @@ The frame is fixed, x and y in metres, yaw counter-clockwise (REP-103). A world 
           - {at: 0 s, pose: [1, -1]}
           - {at: 4 s, pose: [1, 1]}
         appears: 2 s
+    lines:                                     # on the floor, for cameras
+      - {points: [[0, 0], [1, 0], [1, 1]], width: 5 cm, colour: black}
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,8 +35,9 @@ from grader.errors import AssignmentError, Problem
 from grader.spec.document import Place
 from grader.spec.nearest_name import did_you_mean
 from grader.spec.source import Source, in_order, parse_source, read_source
+from sim.colour import Rgb
 from sim.motion import ORIGIN, Pose
-from sim.shapes import Body, MovingObstacle, Shape, polygon, wall
+from sim.shapes import Body, FloorLine, MovingObstacle, Shape, polygon, wall
 from sim.turtles.bounds import SIZE_M
 from sim.world_model import WorldModel
 
@@ -53,6 +57,10 @@ class World:
             Its four walls are among the shapes.
         bodies: Other robots in it.
         turtles: Names and poses of the turtles that are there instead of a robot.
+        lines: On the floor, for cameras.
+        floor: Its colour.
+        light: Brightness of everything for cameras.
+        text: The file, with the values in place of every ``$name``: what reads as the same world.
     """
 
     shapes: tuple[Shape, ...] = ()
@@ -62,6 +70,10 @@ class World:
     file: Path = Path("world.yaml")
     bodies: tuple[Body, ...] = ()
     turtles: tuple[tuple[str, Pose], ...] = ()
+    lines: tuple[FloorLine, ...] = ()
+    floor: Rgb = (205, 205, 205)
+    light: float = 1.0
+    text: str = field(default="{}", compare=False, repr=False)
 
     def extent(self, *points: tuple[float, float]) -> tuple[float, float, float, float]:
         """The smallest upright rectangle around everything, as x_min, y_min, x_max, y_max."""
@@ -134,8 +146,18 @@ def world_of(source: Source, values: Values) -> World:
         item.obstacle(f"moving[{i}]", source.line(("moving", i)))
         for i, item in enumerate(model.moving)
     )
-    turtles = tuple((one.name, one.pose) for one in model.turtles)
-    return World(shapes, moving, model.bounds, model.start, source.file, turtles=turtles)
+    return World(
+        shapes,
+        moving,
+        model.bounds,
+        model.start,
+        source.file,
+        turtles=tuple((one.name, one.pose) for one in model.turtles),
+        lines=tuple(item.line for item in model.lines),
+        floor=model.floor,
+        light=model.light,
+        text=json.dumps(source.data),
+    )
 
 
 def turtle_names(source: Source) -> tuple[str, ...]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
+from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from grader.spec.quantity import Angle, DurationOrZero
+from grader.spec.quantity import Angle, DurationOrZero, Ratio
 from grader.spec.source import Model
+from sim.colour import Colour
 from sim.coordinates import (
     MIN_SIZE_M,
     Ends,
@@ -20,19 +23,43 @@ from sim.coordinates import (
     Size,
 )
 from sim.motion import NS, ORIGIN, Pose, relative
-from sim.shapes import MAX_SPEED_M_S, MovingObstacle, Shape, Waypoint, box, circle, polygon
+from sim.shapes import (
+    HEIGHT_M,
+    MAX_SPEED_M_S,
+    PAINT,
+    FloorLine,
+    MovingObstacle,
+    Shape,
+    Waypoint,
+    box,
+    circle,
+    polygon,
+)
 from sim.turtles.bounds import CENTRE_M
 
 TURTLE_NAME = r"[A-Za-z][A-Za-z0-9_]*"
 
 
-class CornerModel(Model):
+class Upright(Model):
+    """Something that stands on the floor, as a camera sees it."""
+
+    height: PositiveMetres = Field(
+        HEIGHT_M, description="For cameras: a robot and its LiDAR never pass above it."
+    )
+    colour: Colour = Field(PAINT, description="For cameras.")
+
+    def painted(self, shape: Shape) -> Shape:
+        """A shape with this height and colour."""
+        return replace(shape, height_m=self.height, colour=self.colour)
+
+
+class CornerModel(Upright):
     """The outline of a moving box."""
 
     size: Size = Field(description="Length (along x at yaw 0) and width.")
 
 
-class RoundModel(Model):
+class RoundModel(Upright):
     """The outline of a moving pillar."""
 
     radius: PositiveMetres = Field(description="Its radius.")
@@ -46,7 +73,7 @@ class BoxModel(CornerModel):
 
     def shape(self, label: str, line: int | None) -> Shape:
         """What the simulation computes with."""
-        return box(label, Pose(*self.centre, self.yaw), self.size, line)
+        return self.painted(box(label, Pose(*self.centre, self.yaw), self.size, line))
 
 
 class CircleModel(RoundModel):
@@ -56,10 +83,10 @@ class CircleModel(RoundModel):
 
     def shape(self, label: str, line: int | None) -> Shape:
         """What the simulation computes with."""
-        return circle(label, *self.centre, self.radius, line)
+        return self.painted(circle(label, *self.centre, self.radius, line))
 
 
-class PolygonModel(Model):
+class PolygonModel(Upright):
     """A filled polygon."""
 
     points: tuple[Point, ...] = Field(
@@ -75,7 +102,20 @@ class PolygonModel(Model):
 
     def shape(self, label: str, line: int | None) -> Shape:
         """What the simulation computes with."""
-        return polygon(label, self.points, line)
+        return self.painted(polygon(label, self.points, line))
+
+
+class LineModel(Model):
+    """A line on the floor, which only cameras see."""
+
+    points: tuple[Point, ...] = Field(min_length=2, description="Its points in order.")
+    width: PositiveMetres = Field(0.05, description="How wide it is.")
+    colour: Colour = Field((0, 0, 0), description="Its colour.")
+
+    @property
+    def line(self) -> FloorLine:
+        """What a camera sees."""
+        return FloorLine(self.points, self.width, self.colour)
 
 
 class WaypointModel(Model):
@@ -119,6 +159,8 @@ class MovingModel(Model):
 
     def obstacle(self, label: str, line: int | None = None) -> MovingObstacle:
         """What the simulation computes with."""
+        outline = self.circle or self.box
+        assert outline is not None
         return MovingObstacle(
             label=label,
             path=tuple(Waypoint(_ns(point.at), point.pose) for point in self.path),
@@ -128,6 +170,8 @@ class MovingModel(Model):
             disappears_ns=None if self.disappears is None else _ns(self.disappears),
             repeat=self.repeat,
             line=line,
+            height_m=outline.height,
+            colour=outline.colour,
         )
 
 
@@ -164,6 +208,15 @@ class WorldModel(Model):
         (),
         description="Turtles in place of a robot and all other keys but `values`: the canvas of "
         "turtlesim, with its services `/spawn`, `/kill`, `/clear` and `/reset`.",
+    )
+    lines: tuple[LineModel, ...] = Field(
+        (), description="Lines on the floor; a later one lies on those before it."
+    )
+    floor: Colour = Field((205, 205, 205), description="Colour of the floor.")
+    light: Annotated[Ratio, Field(ge=0.1, le=2.0)] = Field(
+        1.0,
+        description="How bright cameras see everything, from 10 % to 200 %: at 100 % colours are "
+        "as they are written.",
     )
 
 

@@ -66,8 +66,9 @@
         [left, right] = [Math.min(left, x - radius - 0.1), Math.max(right, x + radius + 0.1)];
         [bottom, top] = [Math.min(bottom, y - radius - 0.1), Math.max(top, y + radius + 0.1)];
       }
+      const thin = (this.data.lines || []).flatMap((points) => points.slice(1).map((point, i) => [...points[i], ...point]));
       const far = { left: left - 0.35, right: right + 0.35, bottom: bottom - 0.35, top: top + 0.35 };
-      for (const [x1, y1, x2, y2] of this.data.walls.map((wall) => wall.map((value) => value / 1000))) {
+      for (const [x1, y1, x2, y2] of [...this.data.walls, ...thin].map((wall) => wall.map((value) => value / 1000))) {
         if (Math.max(x1, x2) < far.left || Math.min(x1, x2) > far.right) continue;
         if (Math.max(y1, y2) < far.bottom || Math.min(y1, y2) > far.top) continue;
         for (const [x, y] of [[x1, y1], [x2, y2]]) {
@@ -158,6 +159,9 @@
     }
     walls(world, run, role) {
       if (!this.differs(run, "walls")) return;
+      for (const points of run.data.lines || []) {
+        make(world, "path", { d: `M${points.map(([x, y]) => `${x / 1000} ${y / 1000}`).join("L")}`, class: `floor-line ${role}` });
+      }
       for (const wall of run.data.walls) {
         const [x1, y1, x2, y2, radius] = wall.map((value) => value / 1000);
         make(world, "line", radius
@@ -195,6 +199,25 @@
         if (place) this.movers[i].setAttribute("transform", `translate(${place[0] / 1000} ${place[1] / 1000}) rotate(${place[2] * 0.18 / Math.PI})`);
       });
       this.svg.setAttribute("aria-label", `Robot at x ${now.x.toFixed(2)} m, y ${now.y.toFixed(2)} m, heading ${Math.round(now.yaw * 180 / Math.PI)}°`);
+    }
+  }
+
+  // What the camera of the student's robot saw: pictures that lie below each other in one.
+  class Film {
+    constructor(parent, film, begin) {
+      [this.film, this.begin, this.time] = [film, begin, begin];
+      const figure = make(parent, "figure");
+      this.canvas = make(figure, "canvas", { class: "film", role: "img", width: film.width, height: film.height });
+      make(figure, "figcaption", { class: "soft hint" }, "What its camera sees, without its noise.");
+      const bytes = Uint8Array.from(atob(film.png), (letter) => letter.charCodeAt(0));
+      createImageBitmap(new Blob([bytes], { type: "image/png" })).then((strip) => { this.strip = strip; this.show(this.time); });
+    }
+    show(time) {
+      this.time = time;
+      const { count, every, width, height } = this.film;
+      const number = clamp(Math.floor((time - this.begin) / every + 1e-6), 0, count - 1);
+      this.canvas.setAttribute("aria-label", `Picture ${number + 1} of ${count} of the camera`);
+      if (this.strip) this.canvas.getContext("2d").drawImage(this.strip, 0, number * height, width, height, 0, 0, width, height);
     }
   }
 
@@ -252,6 +275,7 @@
       const left = make(sides, "div", { class: "side" });
       this.plan = new Plan(left, this.runs, box);
       this.legend(left);
+      this.film = data.film && new Film(left, data.film, this.begin);
       const charts = make(sides, "div", { class: "side" });
       const [linear, angular] = student.data.limits.map((value) => value / 1000);
       const chart = (...args) => new Chart(charts, ...args, this.runs, this.shifts, this.begin, this.end);
@@ -312,6 +336,7 @@
       this.output.textContent = `${this.time.toFixed(1)} s`;
       this.plan.show(this.time, Object.fromEntries(Object.keys(this.runs).map((key) => [key, this.time + this.shifts[key]])));
       for (const chart of this.charts) chart.show(this.time);
+      if (this.film) this.film.show(this.time);
       const { student } = this.runs;
       const now = student.at(this.time);
       const away = student.goals.map((goal) =>

@@ -34,7 +34,8 @@ def _unknown_topics(loaded: LoadedAssignment) -> Iterator[str]:
         kept_free = getattr(bound.parameters, "topics", ()) if stated else ()
         for scenario in loaded.scenarios_of(bound):
             exchanged = {one.exchanged[0] for one in scenario.stimuli if one.exchanged}
-            known = {*scenario.recorded_types, *exchanged, *published(scenario.turtles)}
+            known = {*scenario.recorded_types, *scenario.camera_topics, *exchanged}
+            known |= {*published(scenario.turtles)}
             suspects = [name for name in named if isinstance(name, str)]
             suspects += [name for name in kept_free if did_you_mean(name, known)]
             for topic in suspects:

@@ -33,6 +33,7 @@ from grader.spec.name import (
 from grader.spec.quantity import Duration, DurationOrZero, PositiveLength, Ratio
 from grader.spec.source import Model
 from grader.spec.unit import parse_any
+from sim.camera_options import CameraOptions
 from sim.description import LidarOptions, OdometryOptions, RobotOptions, SimulatorOptions, Topics
 from sim.sensor_options import BatteryOptions, ImuOptions, JointOptions, RangeOptions
 from sim.turtles.interfaces import commands
@@ -321,6 +322,9 @@ class Scenario(Model):
     ranges: tuple[RangeOptions, ...] = Field(
         (), description="Its distance sensors, such as sonars."
     )
+    camera: CameraOptions | None = Field(
+        None, description="Its camera. By default it has none; `camera: {}` is one."
+    )
     topics: Topics = Field(default_factory=Topics, description="Its topics with their QoS.")
     random: dict[Id, RandomRange] = Field(
         default_factory=dict,
@@ -367,6 +371,12 @@ class Scenario(Model):
         tf = self.topics.tf
         named = self.simulated and "tf" in self.topics.model_fields_set and tf.enabled
         return {tf.topic: tf.durability, tf.static_topic: "transient_local"} if named else {}
+
+    @property
+    def camera_topics(self) -> set[str]:
+        """The topics of the robots' cameras; only what `record` names is recorded of them."""
+        cameras = (robot.camera for robot in self.simulated.values())
+        return {topic for camera in cameras if camera is not None for topic in camera.topics}
 
     @property
     def simulator(self) -> SimulatorOptions:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from grader.errors import UsageError
 from grader.spec.nearest_name import did_you_mean
-from grader.spec.unit import parse_any
+from grader.spec.unit import parse_any, shown_in
 
 if TYPE_CHECKING:
     from grader.assignment.model import Scenario
@@ -33,7 +33,10 @@ def world_values(scenario: Scenario, values: dict[str, float]) -> dict[str, str]
     """The values as a world file wants them: with their unit."""
     units = {name: bounds.unit for name, bounds in scenario.random.items()}
     units |= {name: fixed.unit for name, fixed in scenario.values.items()}
-    return {name: f"{value!r} {units[name]}".strip() for name, value in values.items()}
+    return {
+        name: f"{shown_in(value, units[name])!r} {units[name]}".strip()
+        for name, value in values.items()
+    }
 
 
 def fill_in(value: Any, values: dict[str, float]) -> Any:

@@ -34,7 +34,7 @@ from grader.recording import model as recording
 from grader.recording.mcap_writer import FACTS
 from grader.report.concepts import concepts
 from grader.spec.unit import UNITS, Dimension, format_duration
-from sim import description, sensor_options, world_model
+from sim import camera_options, description, sensor_options, world_model
 from sim.motion import Pose
 
 _MADE = "<!-- Made by `python -m grader.dev.docs` from the code: change it there. -->"
@@ -85,6 +85,8 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "ranges": sensor_options.RangeOptions,
         "odometry: drift": description.DriftOptions,
         "odometry: covariance": description.CovarianceOptions,
+        "camera": camera_options.CameraOptions,
+        "camera: objects": camera_options.ObjectsOptions,
         "topics": description.Topics,
         "topics: command": description.CommandTopic,
         "topics: odometry": description.OdometryTopic,
@@ -104,6 +106,7 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "boxes": world_model.BoxModel,
         "circles": world_model.CircleModel,
         "polygons": world_model.PolygonModel,
+        "lines": world_model.LineModel,
         "moving": world_model.MovingModel,
         "moving: circle": world_model.RoundModel,
         "moving: box": world_model.CornerModel,

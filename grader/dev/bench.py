@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -15,11 +16,12 @@ import sys
 import tempfile
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 from grader.assignment.load import load_assignment
 from grader.assignment.mutant import reference_of
@@ -47,6 +49,18 @@ CLASSES = {"timed_publisher": 100, "bot_controller": 40, "p_controller": 40}
 CELLS = {"at rest": ("bot_controller", "blocked"), "driving": ("bot_controller", "open")}
 """What the robot does -> assignment and scenario in which the reference does it."""
 ASSIGNMENT = "timed_publisher"
+PICTURES = {
+    "raw": ("Image", "/camera/image_raw"),
+    "compressed": ("CompressedImage", "/camera/image_raw/compressed"),
+}
+"""What somebody listens to -> its type and topic."""
+_LISTENER = """
+import sys, rclpy, sensor_msgs.msg as types
+rclpy.init()
+node = rclpy.create_node("listener")
+node.create_subscription(getattr(types, sys.argv[1]), sys.argv[2], lambda message: None, 10)
+rclpy.spin(node)
+"""
 REGRADED = 50
 OUTPUT = Path("rosgrade-bench.json")
 _FEW = 3
@@ -191,21 +205,58 @@ def _cell(samples: Samples, folder: Path, _: int) -> None:
 
 def _simulator(samples: Samples, folder: Path, _: int) -> None:
     """What share of a core the simulator takes in real time, with a robot among 100 walls."""
-    world, options = folder / "walls.yaml", folder / "options.yaml"
     walls = [[x, y, x + 0.5, y + 0.3] for x in range(10) for y in range(10)]
-    world.write_text(json.dumps({"start": [-1, -1, 0], "segments": walls}))
-    options.write_text("robot: {drives: [{at: 0 s, linear: 0.2 m/s, angular: 0.4 rad/s}]}")
-    simulate = [sys.executable, "-m", "grader", "sim", str(world), "--options", str(options)]
     for _ in range(_FEW):
-        with lock_domain() as domain:
-            domain_id = ["--domain-id", str(domain.domain_id)]
-            short_s, long_s = (
-                _timed([*simulate, "--duration", seconds, *domain_id], dict(os.environ))[1]
-                for seconds in ("1", "11")
-            )
         samples["simulator: share of a core at real time, 100 segments"].append(
-            (long_s - short_s) / 10
+            _simulated(folder, {"start": [-1, -1, 0], "segments": walls}, {})
         )
+
+
+def _camera(samples: Samples, folder: Path, _: int) -> None:
+    """What share of a core the simulator takes with a camera, and how much of it is the camera."""
+    box = {"size": [0.3, 0.2], "colour": "red", "height": 0.2}
+    around = [[2 * math.cos(angle), 2 * math.sin(angle)] for angle in range(6)]
+    world = {
+        "bounds": [-4, -4, 4, 4],
+        "boxes": [{"centre": centre, **box} for centre in around],
+        "lines": [{"points": around, "colour": "black"}],
+    }
+    camera = {"lidar": {"enabled": False}, "camera": {"noise": "1 %"}}
+    for _ in range(_FEW):
+        unheard = _simulated(folder, world, camera)
+        for what, topic in PICTURES.items():
+            heard = _simulated(folder, world, camera, ("-c", _LISTENER, *topic))
+            samples[f"camera of 320 x 240 at 10 Hz, {what}: share of a core"].append(
+                heard - unheard
+            )
+
+
+def _simulated(
+    folder: Path, world: Any, options: dict[str, Any], beside: Sequence[str] = ()
+) -> float:
+    """The share of a core that the simulator takes in real time, with a robot that drives.
+
+    Args:
+        beside: A Python program that runs beside it, whose time does not count.
+    """
+    drives = [{"at": "0 s", "linear": "0.2 m/s", "angular": "0.4 rad/s"}]
+    files = folder / "world.yaml", folder / "options.yaml"
+    for file, content in zip(files, (world, {"robot": {"drives": drives}, **options}), strict=True):
+        file.write_text(json.dumps(content))
+    simulate = [sys.executable, "-m", "grader", "sim", str(files[0]), "--options", str(files[1])]
+    with lock_domain() as domain:
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain.domain_id)}
+        other = subprocess.Popen([sys.executable, *(beside or ("-c", ""))], env=environment)
+        try:
+            # Both have met after the shorter time.
+            short_s, long_s = (
+                _timed([*simulate, "--duration", seconds], environment)[1]
+                for seconds in ("3", "13")
+            )
+        finally:
+            other.kill()
+            other.wait()
+    return (long_s - short_s) / 10
 
 
 MEASUREMENTS: dict[str, Callable[[Samples, Path, int], None]] = {
@@ -213,6 +264,7 @@ MEASUREMENTS: dict[str, Callable[[Samples, Path, int], None]] = {
     "batch": _batch,
     "cell": _cell,
     "simulator": _simulator,
+    "camera": _camera,
 }
 
 

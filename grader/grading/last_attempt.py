@@ -15,7 +15,7 @@ EARLIER = "earlier"
 _FILE = "replays.json"
 # Of the world the new run has everything.
 _EMPTY: Replay = {
-    **{"walls": [], "moving": [], "touches": [], "log": [], "goals": []},
+    **{"walls": [], "lines": [], "moving": [], "touches": [], "log": [], "goals": []},
     **{"lidar": [0, 0, 0], "scans": None},
 }
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from grader.recording.model import Recording
 from sim.motion import Pose
-from sim.shapes import ROBOTS, MovingObstacle, Waypoint
+from sim.shapes import ROBOT_HEIGHT_M, ROBOT_PAINT, ROBOTS, MovingObstacle, Waypoint
 
 _STRIDE = 5
 """Steps of 10 ms from one kept place of another robot to the next; it drives straight between."""
@@ -41,4 +41,6 @@ def _obstacle(recording: Recording, name: str) -> MovingObstacle:
         Waypoint(step.time_ns - scene.began_ns, Pose(step.x_m, step.y_m, step.yaw_rad))
         for step in (*steps[::_STRIDE], *steps[-1:])
     )
-    return MovingObstacle(f"{ROBOTS}[{name}]", path, scene.radius_m)
+    return MovingObstacle(
+        f"{ROBOTS}[{name}]", path, scene.radius_m, height_m=ROBOT_HEIGHT_M, colour=ROBOT_PAINT
+    )

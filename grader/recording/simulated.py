@@ -89,6 +89,21 @@ class TurtleEvent:
 
 
 @dataclass(frozen=True)
+class Filmed:
+    """What pictures of the robot's camera are made of, beside its path: they are not recorded.
+
+    Attributes:
+        world: The world file, in JSON, with all values in it.
+        options: The camera's options, in JSON.
+        seed: Of the noise.
+    """
+
+    world: str
+    options: str
+    seed: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class Scene:
     """World and robot of a run, for drawing and judging.
 
@@ -106,6 +121,8 @@ class Scene:
         scan_topic: Topic of its scans.
         acceleration_m_s2: Limit of the robot, speeding up or braking.
         sensor_topics: Topics of its other sensors.
+        lines: Points of each line on the floor, in the order of the world file.
+        filmed: What pictures of its camera are made of, or None without a camera.
     """
 
     radius_m: float
@@ -120,6 +137,8 @@ class Scene:
     scan_topic: str = "/scan"
     acceleration_m_s2: float = 1.0
     sensor_topics: tuple[str, ...] = ()
+    lines: tuple[tuple[tuple[float, float], ...], ...] = ()
+    filmed: Filmed | None = None
 
     @property
     def published(self) -> tuple[str, ...]:

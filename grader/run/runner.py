@@ -190,6 +190,8 @@ def _topics(scenario: Scenario) -> tuple[Topic, ...]:
                 type = scenario.recorded_types[name]
                 qos = (options.reliability, options.durability, 100)
                 found[name] = Topic(name, type, *qos, ours=True)
+    for name in scenario.camera_topics & found.keys():
+        found[name] = replace(found[name], ours=True)
     for name, durability in scenario.transform_topics.items():
         qos = (scenario.topics.tf.reliability, durability, 100)
         found.setdefault(name, Topic(name, scenario.recorded_types[name], *qos, ours=True))

@@ -113,6 +113,11 @@ def parse_any(text: str | int | float) -> tuple[float, str]:
     raise ValueError(f"unknown unit {match[2]!r} in {text!r}")
 
 
+def shown_in(value: float, unit: str) -> float:
+    """A value in SI units as it is written before the unit that :func:`parse_any` gave."""
+    return round(value * 100.0, 9) if unit in UNITS[Dimension.RATIO] else value
+
+
 def _factor(unit: str, dimension: Dimension) -> float:
     units = UNITS[dimension]
     if unit in units:

@@ -12,6 +12,7 @@ from grader.assignment.model import Scenario
 from grader.assignment.random_values import draw_values, fill_in, world_values
 from grader.errors import AssignmentError, UsageError
 from grader.report.drawing.path import targets
+from sim.world import parse_world
 
 YAML = """\
 rosgrade: 1
@@ -211,6 +212,28 @@ def test_fixed_values_are_the_same_numbers_in_every_run() -> None:
     assert first == second == {"turn": math.pi / 2, "wall": 0.6, "legs": 3}
     assert world_values(scenario, first)["wall"] == "0.6 m"
     assert repr(fill_in("$legs", first)) == "3"
+
+
+def test_a_share_in_percent_reaches_the_world_as_it_is() -> None:
+    scenario = a_scenario(values={"dim": "40 %"}, random={"light": ["120 %", "130 %"]})
+    values = draw_values(scenario, 1)
+    assert world_values(scenario, values)["dim"] == "40.0 %"
+    drawn = world_values(scenario, values)["light"]
+    assert 120.0 <= float(drawn.removesuffix(" %")) <= 130.0
+    world = "values: {light: 100 %}\nlight: $light"
+    assert parse_world(world, values={"light": drawn}).light == pytest.approx(values["light"])
+
+
+def test_a_camera_needs_a_world_and_is_recorded_only_where_a_scenario_names_it(
+    tmp_path: Path,
+) -> None:
+    yaml = YAML.replace("    timeout", "    camera: {topic: /eye}\n    timeout")
+    [scenario] = load_assignment(lesson(tmp_path, yaml)).assignment.scenarios
+    assert scenario.camera_topics == {"/eye", "/eye/compressed", "/camera/camera_info"}
+    assert not scenario.camera_topics & scenario.recorded_types.keys()
+    (tmp_path / "other").mkdir()
+    told = refused(tmp_path / "other", yaml.replace("    world: world.yaml\n", ""))
+    assert "scenarios[0].camera: a simulated robot needs a 'world', which is missing" in told
 
 
 FIXED = YAML.replace("random: {x: [1 m, 2 m]}", "values: {x: 1.5 m}")

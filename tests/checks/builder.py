@@ -31,7 +31,7 @@ from grader.recording.model import (
     Qos,
     Recording,
 )
-from grader.recording.simulated import Incident, Scene, Truth
+from grader.recording.simulated import Filmed, Incident, Scene, Truth
 from grader.recording.submission import (
     BuildRecord,
     Dependency,
@@ -536,7 +536,7 @@ def simulated(truth: Sequence[Truth], scene: Scene, **changes: Any) -> Recording
 
 def scene_of(simulation: Simulation) -> Scene:
     """World and robot as a cell records them."""
-    model = simulation.model
+    model, camera = simulation.model, simulation.camera
     return Scene(
         radius_m=model.radius_m,
         max_linear_m_s=model.limits.speed_m_s,
@@ -546,6 +546,10 @@ def scene_of(simulation: Simulation) -> Scene:
         began_ns=at(BEGAN_S),
         lidar=simulation.lidar.options.pose,
         acceleration_m_s2=model.limits.acceleration_m_s2,
+        lines=tuple(line.points for line in simulation.world.lines),
+        filmed=Filmed(simulation.world.text, camera.options.model_dump_json(), camera.seed)
+        if camera is not None
+        else None,
     )
 
 

@@ -12,7 +12,7 @@ from pydantic import TypeAdapter
 from grader.errors import AssignmentError
 from grader.spec.source import parse_source
 from sim.coordinates import RollPitchYaw
-from sim.description import Layout, NoReturn, SimulatorOptions
+from sim.description import Layout, NoReturn, RobotOptions, SimulatorOptions
 from sim.motion import Pose
 
 FILE = Path("options.yaml")
@@ -129,3 +129,30 @@ def test_roll_pitch_and_yaw_are_written_as_they_are_read() -> None:
     angles = TypeAdapter(RollPitchYaw)
     read = angles.validate_python([0, "90 deg", "0.5 rad"])
     assert angles.validate_json(angles.dump_json(read)) == read
+
+
+def test_a_camera_has_a_body_and_an_optical_frame_and_each_robot_its_own() -> None:
+    options = SimulatorOptions.model_validate(
+        {"camera": {"pitch": "60 deg", "position": [0.1, 0, "20 cm"], "objects": {}}}
+    )
+    [body, optical] = options.camera_frames
+    assert body[:3] == ("base_link", "camera_link", (0.1, 0.0, 0.2))
+    assert body[3] == pytest.approx((0.0, 0.5, 0.0, 0.75**0.5))
+    assert optical == (
+        *("camera_link", "camera_rgb_optical_frame"),
+        *((0.0, 0.0, 0.0), (-0.5, 0.5, -0.5, 0.5)),
+    )
+    assert ("base_link", "camera_link") in options.transforms
+    assert SimulatorOptions().camera_frames == []
+    own = options.each({"tb1": RobotOptions(), "tb2": RobotOptions()})["tb2"]
+    assert own.camera is not None
+    assert own.camera.topics == (
+        "/tb2/camera/image_raw",
+        "/tb2/camera/image_raw/compressed",
+        "/tb2/camera/camera_info",
+        "/tb2/camera/objects",
+    )
+    assert [frames[:2] for frames in own.camera_frames] == [
+        ("tb2/base_link", "tb2/camera_link"),
+        ("tb2/camera_link", "tb2/camera_rgb_optical_frame"),
+    ]

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
@@ -22,13 +23,24 @@ from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import BatteryState, Imu, JointState, LaserScan, Range
+from sensor_msgs.msg import (
+    BatteryState,
+    CameraInfo,
+    CompressedImage,
+    Image,
+    Imu,
+    JointState,
+    LaserScan,
+    Range,
+)
+from visualization_msgs.msg import MarkerArray
 
 from grader.run.cell.domain import lock_domain
 from sim.description import SimulatorOptions
 from sim.motion import NS, Pose, Twist
 from sim.node import RosSimulator, make_node
 from sim.pacing import MAX_AHEAD, Lateness
+from sim.png import png
 from sim.simulation import STEP_NS, EventKind, Step, make_simulation
 from sim.world import parse_world
 
@@ -40,6 +52,7 @@ pytestmark = [
 
 LIMIT_S = 20.0
 ROOM = parse_world("bounds: [-1, -2, 3, 4]")
+PICTURE = np.arange(24 * 32 * 3, dtype=np.uint8).reshape(24, 32, 3)
 
 
 class Truth:
@@ -421,3 +434,64 @@ def test_the_other_sensors_of_a_turtlebot_arrive_with_their_units(bench: Bench) 
     assert math.isnan(battery.current)
     assert (sonar.radiation_type, sonar.max_range) == (Range.INFRARED, 4.0)
     assert 2.0 < sonar.range < 3.1
+
+
+def test_a_camera_makes_pictures_only_while_somebody_subscribes(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulator = bench.simulator(
+        lidar={"enabled": False}, camera={"width": 32, "height": 24, "encoding": "bgr8"}
+    )
+    camera = simulator.robots[""].camera
+    assert camera is not None
+    made = []
+    monkeypatch.setattr(camera._camera, "picture", lambda *at: made.append(at) or PICTURE)
+    simulator.start()
+    bench.step(simulator, 20)
+    assert made == []
+    images = bench.listen(Image, "/camera/image_raw")
+    infos = bench.listen(CameraInfo, "/camera/camera_info")
+    counts = camera.image.get_subscription_count, camera.info.get_subscription_count
+    bench.wait(lambda: all(count() == 1 for count in counts), "match")
+    bench.step(simulator, 20)
+    bench.wait(lambda: len(images) == len(infos) == 2, "pictures")
+    assert [time_ns for _, time_ns in made] == [300_000_000, 400_000_000]
+    image, info = images[-1], infos[-1]
+    assert (image.height, image.width, image.step, image.encoding) == (24, 32, 96, "bgr8")
+    assert bytes(image.data) == PICTURE[..., ::-1].tobytes()
+    assert image.header == info.header
+    assert image.header.frame_id == "camera_rgb_optical_frame"
+    focal = 16 / math.tan(1.02974 / 2)
+    assert list(info.k) == pytest.approx([focal, 0, 15.5, 0, focal, 11.5, 0, 0, 1])
+    assert list(info.p) == pytest.approx([focal, 0, 15.5, 0, 0, focal, 11.5, 0, 0, 0, 1, 0])
+    assert (info.distortion_model, list(info.d)) == ("plumb_bob", [0.0] * 5)
+
+
+def test_compressed_pictures_and_the_logical_camera(bench: Bench) -> None:
+    box = "boxes: [{centre: [1, 0], size: [0.2, 0.1], colour: red, yaw: 20 deg}]"
+    options = {"camera": {"objects": {}, "pitch": "10 deg"}}
+    simulation = make_simulation(parse_world(box), SimulatorOptions.model_validate(options))
+    simulator = RosSimulator(bench.node, {"": simulation}, None, lambda: bench.now_ns)
+    pictures = bench.listen(CompressedImage, "/camera/image_raw/compressed")
+    told = bench.listen(MarkerArray, "/camera/objects")
+    camera = simulator.robots[""].camera
+    assert camera is not None
+    counts = camera.compressed.get_subscription_count, camera.objects.get_subscription_count
+    bench.wait(lambda: all(count() == 1 for count in counts), "match")
+    simulator.start()
+    bench.step(simulator, 10)
+    bench.wait(lambda: bool(pictures and told), "pictures")
+    assert pictures[0].format == "rgb8; png compressed bgr8"
+    assert simulation.camera is not None
+    assert bytes(pictures[0].data) == png(simulation.camera.picture(simulation.pose, 10 * STEP_NS))
+    [marker] = told[0].markers
+    assert (marker.ns, marker.id, marker.type) == ("box", 0, marker.CUBE)
+    assert marker.header.frame_id == "camera_link"
+    assert (marker.color.r, marker.color.g) == (1.0, 0.0)
+    # The camera looks 10 degrees down, so that the box is turned up from it.
+    place, q = marker.pose.position, marker.pose.orientation
+    ahead = (2 * (q.w * q.y + q.x * q.z), 2 * (q.y * q.z - q.w * q.x), 1 - 2 * (q.x**2 + q.y**2))
+    assert ahead == pytest.approx((-math.sin(math.radians(10)), 0.0, math.cos(math.radians(10))))
+    assert math.hypot(place.x, place.y, place.z) == pytest.approx(
+        math.dist((1.0, 0.0, 0.25), (0.069, -0.047, 0.117))
+    )

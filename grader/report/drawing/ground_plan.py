@@ -78,8 +78,8 @@ def _near(scene: Scene, box: tuple[float, float, float, float]) -> Iterable[Poin
 
 
 def world(scene: Scene, view: View) -> list[Markup]:
-    """Draw the grid and what stands still, in metres."""
-    drawn = [_grid(view)]
+    """Draw the grid, the lines on the floor, and what stands still, in metres."""
+    drawn = [_grid(view), *(track(points, "floor-line") for points in scene.lines)]
     for capsules in scene.outlines.values():
         thin = [(c[:4]) for c in capsules if c[4] == 0.0]
         if thin:

@@ -22,6 +22,7 @@ from grader.report.drawing.ground_plan import places
 from grader.report.drawing.path import targets
 from grader.report.model.excerpt import printed
 from grader.spec.safe_text import one_line
+from grader.spec.unit import shown_in
 from sim.shapes import ROBOTS
 
 Replay = Mapping[str, Any]
@@ -64,6 +65,7 @@ def make_replay(recording: Recording, scenario: Scenario) -> Replay | None:
         "radius": _milli(scene.radius_m),
         "limits": _millis(scene.max_linear_m_s, scene.max_angular_rad_s),
         "walls": [_millis(*one) for capsules in scene.outlines.values() for one in capsules],
+        "lines": [[_millis(*point) for point in points] for points in scene.lines],
         "moving": _moving(scene, (truth[-1].time_ns - scene.began_ns) / NS),
         "x": _differences(step.x_m for step in samples),
         "y": _differences(step.y_m for step in samples),
@@ -80,8 +82,9 @@ def make_replay(recording: Recording, scenario: Scenario) -> Replay | None:
             for entry in printed(recording)[:MOST_LINES]
         ],
         "values": [
-            f"{name} = {value:.3g} {scenario.random[name].unit}".strip()
+            f"{name} = {shown_in(value, unit):.3g} {unit}".strip()
             for name, value in given.items()
+            for unit in (scenario.random[name].unit,)
         ],
         "given": {name: round(value, 6) for name, value in given.items()},
     }

@@ -25,6 +25,7 @@ from grader.report.drawing.plot import draw_plot
 from grader.report.drawing.svg import Figure
 from grader.report.drawing.timeline import draw_timeline
 from grader.report.drawing.turtles import draw_turtles, figures
+from grader.report.html.film import make_film
 from grader.report.html.page import render_page
 from grader.report.html.replay import Replay, embedded, make_replay, with_goals
 from grader.report.html.source_code import ShownSource
@@ -208,12 +209,11 @@ def _replays(
         name, own = section.scenario.id, make_replay(section.recording, section.scenario)
         if own is not None:
             all_ = {"student": own, "reference": references.get(name), "before": before.get(name)}
-            found[name] = embedded(
-                {
-                    role: with_goals(replay, grade.assignment, name) if replay else None
-                    for role, replay in all_.items()
-                }
-            )
+            roles = {
+                role: with_goals(replay, grade.assignment, name) if replay else None
+                for role, replay in all_.items()
+            }
+            found[name] = embedded({**roles, "film": make_film(section.recording)})
     return found
 
 

@@ -15,7 +15,7 @@ from rclpy.node import Node
 
 from grader.assignment.simulation import read_scenario_world
 from grader.recording.model import NS
-from grader.recording.simulated import Incident, Scene, Truth
+from grader.recording.simulated import Filmed, Incident, Scene, Truth
 from grader.run.order import SimulatorOrder
 from sim.description import RobotOptions, SimulatorOptions
 from sim.motion import Pose, Twist
@@ -75,6 +75,7 @@ class SimulatedRobot:
     def scene(self, world: World) -> Scene:
         """World and robot."""
         robot, options = self._simulation.model, self._simulation.options
+        camera = self._simulation.camera
         return Scene(
             radius_m=robot.radius_m,
             max_linear_m_s=robot.limits.speed_m_s,
@@ -87,7 +88,14 @@ class SimulatedRobot:
             odometry_topic=options.topics.odometry.topic,
             scan_topic=options.topics.scan.topic,
             acceleration_m_s2=robot.limits.acceleration_m_s2,
-            sensor_topics=tuple(sensor.topic for sensor in options.sensors),
+            sensor_topics=(
+                *(sensor.topic for sensor in options.sensors),
+                *(camera.options.topics if camera is not None else ()),
+            ),
+            lines=tuple(line.points for line in world.lines),
+            filmed=Filmed(world.text, camera.options.model_dump_json(), camera.seed)
+            if camera is not None
+            else None,
         )
 
     def keep(self, step: Step, stamp_ns: int) -> None:
