@@ -64,7 +64,7 @@
       let [bottom, top] = [Math.min(...this.y) - reach, Math.max(...this.y) + reach];
       for (const { x, y, radius } of this.goals) {
         [left, right] = [Math.min(left, x - radius - 0.1), Math.max(right, x + radius + 0.1)];
-        [bottom, top] = [Math.min(bottom, y - radius - 0.1), Math.max(top, y + radius + 0.1)];
+        [bottom, top] = [Math.min(bottom, y - radius - 0.1), Math.max(top, y + radius + 0.25)];
       }
       const thin = (this.data.lines || []).flatMap((points) => points.slice(1).map((point, i) => [...points[i], ...point]));
       const far = { left: left - 0.35, right: right + 0.35, bottom: bottom - 0.35, top: top + 0.35 };
