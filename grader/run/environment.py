@@ -30,6 +30,8 @@ _OWN_NETWORK = {
 }
 _OF_THE_CALLER = ("XDG_RUNTIME_DIR", "USER")
 _INSIDE = {"HOME": "/tmp", "TMPDIR": "/tmp"}
+COMPANION_IN_CELL = {**_INSIDE, "ROS_LOG_DIR": "/tmp/.ros/log"}
+"""Of a program of the author's in the sandbox of a cell."""
 
 
 def cell_environment(ros: RosInstallation, *, sandboxed: bool = False) -> dict[str, str]:
