@@ -32,7 +32,7 @@ from grader.run.cell.prefork_server import (
     PreforkServer,
 )
 from grader.run.compiled_tracer import compiled_tracer, has_compiled_programs
-from grader.run.environment import RMW, student_environment
+from grader.run.environment import RMW, companion_environment, student_environment
 from grader.run.imposing.mistake import Mistake, with_mistakes
 from grader.run.order import (
     AuthorSimulatorOrder,
@@ -469,7 +469,7 @@ class Runner:
             commands=commands,
             companions=companions,
             student_environment=student_environment(ros, (install,), scratch, tracer),
-            companion_environment=student_environment(ros, (), scratch),
+            companion_environment=companion_environment(ros, scratch),
             compiled_tracer=str(tracer) if tracer else None,
             prefixes=tuple(map(str, (*type_support, install, *ros.underlays, *ros.prefixes))),
             topics=_topics(scenario),

@@ -98,9 +98,7 @@ def sandboxed(
         student_environment=sandboxed_environment(order.student_environment, places),
         # They run in the cell itself, where no program of the student's reaches them.
         companion_environment={
-            **sandboxed_environment(
-                order.companion_environment, {**in_cell, str(TRACER): str(TRACER_IN_SANDBOX)}
-            ),
+            **sandboxed_environment(order.companion_environment, in_cell),
             **COMPANION_IN_CELL,
         },
         prefixes=_moved(order.prefixes, in_cell),

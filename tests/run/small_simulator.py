@@ -5,6 +5,7 @@ Tests install it as a program of a package of its own.
 
 import math
 import sys
+import time
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, Twist
@@ -32,11 +33,17 @@ class SmallSimulator(Node):
         self.pose = self.create_publisher(PoseStamped, "model/pose", 10)
         self.clock = self.create_publisher(Clock, "/clock", 10)
         self.bumper = self.create_publisher(Bool, "bumper", 10)
-        self.create_timer(STEP_S, self.step)
+        self.began_s = time.monotonic()
+        self.create_timer(STEP_S, self.catch_up)
 
     def obey(self, command: Twist) -> None:
         """Keep the newest command."""
         self.command = command
+
+    def catch_up(self) -> None:
+        """All steps that are due: a busy machine slows no time down."""
+        while self.steps * STEP_S < time.monotonic() - self.began_s:
+            self.step()
 
     def step(self) -> None:
         """One step, and what is told of it."""

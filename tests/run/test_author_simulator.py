@@ -5,6 +5,7 @@ It is an ordinary node of a package of its own, see small_simulator.py.
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +86,8 @@ def simulate(run_node: RunNode, tmp_path: Path) -> RunNode:
         source: str = driver(), program: str | None = None, more: Any = (), **own: Any
     ) -> Recording:
         if program is not None:
-            (course / "lib/course_sim/small_simulator").write_text(program, encoding="utf-8")
+            file = course / "lib/course_sim/small_simulator"
+            file.write_text(f"#!{sys.executable}\n{program}", encoding="utf-8")
         return run_node(
             source,
             underlays=(*more, course),
