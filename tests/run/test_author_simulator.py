@@ -17,10 +17,13 @@ from grader.machine import ros
 from grader.machine.resources import cache_folder
 from grader.recording.model import Ending, Owner, Recording
 from grader.report.model.result import remarks
+from grader.run.runner import Runner
+from grader.sandbox.sandbox import Sandbox
+from grader.sandbox.trial import try_sandbox
 from grader.submission.underlay.definition import find_underlay
 from grader.submission.underlay.store import UnderlayStore
 from tests.checks.builder import judge
-from tests.run.conftest import RunNode, install
+from tests.run.conftest import RunNode, install, runs_of
 
 pytestmark = pytest.mark.ros
 
@@ -60,6 +63,20 @@ FORGER = {
     "more": 'self.liar = self.create_publisher(PoseStamped, "model/pose", 10)',
     "also": "lie = PoseStamped(); lie.pose.position.x = 7.0; self.liar.publish(lie)",
 }
+SPY = DRIVER.replace(
+    "rclpy.init()",
+    """
+import os
+from pathlib import Path
+roots = os.environ["AMENT_PREFIX_PATH"].split(":")
+found = [str(path) for root in roots for path in Path(root).glob("lib/course_sim/*")]
+for file in Path("/proc").glob("[0-9]*/cmdline"):
+    if b"small_simulator" in file.read_bytes():
+        found.append(str(file))
+print("found:", found)
+rclpy.init()
+""",
+).format(lasts=2.0, more="pass", also="pass")
 GIVEN: dict[str, Any] = {
     "package": "course_sim",
     "executable": "small_simulator",
@@ -80,6 +97,10 @@ def driver(lasts: float = 2.0, more: str = "pass", also: str = "pass") -> str:
 @pytest.fixture
 def simulate(run_node: RunNode, tmp_path: Path) -> RunNode:
     """Run a student's node beside the small simulator."""
+    return beside_simulator(run_node, tmp_path)
+
+
+def beside_simulator(run_node: RunNode, tmp_path: Path) -> RunNode:
     course = install(tmp_path / "course", SIMULATOR, "course_sim/small_simulator")
 
     def run(
@@ -168,6 +189,18 @@ def test_a_simulator_that_never_gets_ready_is_an_error(
     run = simulate(**own, within="1 s")
     assert run.ending is Ending.FAULT and not run.processes
     assert lacks in run.faults[0]
+
+
+def test_in_a_sandbox_the_student_sees_nothing_of_the_simulator(tmp_path: Path) -> None:
+    found = try_sandbox()
+    if found.problem:
+        pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
+    with Runner(ros.find(), sandbox=Sandbox(tmp_path / "cache")) as runner:
+        run = beside_simulator(runs_of(runner, tmp_path), tmp_path)(SPY)
+    assert run.ending is Ending.UNTIL and not run.faults
+    assert judge("motion.drives", run, speed="0.2 m/s").status is Status.PASSED
+    (said,) = {line.text for line in run.log if line.text.startswith("found: ")}
+    assert said == "found: []"
 
 
 def test_a_simulator_that_dies_at_once_says_why(simulate: RunNode) -> None:
