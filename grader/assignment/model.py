@@ -227,6 +227,10 @@ class AuthorSimulator(Launch, TrueMotion):
     It is started before the student's programs, as companions are.
     """
 
+    package: PackageName = Field(
+        description="Its package: in `packages/` beside assignment.yaml, in an underlay or of ROS."
+    )
+
     @property
     def options(self) -> SimulatorOptions:
         """Its robot's topics, in the words of rosgrade's own simulator."""
