@@ -104,7 +104,11 @@ def beside_simulator(run_node: RunNode, tmp_path: Path) -> RunNode:
     course = install(tmp_path / "course", SIMULATOR, "course_sim/small_simulator")
 
     def run(
-        source: str = driver(), program: str | None = None, more: Any = (), **own: Any
+        source: str = driver(),
+        program: str | None = None,
+        more: Any = (),
+        elapsed: str = "4 s",
+        **own: Any,
     ) -> Recording:
         if program is not None:
             file = course / "lib/course_sim/small_simulator"
@@ -114,7 +118,7 @@ def beside_simulator(run_node: RunNode, tmp_path: Path) -> RunNode:
             underlays=(*more, course),
             simulator={**GIVEN, **own},
             launch=[{"executable": "bot_pub", "parameters": {"use_sim_time": True}}],
-            until={"elapsed": "4 s"},
+            until={"elapsed": elapsed},
             timeout="15 s",
         )
 
@@ -166,7 +170,7 @@ def test_a_forged_truth_does_not_count_and_is_said(simulate: RunNode) -> None:
 def test_a_simulator_that_fails_in_a_run_is_no_fault_of_the_student_s(
     simulate: RunNode, parameters: dict[str, float], fault: str
 ) -> None:
-    run = simulate(driver(), parameters=parameters, within="20 s")
+    run = simulate(driver(), parameters=parameters, elapsed="12 s")
     assert run.ending is Ending.FAULT
     assert fault in run.faults[0]
 
@@ -186,9 +190,14 @@ def test_a_simulator_that_fails_in_a_run_is_no_fault_of_the_student_s(
 def test_a_simulator_that_never_gets_ready_is_an_error(
     simulate: RunNode, own: dict[str, Any], lacks: str
 ) -> None:
-    run = simulate(**own, within="1 s")
+    run = simulate(**own, within="4 s")
     assert run.ending is Ending.FAULT and not run.processes
     assert lacks in run.faults[0]
+
+
+def test_a_simulator_that_is_silent_at_the_end_is_an_error_as_well(simulate: RunNode) -> None:
+    run = simulate(driver(), parameters={"silent_after": 4.0}, elapsed="5 s")
+    assert "has published nothing on /model/pose for" in run.faults[0]
 
 
 def test_in_a_sandbox_the_student_sees_nothing_of_the_simulator(tmp_path: Path) -> None:

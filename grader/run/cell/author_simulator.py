@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from grader.assignment.true_motion import TruthTopic
 
 _FACTOR_WINDOW_S = 3.0
-_SILENT_S = 3.0
+_SILENT_S, _SILENT_AT_END_S = 3.0, 1.0
 _MOVED_M, _MOVED_RAD = 1e-3, 1e-2
 FORGED = "forged_truth"
 
@@ -156,12 +156,13 @@ class AuthorSimulator:
 
     def faults(self) -> Iterator[str]:
         """What went wrong with it while the student's programs ran, one sentence each."""
-        if self._stop_ns or not self._began_ns:
+        if not self._began_ns:
             return
-        now_ns = time.time_ns()
+        now_ns = self._stop_ns or time.time_ns()
         silent_s = (now_ns - max(self._robot.seen[-1].time_ns, self._began_ns)) / NS
-        if silent_s > _SILENT_S:
-            limit = format_duration(_SILENT_S)
+        limit_s = _SILENT_AT_END_S if self._stop_ns else _SILENT_S
+        if silent_s > limit_s:
+            limit = format_duration(limit_s)
             topic = self._options.truth.topic
             yield f"the simulator {self.name} has published nothing on {topic} for {limit}"
         factor = self._factor.now(now_ns)

@@ -86,9 +86,8 @@ class Companions:
         if self._simulator is not None and not found:
             self._simulator.look()
             found += self._simulator.faults()
-        limit_s = self._order.limits.discovery_s
-        if self._simulator is not None:
-            limit_s = max(limit_s, self._simulator.within_s)
+        simulator = self._simulator
+        limit_s = self._order.limits.discovery_s if simulator is None else simulator.within_s
         if self._started is not None and self._started.elapsed_s > limit_s and not found:
             why = self._lacking() or "new nodes come all the time"
             names = ", ".join(one.name for one in self._order.companions)
