@@ -167,6 +167,11 @@ def _no_simulator(
         yield ("simulator", "package"), text + did_you_mean(own.package, shares)
     if own.after:
         yield ("simulator", "after"), _STARTED_FIRST
+    for number, launch in enumerate(scenario.launch):
+        for index, argument in enumerate(launch.arguments):
+            if own.package in FIND_SHARE.findall(argument):
+                text = "students do not see the simulator's files: put it into another package"
+                yield ("launch", number, "arguments", index), text
     if scenario.world is not None:
         text = (
             "a scenario is simulated once: give either a 'world' of rosgrade, or a 'simulator' of "

@@ -480,7 +480,7 @@ class Runner:
             submission=to_json(submission).decode(),
             simulator=_simulator(scenario, request.worlds, values, seed),
             author_simulator=_author_simulator(scenario, request.worlds, values),
-            hidden=frozenset(str(one.package) for one in own) - PACKAGES,
+            hidden=frozenset({scenario.simulator.package} if scenario.simulator else ()) - PACKAGES,
             values=values,
             environment={
                 "assignment": assignment.id,

@@ -425,7 +425,7 @@ def test_checks_of_contact_and_of_distance_need_to_know_both(
     ("own", "told"),
     [
         (SIMULATOR, ".simulator.package: there is no package 'course_sim', not in packages/"),
-        (SIMULATOR.replace("package: course_sim", "name: sim"), "leave out name"),
+        (SIMULATOR.replace("package: course_sim", "name: sim"), "'package' is missing"),
         (SIMULATOR + "      after: 1 s\n", ".simulator.after: what is yours is started before"),
         (SIMULATOR + "    world: w.yaml\n", ".simulator: a scenario is simulated once"),
         (SIMULATOR + "    robot: {radius: 1 cm}\n", "is not that of your 'simulator'"),
@@ -435,6 +435,10 @@ def test_checks_of_contact_and_of_distance_need_to_know_both(
             "'frame' goes with the type tf2_msgs/msg/TFMessage",
         ),
         (OF_ROS + "      map: none.yaml\n", ".simulator.map: "),
+        (
+            OF_ROS + "    bag: {}\n",
+            ".simulator: ",
+        ),
     ],
 )
 def test_a_simulator_that_does_not_fit_is_told(

@@ -5,18 +5,36 @@ It is an ordinary node of a package of its own, see small_simulator.py.
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseStamped,
+    PoseWithCovariance,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Vector3,
+)
+from nav_msgs.msg import Odometry
+from std_msgs.msg import Header
 
+from grader.assignment.true_motion import TruthTopic
 from grader.errors import GraderFault
 from grader.findings.finding import Status
 from grader.machine import ros
 from grader.machine.resources import cache_folder
 from grader.recording.model import Ending, Owner, Recording
 from grader.report.model.result import remarks
+from grader.run.cell.author_simulator import sighting_of
+from grader.run.cell.signed_messages import Signed
 from grader.run.runner import Runner
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
@@ -198,6 +216,51 @@ def test_a_simulator_that_never_gets_ready_is_an_error(
 def test_a_simulator_that_is_silent_at_the_end_is_an_error_as_well(simulate: RunNode) -> None:
     run = simulate(driver(), parameters={"silent_after": 4.0}, elapsed="5 s")
     assert "has published nothing on /model/pose for" in run.faults[0]
+
+
+STAMP = Time(sec=3, nanosec=5)
+TURN = Quaternion(z=math.sin(0.5), w=math.cos(0.5))
+POSE = Pose(position=Point(x=1.0, y=2.0), orientation=TURN)
+TRANSFORM = TransformStamped(
+    header=Header(stamp=STAMP),
+    child_frame_id="robot",
+    transform=Transform(translation=Vector3(x=1.0, y=2.0), rotation=TURN),
+)
+STAMPED_NS = 3 * 10**9 + 5
+
+
+@pytest.mark.parametrize(
+    ("message", "type", "frame", "stamp_ns"),
+    [
+        (POSE, "geometry_msgs/msg/Pose", None, 77),
+        (
+            PoseStamped(header=Header(stamp=STAMP), pose=POSE),
+            "geometry_msgs/msg/PoseStamped",
+            None,
+            STAMPED_NS,
+        ),
+        (
+            Odometry(header=Header(stamp=STAMP), pose=PoseWithCovariance(pose=POSE)),
+            "nav_msgs/msg/Odometry",
+            None,
+            STAMPED_NS,
+        ),
+        (
+            SimpleNamespace(transforms=[TransformStamped(child_frame_id="box"), TRANSFORM]),
+            "tf2_msgs/msg/TFMessage",
+            "robot",
+            STAMPED_NS,
+        ),
+    ],
+)
+def test_each_type_of_truth_says_where_the_robot_is(
+    message: Any, type: Any, frame: str | None, stamp_ns: int
+) -> None:
+    found = sighting_of(Signed(77, b"", message), TruthTopic(topic="/t", type=type, frame=frame))
+    assert found is not None
+    assert (found.time_ns, found.stamp_ns) == (77, stamp_ns)
+    pose = found.pose
+    assert (pose.x_m, pose.y_m, pose.yaw_rad) == pytest.approx((1.0, 2.0, 1.0))
 
 
 def test_in_a_sandbox_the_student_sees_nothing_of_the_simulator(tmp_path: Path) -> None:

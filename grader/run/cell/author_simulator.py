@@ -215,7 +215,7 @@ class AuthorSimulator:
         elif topic == self._options.contact:
             self._robot.touch(one.time_ns, one.value.data)
         elif topic == self._options.truth.topic:
-            found = _sighting(one, self._options.truth)
+            found = sighting_of(one, self._options.truth)
             if found is None:
                 return False
             self._robot.keep(found)
@@ -243,7 +243,7 @@ class AuthorSimulator:
                     yield one.received_ns, twist
 
 
-def _sighting(one: Signed, truth: TruthTopic) -> Sighting | None:
+def sighting_of(one: Signed, truth: TruthTopic) -> Sighting | None:
     """The pose in a message, or None where it has none of the robot."""
     value, stamp = one.value, None
     if truth.frame is not None:
