@@ -12,6 +12,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+
+pytest.importorskip("rclpy")
+
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import (
     Point,

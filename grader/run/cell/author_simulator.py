@@ -205,6 +205,7 @@ class AuthorSimulator:
                 odometry_topic=options.odometry.topic if options.odometry else "",
                 scan_topic=options.scan.topic if options.scan else "",
                 acceleration_m_s2=options.max_acceleration,
+                lines=tuple(line.points for line in world.lines) if world else (),
             )
         }
 
