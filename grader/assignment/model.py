@@ -15,6 +15,7 @@ from grader.assignment.bag import BagOptions
 from grader.assignment.contract.model import Contract
 from grader.assignment.limits import BuildLimitOptions, LimitOptions
 from grader.assignment.stimuli.stimulus import Stimulus
+from grader.assignment.true_motion import TrueMotion
 from grader.assignment.variable import Variable
 from grader.checks.window import Phase, Window
 from grader.findings.words import Words
@@ -34,7 +35,16 @@ from grader.spec.quantity import Duration, DurationOrZero, PositiveLength, Ratio
 from grader.spec.source import Model
 from grader.spec.unit import parse_any
 from sim.camera_options import CameraOptions
-from sim.description import LidarOptions, OdometryOptions, RobotOptions, SimulatorOptions, Topics
+from sim.description import (
+    LidarOptions,
+    OdometryOptions,
+    OdometryTopic,
+    RobotOptions,
+    ScanTopic,
+    SimulatorOptions,
+    Topics,
+    TransformTopic,
+)
 from sim.sensor_options import BatteryOptions, ImuOptions, JointOptions, RangeOptions
 from sim.turtles.interfaces import commands
 
@@ -211,6 +221,31 @@ class Launch(Model):
         return self.executable or self.file or ""
 
 
+class AuthorSimulator(Launch, TrueMotion):
+    """A simulator of the author's, with one robot, in place of rosgrade's own.
+
+    It is started before the student's programs, as companions are.
+    """
+
+    package: PackageName = Field(
+        description="Its package: in `packages/` beside assignment.yaml, in an underlay or of ROS."
+    )
+
+    @property
+    def options(self) -> SimulatorOptions:
+        """Its robot's topics, in the words of rosgrade's own simulator."""
+        return SimulatorOptions(
+            lidar=LidarOptions(enabled=self.scan is not None),
+            odometry=OdometryOptions(enabled=self.odometry is not None),
+            topics=Topics(
+                command=self.command,
+                odometry=self.odometry or OdometryTopic(),
+                scan=self.scan or ScanTopic(),
+                tf=TransformTopic(enabled=False),
+            ),
+        )
+
+
 class RecordedTopic(Model):
     """A topic that the probe subscribes to, with the QoS that the probe requests."""
 
@@ -283,9 +318,14 @@ class Scenario(Model):
     )
     companions: tuple[Launch, ...] = Field(
         (),
-        description="Programs of the author's, each an executable of a package in `packages/` "
-        "beside assignment.yaml. They start before the student's and run as long, and nothing of "
-        "theirs is judged: a traffic light, another robot.",
+        description="Programs of the author's, each an executable or a launch file of a package in "
+        "`packages/` beside assignment.yaml. They start before the student's and run as long, and "
+        "nothing of theirs is judged: a traffic light, another robot.",
+    )
+    simulator: AuthorSimulator | None = Field(
+        None,
+        description="A simulator of your own, such as Gazebo, in place of a `world`. See "
+        "[authors.md](authors.md#a-simulator-of-your-own).",
     )
     record: tuple[RecordedTopic, ...] = Field((), description="Topics to record.")
     stimuli: tuple[Stimulus, ...] = Field(
@@ -379,16 +419,18 @@ class Scenario(Model):
         return {topic for camera in cameras if camera is not None for topic in camera.topics}
 
     @property
-    def simulator(self) -> SimulatorOptions:
-        """Everything about the simulator but the world and the names of several robots."""
+    def simulation(self) -> SimulatorOptions:
+        """Everything about rosgrade's simulator but the world and the names of several robots."""
         own = {key: getattr(self, key) for key in SimulatorOptions.model_fields}
         return SimulatorOptions(**own)
 
     @property
     def simulated(self) -> dict[str, SimulatorOptions]:
         """The robots in its world by their names, which is empty for the only one."""
+        if self.simulator is not None:
+            return {"": self.simulator.options}
         has_robots = self.world is not None and not self.turtles
-        return self.simulator.each(self.robots) if has_robots else {}
+        return self.simulation.each(self.robots) if has_robots else {}
 
     @property
     def has_robot(self) -> bool:

@@ -34,11 +34,12 @@ from sim.description import SimulatorOptions
 from sim.turtles.interfaces import commands as turtle_commands
 from sim.turtles.interfaces import servers as turtle_servers
 
+_STARTED_FIRST = "what is yours is started before the student's programs: leave 'after' out"
 _Lack = tuple[Place, str]
 """A place below the entry of a check, and what is wrong there."""
 _OF_RUNS = (
-    *("repeat", "launch", "companions", "stimuli", "world", "robots", "random", "until"),
-    *("discovery", "shutdown", "limits"),
+    *("repeat", "launch", "companions", "simulator", "stimuli", "world", "robots", "random"),
+    *("until", "discovery", "shutdown", "limits"),
     *sorted({*SimulatorOptions.model_fields} - {"robot", "odometry", "topics"}),
 )
 """Keys of a scenario that say how it is run."""
@@ -66,7 +67,7 @@ def problems(
         for run in sorted({*runs_of(scenario)} & {*ids} - {scenario.id}):
             text = f"a run of {scenario.id!r} would be called as the scenario {run!r}"
             yield source.problem(("scenarios", index, "repeat"), text)
-        own = _no_companion(scenario, beside)
+        own = (*_no_companion(scenario, beside), *_no_simulator(assignment, scenario, shares))
         for place, text in (*_scenario(assignment, scenario), *_no_share(scenario, shares), *own):
             yield source.problem(("scenarios", index, *place), text)
     yield from _requirements(source, assignment.checks)
@@ -103,19 +104,20 @@ def _scenario(assignment: Assignment, scenario: Scenario) -> Iterator[tuple[Plac
     for key in ("messages", "quiet"):
         if not topics and getattr(until, key) is not None:
             yield ("until", key), "no topic is recorded: 'record' is missing"
-    if scenario.bag is None and not scenario.simulated:
+    own = scenario.simulator
+    if scenario.bag is None and (own is not None or not scenario.simulated):
         lacks = "needs a 'world', which is missing"
         lacks = "is not in a world with turtles" if scenario.turtles else lacks
+        lacks = "is not that of your 'simulator'" if own is not None else lacks
         for key in ("robots", *SimulatorOptions.model_fields):
             if key in scenario.model_fields_set:
                 yield (key,), f"a simulated robot {lacks}"
-    if scenario.world is None and scenario.bag is None:
+    if scenario.world is None and scenario.simulator is None and scenario.bag is None:
         for key in ("at_rest", "travelled"):
             if any(getattr(one, key) is not None for one in (until, *until.any)):
                 text = f"{key!r} is about the simulated robot: 'world' is missing"
                 yield ("until",), text
-
-    elif scenario.robots and "robot" in scenario.model_fields_set:
+    if scenario.world is not None and scenario.robots and "robot" in scenario.model_fields_set:
         yield ("robot",), "give either one 'robot' or several 'robots'"
 
 
@@ -144,10 +146,43 @@ def _no_companion(scenario: Scenario, beside: Collection[str]) -> Iterator[tuple
         if one.package not in beside:
             text = f"there is no package {one.package!r} in packages/ beside assignment.yaml."
             yield ("companions", number, "package"), text + nearest_or_all(str(one.package), beside)
-        elif one.executable is None or one.after:
-            key = "after" if one.after else "file"
-            text = "a companion is an executable that is started before the student's programs"
-            yield ("companions", number, key), text
+        elif one.after:
+            yield ("companions", number, "after"), _STARTED_FIRST
+
+
+def _no_simulator(
+    assignment: Assignment, scenario: Scenario, shares: Collection[str]
+) -> Iterator[tuple[Place, str]]:
+    own = scenario.simulator
+    if own is None:
+        return
+    student = {package.name for package in assignment.packages}
+    # What lies in an underlay of the author's is known when it is built.
+    unknown = own.package not in shares and PACKAGES.issuperset(assignment.underlays)
+    if own.package in student:
+        text = f"{own.package!r} is what students hand in: the simulator is a program of yours"
+        yield ("simulator", "package"), text
+    elif unknown:
+        text = f"there is no package {own.package!r}, not in packages/ either."
+        yield ("simulator", "package"), text + did_you_mean(own.package, shares)
+    if own.after:
+        yield ("simulator", "after"), _STARTED_FIRST
+    for number, launch in enumerate(scenario.launch):
+        for index, argument in enumerate(launch.arguments):
+            if own.package in FIND_SHARE.findall(argument):
+                text = "students do not see the simulator's files: put it into another package"
+                yield ("launch", number, "arguments", index), text
+    if scenario.world is not None:
+        text = (
+            "a scenario is simulated once: give either a 'world' of rosgrade, or a 'simulator' of "
+            "yours. What stands in its world can be given as its 'map'"
+        )
+        yield ("simulator",), text
+    for number, item in enumerate(scenario.stimuli):
+        for index, answer in enumerate(getattr(item, "answers", ())):
+            if getattr(answer, "drive", None) is not None:
+                text = "rosgrade drives no robot of a 'simulator' of yours: leave it out"
+                yield ("stimuli", number, "answers", index, "drive"), text
 
 
 def _no_share(scenario: Scenario, shares: Collection[str]) -> Iterator[tuple[Place, str]]:
@@ -339,6 +374,32 @@ def _(need: needs.WithTurtles, user: _User) -> Iterator[_Lack]:
         if not scenario.turtles:
             text = f"the scenario {scenario.id!r} has no 'world' with turtles"
             yield ("uses",), text
+
+
+@_lacks.register
+def _(need: needs.Contacts, user: _User) -> Iterator[_Lack]:
+    if need.about and user.value(need.about) != need.value:
+        return
+    for scenario in user.scenarios:
+        if scenario.simulator is not None and scenario.simulator.contact is None:
+            text = (
+                f"the simulator of the scenario {scenario.id!r} does not say what its robot "
+                "touches: give it the topic 'contact'"
+            )
+            yield ("with", need.about) if need.about else ("uses",), text
+
+
+@_lacks.register
+def _(need: needs.Obstacles, user: _User) -> Iterator[_Lack]:
+    if need.about and user.value(need.about) is None:
+        return
+    for scenario in user.scenarios:
+        if scenario.simulator is not None and scenario.simulator.map is None:
+            text = (
+                f"what stands in the simulator of the scenario {scenario.id!r} is not known: give "
+                "it a 'map'"
+            )
+            yield ("with", need.about) if need.about else ("uses",), text
 
 
 @_lacks.register

@@ -58,7 +58,10 @@ def problems(source: Source, assignment: Assignment, known: Interfaces) -> Itera
         making = Making(source.file.parent, known.find, 0, values, launched)
         yield from _parameters(source, place, scenario, values)
         if scenario.world is not None:
-            yield from _world(source, place, scenario)
+            yield from _world(source, (*place, "world"), scenario.world, scenario)
+        if scenario.simulator is not None and scenario.simulator.map is not None:
+            inside = (*place, "simulator", "map")
+            yield from _world(source, inside, scenario.simulator.map, scenario)
         for inside, text in _stimuli(scenario, making):
             yield source.problem((*place, *inside), text)
 
@@ -87,14 +90,15 @@ def _parameters(
                 yield source.problem((*place, "launch", number, "parameters", name), str(error))
 
 
-def _world(source: Source, place: Place, scenario: Scenario) -> Iterator[Problem]:
+def _world(source: Source, place: Place, file: str, scenario: Scenario) -> Iterator[Problem]:
     values: dict[str, float] = {}
     try:
-        written = read_source(source.file.parent / str(scenario.world))
+        written = read_source(source.file.parent / file)
         for seed in _TRIED_SEEDS if scenario.random else (0,):
             values = draw_values(scenario, seed)
             world = _scenario_world(written, world_values(scenario, values))
-            starting(world, scenario.simulated)
+            if scenario.simulator is None:
+                starting(world, scenario.simulated)
     except (AssignmentError, UsageError) as error:
         drawn = ", ".join(f"{name} = {value:g}" for name, value in values.items())
-        yield source.problem((*place, "world"), f"{error}{f' (with {drawn})' if drawn else ''}")
+        yield source.problem(place, f"{error}{f' (with {drawn})' if drawn else ''}")

@@ -17,7 +17,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from grader.assignment import bag, limits, model, mutant, variable
+from grader.assignment import bag, limits, model, mutant, true_motion, variable
 from grader.assignment.contract import model as contract
 from grader.assignment.own_check import FOLDER, lesson_checks
 from grader.assignment.stimuli.stimulus import stimulus_models
@@ -49,6 +49,9 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "scenarios": model.Scenario,
         "launch": model.Launch,
         "bag": bag.BagOptions,
+        "simulator": model.AuthorSimulator,
+        "simulator: truth": true_motion.TruthTopic,
+        "simulator: ready": true_motion.Ready,
         "record": model.RecordedTopic,
         "until": model.Until,
         "limits": limits.LimitOptions,

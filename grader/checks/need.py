@@ -40,9 +40,9 @@ class Need:
 
 @dataclass(frozen=True)
 class SimulatedRobot(Need):
-    """A ``world`` in each scenario."""
+    """A ``world`` in each scenario, or a simulator of the author's."""
 
-    words = "a `world` with the simulated robot"
+    words = "a `world` with the simulated robot, or a `simulator`"
     about: str | None = None
     """Parameter that is about the robot, if one is."""
     unless: str | None = None
@@ -56,6 +56,25 @@ class WithTurtles(Need):
     """Turtles in the ``world`` of each scenario."""
 
     words = "a `world` with `turtles`"
+
+
+@dataclass(frozen=True)
+class Contacts(Need):
+    """A robot of which it is known whether it touches something."""
+
+    words = "with a `simulator` its topic of `contact`"
+    about: str | None = None
+    """Parameter that needs it, if one does, where it has this value."""
+    value: str | None = None
+
+
+@dataclass(frozen=True)
+class Obstacles(Need):
+    """A robot of which it is known what stands around it."""
+
+    words = "with a `simulator` its `map`"
+    about: str | None = None
+    """Parameter that needs it, if one does."""
 
 
 @dataclass(frozen=True)

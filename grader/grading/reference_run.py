@@ -76,6 +76,8 @@ def scenario_hash(loaded: LoadedAssignment, scenario: Scenario) -> str:
     digest = hashlib.sha256(definition.encode())
     if scenario.world is not None:
         digest.update((loaded.folder / scenario.world).read_bytes())
+    if scenario.simulator is not None and scenario.simulator.map is not None:
+        digest.update((loaded.folder / scenario.simulator.map).read_bytes())
     return digest.hexdigest()[:16]
 
 

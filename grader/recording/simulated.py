@@ -45,8 +45,8 @@ class Incident:
     Attributes:
         time_ns: When.
         kind: ``contact_began``, ``contact_ended``, ``command_rejected``, ``command_timeout``,
-            ``pushed`` or ``late`` (steps that ran late because of the machine, and were caught
-            up).
+            ``pushed``, ``late`` (steps that ran late because of the machine, and were caught up)
+            or ``forged_truth`` (a publisher of the student's where only a simulator is believed).
         text: For people.
         value: For ``late`` how late in seconds, else None.
         robot: Name of the robot, which is empty for the only one.

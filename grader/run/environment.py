@@ -30,6 +30,8 @@ _OWN_NETWORK = {
 }
 _OF_THE_CALLER = ("XDG_RUNTIME_DIR", "USER")
 _INSIDE = {"HOME": "/tmp", "TMPDIR": "/tmp"}
+COMPANION_IN_CELL = {**_INSIDE, "ROS_LOG_DIR": "/tmp/.ros/log"}
+"""Of a program of the author's in the sandbox of a cell."""
 
 
 def cell_environment(ros: RosInstallation, *, sandboxed: bool = False) -> dict[str, str]:
@@ -47,20 +49,16 @@ def cell_environment(ros: RosInstallation, *, sandboxed: bool = False) -> dict[s
     return environment
 
 
-def student_environment(
-    ros: RosInstallation,
-    installs: tuple[Path, ...],
-    scratch: Path,
-    compiled_tracer: Path | None = None,
+def companion_environment(
+    ros: RosInstallation, scratch: Path, installs: tuple[Path, ...] = ()
 ) -> dict[str, str]:
-    """Variables of a student's process: ROS, the packages handed in, and the tracers."""
+    """Variables of a program of the author's: ROS and the packages beside the assignment."""
     environment = ros.environment(os.environ, installs)
     temporary = scratch / "tmp"
     temporary.mkdir(exist_ok=True)
     environment.update(
         _SHARED,
         **_HOST_NETWORK,
-        PYTHONPATH=_joined(str(TRACER), environment.get("PYTHONPATH", "")),
         # What is printed must be dated when it is printed, not when a buffer is full.
         PYTHONUNBUFFERED="1",
         RCUTILS_COLORIZED_OUTPUT="0",
@@ -68,6 +66,18 @@ def student_environment(
         HOME=str(scratch),
         TMPDIR=str(temporary),
     )
+    return environment
+
+
+def student_environment(
+    ros: RosInstallation,
+    installs: tuple[Path, ...],
+    scratch: Path,
+    compiled_tracer: Path | None = None,
+) -> dict[str, str]:
+    """Variables of a student's process: ROS, the packages handed in, and the tracers."""
+    environment = companion_environment(ros, scratch, installs)
+    environment["PYTHONPATH"] = _joined(str(TRACER), environment.get("PYTHONPATH", ""))
     if compiled_tracer is not None:
         environment["LD_PRELOAD"] = _joined(str(compiled_tracer), ros.preloaded)
     return environment

@@ -10,6 +10,7 @@ from grader.run.process.process_sandbox import ProcessSandbox
 from grader.spec.names import NO_NAMES, Names
 
 if TYPE_CHECKING:
+    from grader.assignment.model import AuthorSimulator
     from grader.assignment.stimuli.stimulus_model import StimulusModel
 
 ORDER_FILE = "order.pickle"
@@ -93,6 +94,21 @@ class SimulatorOrder:
 
 
 @dataclass(frozen=True)
+class AuthorSimulatorOrder:
+    """A simulator of the author's, which is one of the companions.
+
+    Attributes:
+        name: That of its command.
+        map: File of what stands in its world, or None; ``values`` stand for ``$name`` in it.
+    """
+
+    name: str
+    options: AuthorSimulator
+    map: str | None
+    values: dict[str, str]
+
+
+@dataclass(frozen=True)
 class CellOrder:
     """One scenario for one cell.
 
@@ -104,6 +120,8 @@ class CellOrder:
         submission: Its record as JSON, to go into the recording unread.
         environment: What the recording says of the place of the run, as ``Recording.environment``.
         simulator: The simulated robot, or None.
+        author_simulator: What watches a simulator of the author's, or None.
+        hidden: Packages of the author's that students do not see in a sandbox.
         compiled_tracer: The library that compiled programs are started with, or None.
         mutation: Folder with mistakes that selftest imposes on right programs, or None.
         process_sandbox: The sandbox of each process of the student, or None.
@@ -125,6 +143,8 @@ class CellOrder:
     companions: tuple[ProcessCommand, ...] = ()
     companion_environment: dict[str, str] = field(default_factory=dict)
     simulator: SimulatorOrder | None = None
+    author_simulator: AuthorSimulatorOrder | None = None
+    hidden: frozenset[str] = frozenset()
     values: dict[str, float] = field(default_factory=dict)
     environment: dict[str, str] = field(default_factory=dict)
     type_support: tuple[str, ...] = ()

@@ -25,15 +25,29 @@ from grader.recording.submission import SubmissionRecord
 from grader.run.admission import Admission
 from grader.run.cell.cell_process import SCRATCH, CellProcess
 from grader.run.cell.middleware_hang import MiddlewareHung, hung_recording
-from grader.run.cell.prefork_server import SIMULATOR_MODULE, TURTLES_MODULE, PreforkServer
+from grader.run.cell.prefork_server import (
+    AUTHOR_SIMULATOR_MODULE,
+    SIMULATOR_MODULE,
+    TURTLES_MODULE,
+    PreforkServer,
+)
 from grader.run.compiled_tracer import compiled_tracer, has_compiled_programs
-from grader.run.environment import RMW, student_environment
+from grader.run.environment import RMW, companion_environment, student_environment
 from grader.run.imposing.mistake import Mistake, with_mistakes
-from grader.run.order import CellOrder, ProcessCommand, RunLimits, SimulatorOrder, Topic, UntilOrder
+from grader.run.order import (
+    AuthorSimulatorOrder,
+    CellOrder,
+    ProcessCommand,
+    RunLimits,
+    SimulatorOrder,
+    Topic,
+    UntilOrder,
+)
 from grader.run.sandboxed_order import sandboxed
 from grader.sandbox.python_tree import unlisted
 from grader.spec.name import FIND_SHARE
 from grader.spec.names import NO_NAMES, Names, Thing
+from grader.submission.read.rosdistro import PACKAGES
 from sim.turtles.interfaces import commands
 
 if TYPE_CHECKING:
@@ -146,15 +160,23 @@ def companion(ros: RosInstallation, launch: Launch, values: dict[str, float]) ->
     """What to execute of the author's.
 
     Raises:
-        GraderFault: No install space has such an executable.
+        GraderFault: No install space has such an executable or launch file.
     """
     prefixes = (*ros.underlays, *ros.prefixes)
-    name = f"{launch.package}/{launch.executable}"
+    package, is_file = str(launch.package), launch.file is not None
+    name, folder = f"{package}/{launch.program}", f"share/{package}" if is_file else "lib"
+    arguments = with_shares(ros_arguments(launch, values), prefixes)
     for prefix in prefixes:
-        if (file := prefix / "lib" / name).is_file():
-            arguments = with_shares(ros_arguments(launch, values), prefixes)
+        if not is_file and (file := prefix / folder / name).is_file():
             return ProcessCommand(name, (*_program(ros, file), *arguments))
-    raise GraderFault(f"the companion {name} is not there: its package installs no such executable")
+        # `ros2 launch` finds it in any folder there.
+        if is_file and any((prefix / folder).rglob(launch.program)):
+            program = launch_file_program(ros, package, launch.program)
+            return ProcessCommand(name, (*program, *arguments), is_launch_file=True)
+    what = "launch file" if is_file else "executable"
+    raise GraderFault(
+        f"the program {name} of the assignment is not there: its package installs no such {what}"
+    )
 
 
 def _program(ros: RosInstallation, file: Path) -> tuple[str, ...]:
@@ -220,10 +242,26 @@ def _simulator(
     return SimulatorOrder(
         world=str((worlds / scenario.world).resolve()),
         values=world_values(scenario, values),
-        options=scenario.simulator.model_dump_json(),
+        options=scenario.simulation.model_dump_json(),
         robots={name: one.model_dump_json() for name, one in scenario.robots.items()},
         seed=seed,
         has_turtles=bool(scenario.turtles),
+    )
+
+
+def _author_simulator(
+    scenario: Scenario, worlds: Path, values: dict[str, float]
+) -> AuthorSimulatorOrder | None:
+    from grader.assignment.random_values import world_values
+
+    own = scenario.simulator
+    if own is None:
+        return None
+    return AuthorSimulatorOrder(
+        name=f"{own.package}/{own.program}",
+        options=own,
+        map=str((worlds / own.map).resolve()) if own.map else None,
+        values=world_values(scenario, values),
     )
 
 
@@ -387,6 +425,8 @@ class Runner:
         imports = {*scenario.recorded_types.values()}
         if scenario.world is not None:
             imports.add(TURTLES_MODULE if scenario.turtles else SIMULATOR_MODULE)
+        if scenario.simulator is not None:
+            imports.add(AUTHOR_SIMULATOR_MODULE)
         with self._lock:
             if self._aborted:
                 raise GraderFault("interrupted")
@@ -416,7 +456,8 @@ class Runner:
             process_command(ros, launch, assignment, install, values, request.names)
             for launch in scenario.launch
         )
-        companions = tuple(companion(ros, one, values) for one in scenario.companions)
+        own = (*filter(None, (scenario.simulator,)), *scenario.companions)
+        companions = tuple(companion(ros, one, values) for one in own)
         compiled = has_compiled_programs(install)
         tracer = compiled_tracer(ros, cache_folder()) if compiled else None
         imported = {item.module for package in submission.packages for item in package.ros_imports}
@@ -428,7 +469,7 @@ class Runner:
             commands=commands,
             companions=companions,
             student_environment=student_environment(ros, (install,), scratch, tracer),
-            companion_environment=student_environment(ros, (), scratch),
+            companion_environment=companion_environment(ros, scratch),
             compiled_tracer=str(tracer) if tracer else None,
             prefixes=tuple(map(str, (*type_support, install, *ros.underlays, *ros.prefixes))),
             topics=_topics(scenario),
@@ -438,6 +479,8 @@ class Runner:
             scratch=str(scratch),
             submission=to_json(submission).decode(),
             simulator=_simulator(scenario, request.worlds, values, seed),
+            author_simulator=_author_simulator(scenario, request.worlds, values),
+            hidden=frozenset({scenario.simulator.package} if scenario.simulator else ()) - PACKAGES,
             values=values,
             environment={
                 "assignment": assignment.id,

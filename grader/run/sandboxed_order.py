@@ -15,7 +15,12 @@ from pathlib import Path
 from grader.machine.ros import RosInstallation
 from grader.run.cell.cell_process import CellProcess
 from grader.run.compiled_tracer import IN_SANDBOX
-from grader.run.environment import TRACER, TRACER_IN_SANDBOX, sandboxed_environment
+from grader.run.environment import (
+    COMPANION_IN_CELL,
+    TRACER,
+    TRACER_IN_SANDBOX,
+    sandboxed_environment,
+)
 from grader.run.imposing.mistake import IN_SANDBOX as MUTATION_IN_SANDBOX
 from grader.run.order import CellOrder
 from grader.run.process.process_sandbox import HOME, WORKSPACE, ProcessSandbox
@@ -31,6 +36,7 @@ _PASSWD = f"student:x:{_UID}:{_UID}::{HOME}:/bin/sh\n"
 _FILTER, _UNGUARDED, _GUARD = "student.bpf", "unguarded.bpf", "guard.bpf"
 _WORLD, _PASSWD_FILE, _COMPILED_TRACER = "world.yaml", "passwd", "tracer.so"
 _SYSTEM = "system"
+_SITE = "lib/python3*/site-packages"
 
 
 def sandboxed(
@@ -62,6 +68,13 @@ def sandboxed(
     bubblewrap.copy_system_files(folder / _SYSTEM)
     binds = [Bind(Path(in_cell[outside]), Path(inside)) for outside, inside in seen.items()]
     binds.append(Bind.same(TRACER_IN_SANDBOX))
+    covered = [
+        seen[str(path)] + str(folder).removeprefix(str(path))
+        for path in ros.underlays
+        for name in sorted(order.hidden)
+        for folder in (path / "lib" / name, path / "share" / name, *path.glob(f"{_SITE}/{name}"))
+        if folder.is_dir()
+    ]
     places = {**seen, str(TRACER): str(TRACER_IN_SANDBOX)}
     if order.compiled_tracer is not None:
         shutil.copyfile(order.compiled_tracer, folder / _COMPILED_TRACER)
@@ -74,18 +87,27 @@ def sandboxed(
     if simulator is not None:
         shutil.copyfile(simulator.world, folder / _WORLD)
         simulator = replace(simulator, world=str(CELL / _WORLD))
+    own = order.author_simulator
+    if own is not None and own.map is not None:
+        shutil.copyfile(own.map, folder / _WORLD)
+        own = replace(own, map=str(CELL / _WORLD))
     return replace(
         order,
         commands=tuple(replace(one, argv=_moved(one.argv, seen)) for one in order.commands),
-        companions=tuple(replace(one, argv=_moved(one.argv, seen)) for one in order.companions),
+        companions=tuple(replace(one, argv=_moved(one.argv, in_cell)) for one in order.companions),
         student_environment=sandboxed_environment(order.student_environment, places),
-        companion_environment=sandboxed_environment(order.companion_environment, places),
+        # They run in the cell itself, where no program of the student's reaches them.
+        companion_environment={
+            **sandboxed_environment(order.companion_environment, in_cell),
+            **COMPANION_IN_CELL,
+        },
         prefixes=_moved(order.prefixes, in_cell),
         type_support=_moved(order.type_support, in_cell),
         scratch=str(CELL),
         simulator=simulator,
+        author_simulator=own,
         process_sandbox=ProcessSandbox(
-            arguments=(*_arguments(sandbox, ros, binds), "--chdir", HOME),
+            arguments=(*_arguments(sandbox, ros, binds, covered), "--chdir", HOME),
             filter=str(CELL / _FILTER),
             unguarded=str(CELL / _UNGUARDED),
             guard=str(CELL / _GUARD),
@@ -97,7 +119,9 @@ def sandboxed(
     )
 
 
-def _arguments(sandbox: Sandbox, ros: RosInstallation, binds: Sequence[Bind]) -> list[str]:
+def _arguments(
+    sandbox: Sandbox, ros: RosInstallation, binds: Sequence[Bind], covered: Sequence[str]
+) -> list[str]:
     python = sandbox.student_view(ros, TREES)
     disk, shared = STUDENT / "disk", STUDENT / "shared"
     writable = (
@@ -113,6 +137,7 @@ def _arguments(sandbox: Sandbox, ros: RosInstallation, binds: Sequence[Bind]) ->
         # What can be written to comes first: Python may be installed below /tmp.
         *bubblewrap.bound((*writable, *python, *binds)),
         *hide(python),
+        *(word for path in covered for word in ("--tmpfs", path, "--remount-ro", path)),
         *bubblewrap.HIDDEN_INIT,
         *("--remount-ro", "/", "--remount-ro", "/dev"),
     ]

@@ -377,3 +377,71 @@ def test_a_companion_is_an_executable_of_a_package_beside_the_yaml(
     one = "companions: [{package: course_nodes, executable: light}]"
     found = mistakes(GOOD.replace("    launch:", f"    {one}\n    launch:", 1))
     assert len(found) == 1 and told in found[0]
+
+
+SIMULATOR = """simulator:
+      package: course_sim
+      file: world.launch.py
+      truth: {topic: /model/pose, type: geometry_msgs/msg/PoseStamped}
+      radius: 10 cm
+      max_speed: 0.3 m/s
+      max_angular_speed: 2 rad/s
+"""
+OF_ROS = SIMULATOR.replace("course_sim", "ros_gz_sim")
+CONTACT = """  - {id: contact, uses: motion.no_contact, points: 1}
+  - {id: stops, uses: motion.stops, with: {distance: 50 cm}, points: 1}
+  - {id: speed, uses: motion.drives, with: {speed: 0.2 m/s, until_distance: 1 m}, points: 1}
+  - {id: turns, uses: motion.stays_at_rest, with: {after: stop}, while: {robot: touches}, points: 1}
+"""
+
+
+def simulated(own: str = SIMULATOR) -> str:
+    """The good assignment with a simulator of the author's."""
+    return GOOD.replace("    launch:", f"    {own}    launch:", 1)
+
+
+def test_a_simulator_of_the_author_s_gives_a_robot_to_checks(
+    mistakes: Callable[..., list[str]],
+) -> None:
+    """Its package may also be one of ROS."""
+    ended = simulated(OF_ROS).replace("    launch:", "    until: {at_rest: 1 s}\n    launch:", 1)
+    assert mistakes(ended + CONTACT.splitlines(keepends=True)[-1].replace("touches", "rests")) == []
+
+
+def test_checks_of_contact_and_of_distance_need_to_know_both(
+    mistakes: Callable[..., list[str]],
+) -> None:
+    found = mistakes(simulated(OF_ROS) + CONTACT)
+    asked = [re.search(r"(checks\S+): .* give it (.*)", one) for one in found]
+    assert [one and one.groups() for one in asked] == [
+        ("checks[1].uses", "the topic 'contact'"),
+        ("checks[2].uses", "a 'map'"),
+        ("checks[3].with.until_distance", "a 'map'"),
+        ("checks[4].while.robot", "the topic 'contact'"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("own", "told"),
+    [
+        (SIMULATOR, ".simulator.package: there is no package 'course_sim', not in packages/"),
+        (SIMULATOR.replace("package: course_sim", "name: sim"), "'package' is missing"),
+        (SIMULATOR + "      after: 1 s\n", ".simulator.after: what is yours is started before"),
+        (SIMULATOR + "    world: w.yaml\n", ".simulator: a scenario is simulated once"),
+        (SIMULATOR + "    robot: {radius: 1 cm}\n", "is not that of your 'simulator'"),
+        (SIMULATOR.replace("PoseStamped", "Twist"), "tf2_msgs/msg/TFMessage"),
+        (
+            SIMULATOR.replace("geometry_msgs/msg/PoseStamped", "tf2_msgs/msg/TFMessage"),
+            "'frame' goes with the type tf2_msgs/msg/TFMessage",
+        ),
+        (OF_ROS + "      map: none.yaml\n", ".simulator.map: "),
+        (
+            OF_ROS + "    bag: {}\n",
+            ".simulator: ",
+        ),
+    ],
+)
+def test_a_simulator_that_does_not_fit_is_told(
+    mistakes: Callable[..., list[str]], own: str, told: str
+) -> None:
+    assert told in "\n".join(mistakes(simulated(own)))

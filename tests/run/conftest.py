@@ -74,6 +74,11 @@ def runner() -> Iterator[Runner]:
 @pytest.fixture
 def run_node(runner: Runner, tmp_path: Path) -> RunNode:
     """Run a node's source in a cell and read what was recorded."""
+    return runs_of(runner, tmp_path)
+
+
+def runs_of(runner: Runner, tmp_path: Path) -> RunNode:
+    """Run a node's source by this runner and read what was recorded."""
     numbers = iter(range(1000))
 
     def run(

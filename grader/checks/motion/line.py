@@ -6,6 +6,7 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check
 from grader.checks.motion.robot_check import RobotParameters, moved_in
+from grader.checks.need import Obstacles, SimulatedRobot
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.findings.finding import Finding, evidence_at
@@ -21,6 +22,8 @@ _STRIDE = 5
 
 class FollowsLine(RobotParameters):
     """Parameters of motion.follows_line."""
+
+    needs = (SimulatedRobot(), Obstacles())
 
     line: int = Field(0, ge=0, description="Which of the `lines` of the world file, from 0 on.")
     distance: PositiveLength = Field(

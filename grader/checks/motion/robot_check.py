@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from pydantic import Field
 
 from grader.checks.check import Parameters, stop_if
-from grader.checks.need import Doubt, SimulatedRobot
+from grader.checks.need import Doubt, Need, SimulatedRobot
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.no_motion import approach, why_not_moved
 from grader.findings.finding import Finding
@@ -21,7 +23,7 @@ class RobotParameters(Parameters):
 
     of_bags = True
     about = ("published",)
-    needs = (SimulatedRobot(),)
+    needs: ClassVar[tuple[Need, ...]] = (SimulatedRobot(),)
     doubt = Doubt.STEERING_HELD_UP
 
 

@@ -150,7 +150,12 @@ def remarks(recording: Recording) -> tuple[str, ...]:
         return tuple(f"the bag {code(recording.bag)}: {note}" for note in recording.bag_notes)
     names = f"so that everything else could be judged: {codes(map(str, recording.names.wrong))}"
     renamed = (f"this run corrected wrong names, {names}",) if recording.names else ()
-    return (*renamed, *_posing(recording), *_excess(recording), *_tricks(recording))
+    forged = (
+        f"{one.text}: only what the simulator of the assignment publishes there counts as the truth"
+        for one in recording.incidents
+        if one.kind == "forged_truth"
+    )
+    return (*renamed, *_posing(recording), *_excess(recording), *_tricks(recording), *forged)
 
 
 def _posing(recording: Recording) -> Iterator[str]:

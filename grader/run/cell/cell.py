@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import select
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,7 +33,8 @@ from grader.sandbox.packet_monitor import PacketMonitor, bound_ports
 from grader.spec.unit import format_duration
 
 if TYPE_CHECKING:
-    from grader.run.cell.simulator import Simulator
+    from grader.run.cell.author_simulator import AuthorSimulator
+    from grader.run.cell.simulator import SimulatedRobot, Simulator
     from grader.run.cell.turtles import SimulatedTurtles
 
 _TICK_S = 0.05
@@ -82,7 +83,6 @@ class Cell:
             Family(os.getpid()).look, blocked=lambda pid: not self._has_node and is_blocked(pid)
         )
         self._students = StudentProcesses(self._output, self._meter, order.process_sandbox)
-        self._companions = Companions(order, self._meter) if order.companions else None
         self._other_domains: tuple[int, ...] = ()
         self._graph = GraphObserver(
             probe.node,
@@ -100,8 +100,10 @@ class Cell:
             )
         self._exit_barrier = ExitBarrier(self._output, self._graph, self._students)
         self._waits: list[Wait] = []
-        self._simulator: Simulator | None = None
+        self._simulator: Simulator | AuthorSimulator | None = None
         self._turtles: SimulatedTurtles | None = None
+        own: AuthorSimulator | None = None
+        driven: Mapping[str, SimulatedRobot] = {}
         if order.simulator is not None and order.simulator.has_turtles:
             from grader.run.cell.turtles import SimulatedTurtles
 
@@ -110,6 +112,14 @@ class Cell:
             from grader.run.cell.simulator import Simulator
 
             self._simulator = Simulator(probe.node, order.simulator)
+            driven = self._simulator.robots
+        elif order.author_simulator is not None:
+            from grader.run.cell.author_simulator import AuthorSimulator
+
+            self._simulator = own = AuthorSimulator(probe, self._graph, order.author_simulator)
+        self._companions: Companions | None = None
+        if order.companions:
+            self._companions = Companions(order, self._meter, self._graph, own)
         self._faults: list[str] = []
         self._context = StimulusContext(
             probe,
@@ -120,11 +130,12 @@ class Cell:
             self._start_again,
             self._waits,
             self._faults,
-            self._simulator.robots if self._simulator is not None else {},
+            driven,
         )
         self._simulated = self._simulator or self._turtles
         self._player = Player(order.stimuli, self._context)
-        robots = [*self._context.robots.values(), *([self._turtles] if self._turtles else ())]
+        robots = [*(self._simulator.robots.values() if self._simulator else ())]
+        robots += [self._turtles] if self._turtles else []
         self._ending = EndingConditions(probe, self._output, robots, self._player)
         self._later: list[ProcessCommand] = []
         self._next_graph = 0.0
@@ -240,17 +251,13 @@ class Cell:
         """Start the author's programs, and know their nodes before any of the student's runs."""
         if self._companions is None:
             return None
-        self._graph.newcomers = Owner.COMPANION
         self._companions.start(self._domain_id)
-        for watch in self._ticks():
-            nodes = [one for one in self._graph.nodes if one.owner is Owner.COMPANION]
-            if len(nodes) >= len(self._order.companions):
-                break
-            late = watch.elapsed_s > self._order.limits.discovery_s
-            self._faults += self._companions.faults(late=late)
+        for _ in self._ticks():
             if self._faults:
                 return Ending.FAULT
-        self._graph.newcomers = Owner.STUDENT
+            if self._companions.are_ready():
+                break
+        self._students.others = self._companions.pids
         return None
 
     def _observe(self) -> Ending:
@@ -471,6 +478,8 @@ class Cell:
             self._exit_barrier.give()
             if not self._probe.recording:
                 continue
+            if self._companions is not None:
+                self._faults += self._companions.faults()
             self._player.tick()
             if self._later:
                 self._launch((time.time_ns() - self._launched_ns) / NS)

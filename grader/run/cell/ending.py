@@ -14,6 +14,7 @@ from grader.run.process.output import OutputReader
 from grader.run.process.student import StudentProcesses
 
 if TYPE_CHECKING:
+    from grader.run.cell.author_simulator import TrackedRobot
     from grader.run.cell.probe import Probe
     from grader.run.cell.simulator import SimulatedRobot
     from grader.run.cell.turtles import SimulatedTurtles
@@ -29,7 +30,7 @@ class EndingConditions:
         self,
         probe: Probe,
         output: OutputReader,
-        robots: Iterable[SimulatedRobot | SimulatedTurtles],
+        robots: Iterable[SimulatedRobot | SimulatedTurtles | TrackedRobot],
         player: Player,
     ) -> None:
         self._player = player

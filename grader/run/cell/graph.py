@@ -176,7 +176,7 @@ class GraphObserver:
         key = (full_name(info["node_namespace"], info["node_name"]), gid[:12].hex())
         known = self._nodes.get(key)
         if known is None or known.vanished_ns is not None:
-            self._nodes[key] = Node(key[0], self._owner(gid), now_ns)
+            self._nodes[key] = Node(key[0], self.owner(gid), now_ns)
             self.changed_ns = now_ns
         return key
 
@@ -191,7 +191,7 @@ class GraphObserver:
                 type=info.topic_type,
                 type_hash=str(info.topic_type_hash) if info.topic_type_hash.version > 0 else "",
                 node=full_name(info.node_namespace, info.node_name),
-                owner=self._owner(gid),
+                owner=self.owner(gid),
                 qos=qos_of(info.qos_profile),
                 gid=key,
                 appeared_ns=now_ns,
@@ -220,7 +220,8 @@ class GraphObserver:
                 self.changed_ns = now_ns
         _note_vanished(services, seen, now_ns)
 
-    def _owner(self, gid: bytes) -> Owner:
+    def owner(self, gid: bytes) -> Owner:
+        """Whose the participant of an endpoint is."""
         participant = gid[:12].hex()
         if participant not in self._owners:
             self._owners[participant] = self._find_owner(process_bits(gid))

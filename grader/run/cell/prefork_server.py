@@ -62,6 +62,8 @@ SIMULATOR_MODULE = "grader.run.cell.simulator"
 """Module that a cell with a simulated robot imports in addition."""
 TURTLES_MODULE = "grader.run.cell.turtles"
 """The same for turtles."""
+AUTHOR_SIMULATOR_MODULE = "grader.run.cell.author_simulator"
+"""The same for a simulator of the author's."""
 
 
 def readable(descriptors: Collection[int], limit_s: float | None = None) -> set[int]:

@@ -119,6 +119,8 @@ class StudentProcesses:
         self._running: list[_Running] = []
         self._pids: frozenset[int] = frozenset()
         self._survivors: tuple[str, ...] = ()
+        self.others: frozenset[int] = frozenset()
+        """Processes in this cell that are not the student's."""
         self._next_look_s = 0.0
 
     def launch(
@@ -288,7 +290,7 @@ class StudentProcesses:
         self._survivors = tuple(
             command
             for pid, command in kill_descendants(os.getpid()).items()
-            if pid not in {process.popen.pid for process in self._running} and pid not in inits
+            if pid not in {*self.others, *inits, *(process.popen.pid for process in self._running)}
         )
         self.poll()
         reap()

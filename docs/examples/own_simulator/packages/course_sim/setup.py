@@ -1,0 +1,26 @@
+"""Builds and installs the package."""
+
+from setuptools import find_packages, setup
+
+package_name = 'course_sim'
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    packages=find_packages(exclude=['test']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
+        ('share/' + package_name, ['package.xml']),
+    ],
+    install_requires=['setuptools'],
+    zip_safe=True,
+    maintainer='Student',
+    maintainer_email='student@example.com',
+    description='A small simulator of a course.',
+    license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            'simulator = course_sim.simulator:main',
+        ],
+    },
+)
