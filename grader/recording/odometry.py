@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 from grader.recording.simulated import Incident, Truth
-from sim.motion import Pose, Twist, compose, relative, wrap_angle
-
-STEP_NS = 10_000_000
-"""As the simulator's."""
+from grader.recording.tracked import Sighting, truth_of
+from sim.motion import REST, Pose, Twist, compose, relative
 
 Timed = tuple[int, Mapping[str, Any]]
 """A time in ns and the fields of a message."""
@@ -28,34 +25,16 @@ def motion(
         commands: Messages of geometry_msgs/msg/Twist or TwistStamped, oldest first.
         start: The pose that the robot begins at; by default what its odometry says.
     """
-    seen = [one for one in map(_read, odometry) if _is_finite(one[1]) and one[2].is_finite]
-    seen = [one for index, one in enumerate(seen) if index == 0 or one[0] > seen[index - 1][0]]
-    if len(seen) < 2:
-        return ()
-    if start is not None:
-        first = seen[0][1]
-        seen = [(at, compose(start, relative(first, pose)), twist) for at, pose, twist in seen]
-    orders = [one for one in _orders(commands) if one[1].is_finite]
-    order_times = [time_ns for time_ns, _ in orders]
-    found = []
-    for (begin_ns, pose, twist), (end_ns, after, _) in pairwise(seen):
-        for time_ns in range(begin_ns, end_ns, STEP_NS):
-            share = (time_ns - begin_ns) / (end_ns - begin_ns)
-            last = bisect_right(order_times, time_ns)
-            command = orders[last - 1][1] if last else Twist(0.0, 0.0)
-            found.append(
-                Truth(
-                    time_ns,
-                    pose.x_m + share * (after.x_m - pose.x_m),
-                    pose.y_m + share * (after.y_m - pose.y_m),
-                    wrap_angle(pose.yaw_rad + share * wrap_angle(after.yaw_rad - pose.yaw_rad)),
-                    twist.linear_m_s,
-                    twist.angular_rad_s,
-                    command.linear_m_s,
-                    command.angular_rad_s,
-                )
-            )
-    return tuple(found)
+    told = [one for one in map(_read, odometry) if _is_finite(one[1]) and one[2].is_finite]
+    told = [one for index, one in enumerate(told) if index == 0 or one[0] > told[index - 1][0]]
+    if start is not None and told:
+        first = told[0][1]
+        told = [(at, compose(start, relative(first, pose)), twist) for at, pose, twist in told]
+    seen = [Sighting(time_ns, time_ns, pose) for time_ns, pose, _ in told]
+    twists = [twist for _, _, twist in told]
+    # Some drivers fill in the pose alone.
+    said = twists if any(twist != REST for twist in twists) else ()
+    return truth_of(seen, [one for one in _orders(commands) if one[1].is_finite], twists=said)
 
 
 def rejected(commands: Sequence[Timed]) -> tuple[Incident, ...]:

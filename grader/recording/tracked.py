@@ -1,4 +1,4 @@
-"""The true motion of a robot from poses that a simulator of the author's publishes."""
+"""The motion of a robot from poses: of a simulator of the author's, or of odometry in a bag."""
 
 from __future__ import annotations
 
@@ -62,6 +62,7 @@ def truth_of(
     seen: Sequence[Sighting],
     commands: Sequence[tuple[int, Twist]],
     contacts: Sequence[tuple[int, bool]] = (),
+    twists: Sequence[Twist] = (),
 ) -> tuple[Truth, ...]:
     """Steps between the first and the last sighting; the robot goes straight between two.
 
@@ -69,9 +70,10 @@ def truth_of(
         seen: Oldest first, at different times.
         commands: Times and what is commanded from then on, oldest first.
         contacts: Times and whether the robot touches something from then on, oldest first.
+        twists: The velocity at each sighting; by default what follows from the poses.
     """
     found = []
-    for (before, after), twist in zip(pairwise(seen), velocities(seen), strict=False):
+    for (before, after), twist in zip(pairwise(seen), twists or velocities(seen), strict=False):
         for time_ns in range(before.time_ns, after.time_ns, STEP_NS):
             share = (time_ns - before.time_ns) / (after.time_ns - before.time_ns)
             start, end = before.pose, after.pose

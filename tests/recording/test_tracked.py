@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 
+from grader.recording.odometry import motion
 from grader.recording.tracked import RealTimeFactor, Sighting, truth_of, velocities
 from sim.motion import NS, Pose, Twist
 
@@ -83,3 +85,21 @@ def test_a_clock_that_stands_still_is_slow() -> None:
     late = factor.now(2 * NS + NS // 2)
     assert late == pytest.approx(1.0)
     assert factor.now(6 * NS) == pytest.approx(2 / 6)
+
+
+def test_odometry_whose_driver_fills_in_the_pose_alone_has_speeds_all_the_same() -> None:
+    """Its twist is always zero, though the robot drives at 0.2 m/s."""
+
+    def message(tenth: int, speed_m_s: float) -> tuple[int, dict[str, Any]]:
+        pose = {
+            "position": {"x": 0.02 * tenth, "y": 0.0, "z": 0.0},
+            "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+        }
+        twist = {"linear": {"x": speed_m_s}, "angular": {"z": 0.0}}
+        return tenth * NS // 10, {"pose": {"pose": pose}, "twist": {"twist": twist}}
+
+    for said_m_s, expected in ((0.0, 0.2), (0.19, 0.19)):
+        truth = motion([message(tenth, said_m_s) for tenth in range(20)], ())
+        assert truth[100].linear_m_s == pytest.approx(expected)
+        assert truth[100].x_m == pytest.approx(0.2)
+    assert motion([message(0, 0.0)], ()) == ()
