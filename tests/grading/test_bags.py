@@ -180,6 +180,21 @@ def test_a_bag_in_mcap_without_its_end_cannot_be_read(judge: Judge) -> None:
     assert "cannot be read" in seen(graded)
 
 
+def test_a_bag_with_more_than_can_be_judged_costs_the_points_and_nothing_else(
+    judge: Judge, tmp_path: Path
+) -> None:
+    """It is small where it lies: 80 MiB of zeros, compressed."""
+    messages, definitions = read_bag(EXAMPLE / "reference" / "square")
+    bloated = [
+        replace(one, cdr=bytes(8 * 2**20)) if index < 10 else one
+        for index, one in enumerate(messages)
+    ]
+    write_bag(tmp_path / "big" / "square", bloated, definitions)
+    graded = judge(files=read_files(tmp_path / "big"))
+    assert "more than 500,000 messages or 64 MiB of what is judged" in seen(graded)
+    assert (result(graded, "odometry").status, graded.grade.graded) == (Status.FAILED, True)
+
+
 def test_of_two_bags_the_submission_says_which_is_meant(judge: Judge) -> None:
     files = dict(reference())
     other, _ = mutate(Edits.model_validate({"bag": {"folder": "square", "until": "9 s"}}), files)
