@@ -325,7 +325,7 @@ class Scenario(Model):
     simulator: AuthorSimulator | None = Field(
         None,
         description="A simulator of your own, such as Gazebo, in place of a `world`. See "
-        "[authors.md](authors.md#a-simulator-of-your-own).",
+        "[other robots](other-robots.md#a-simulator-of-your-own).",
     )
     record: tuple[RecordedTopic, ...] = Field((), description="Topics to record.")
     stimuli: tuple[Stimulus, ...] = Field(

@@ -48,10 +48,6 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "packages": model.Package,
         "scenarios": model.Scenario,
         "launch": model.Launch,
-        "bag": bag.BagOptions,
-        "simulator": model.AuthorSimulator,
-        "simulator: truth": true_motion.TruthTopic,
-        "simulator: ready": true_motion.Ready,
         "record": model.RecordedTopic,
         "until": model.Until,
         "limits": limits.LimitOptions,
@@ -96,6 +92,12 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "topics: scan": description.ScanTopic,
         "topics: clock": description.ClockTopic,
         "topics: tf": description.TransformTopic,
+    },
+    "other-robots": {
+        "bag": bag.BagOptions,
+        "simulator": model.AuthorSimulator,
+        "simulator: truth": true_motion.TruthTopic,
+        "simulator: ready": true_motion.Ready,
     },
     "mutants": {
         "The whole of mutants.yaml": mutant.MutantFile,
