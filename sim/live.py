@@ -23,6 +23,7 @@ from sim.coordinates import PoseInPlane
 from sim.description import SimulatorOptions, read_options
 from sim.motion import NS, Pose
 from sim.node import RosSimulator, make_node
+from sim.real_time import RealTime
 from sim.robot import MODELS
 from sim.screen import Screen
 from sim.simulation import Simulation
@@ -31,7 +32,7 @@ from sim.turtles.simulation import Turtles
 from sim.world import World, read_world
 
 if TYPE_CHECKING:
-    from sim.turtles.node import RosTurtles
+    pass
 
 _REFRESH_NS = NS // 10
 _LINE_NS = NS
@@ -100,16 +101,12 @@ def _context(domain_id: int | None) -> Iterator[Context]:
         context.try_shutdown()
 
 
-def _loop(
-    simulator: RosSimulator | RosTurtles, screen: Screen | TurtleScreen, duration: float | None
-) -> None:
+def _loop(simulator: RealTime, screen: Screen | TurtleScreen, duration: float | None) -> None:
     with suppress(KeyboardInterrupt):
         _keep_time(simulator, screen, None if duration is None else round(duration * NS))
 
 
-def _keep_time(
-    simulator: RosSimulator | RosTurtles, screen: Screen | TurtleScreen, end_ns: int | None
-) -> None:
+def _keep_time(simulator: RealTime, screen: Screen | TurtleScreen, end_ns: int | None) -> None:
     console = Console()
     # We refresh it ourselves between two steps; a thread of rich's would disturb them.
     live = Live(console=console, screen=True, auto_refresh=False, redirect_stdout=False)

@@ -9,7 +9,6 @@ delays messages, which is reported, but does not change where the robot is.
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
@@ -19,30 +18,22 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from sim.motion import NS, Twist
-from sim.pacing import Lateness, Pacer
+from sim.motion import Twist
 from sim.publishers import ClockPublisher
+from sim.real_time import LateSink, RealTime
 from sim.robot_topics import RobotTopics
-from sim.simulation import Simulation, Step
+from sim.simulation import STEP_NS, Simulation, Step
 
 
-class Sink(Protocol):
+class Sink(LateSink, Protocol):
     """Receiver of the truth, such as a recording; called from the loop, so it must be quick."""
 
     def on_step(self, step: Step, stamp_ns: int, robot: str) -> None:
         """Called after each step of each robot, with its name."""
 
-    def on_late(self, lateness: Lateness) -> None:
-        """Called when steps are late, which are done right after this call."""
 
-
-class RosSimulator:
-    """Simulated robots that listen and whose sensors publish.
-
-    Its loop calls :meth:`start` once and then :meth:`catch_up` again and again, each time at or
-    after the deadline that the last call returned; :meth:`run` does so until an event is set
-    and suits a thread of its own.
-    """
+class RosSimulator(RealTime):
+    """Simulated robots that listen and whose sensors publish."""
 
     def __init__(
         self,
@@ -59,45 +50,23 @@ class RosSimulator:
             recorders: How many subscriptions to a sensor do not mind when its data come together,
                 each with its own time, if they are the only ones.
         """
-        self._node, self._sink, self._steady_ns = node, sink, steady_ns
+        super().__init__(node, sink, steady_ns, STEP_NS)
+        self._sink = sink
         self.robots = {name: RobotTopics(node, one, recorders) for name, one in robots.items()}
         self._first = next(iter(robots.values()))
         clock = self._first.options.topics.clock
         self.clock = ClockPublisher(node, clock) if clock.enabled else None
-        self._pacer: Pacer | None = None
-        self._stamp_ns = 0
 
     def start(self) -> int:
-        """Let simulated time begin now."""
-        self._pacer = Pacer(self._steady_ns())
-        self._stamp_ns = self._node.get_clock().now().nanoseconds
+        """Let simulated time begin now, and publish what is fixed to the robots."""
+        deadline_ns = super().start()
         for robot in self.robots.values():
             robot.start(self._stamp_ns)
-        return self._pacer.deadline_ns
+        return deadline_ns
 
-    def catch_up(self) -> int:
-        """Do every step that is over.
-
-        Returns:
-            Reading of the steady clock at which to call again; in the past if there was more
-            to catch up than is done at once. Calling earlier does no harm.
-        """
-        if self._pacer is None:
-            return self.start()
-        pacer, now_ns = self._pacer, self._steady_ns()
-        due = pacer.due(now_ns)
-        if not due:
-            return pacer.deadline_ns
-        lateness = pacer.lateness(now_ns)
-        if lateness is not None and self._sink is not None:
-            self._sink.on_late(lateness)
+    def _take(self, now_ns: int) -> None:
         for robot in self.robots.values():
-            robot.take_commands(self._stamp_ns, now_ns - pacer.begin_ns)
-        for _ in range(due):
-            self._advance()
-            pacer.done += 1
-        # With a clock every step is visible.
-        return pacer.plan(0 if self.clock is not None else self._next_visible_ns())
+            robot.take_commands(self._stamp_ns, now_ns)
 
     def _advance(self) -> None:
         steps = {name: robot.advance() for name, robot in self.robots.items()}
@@ -111,22 +80,10 @@ class RosSimulator:
             self.robots[name].publish(step, stamp_ns)
 
     def _next_visible_ns(self) -> int | None:
+        if self.clock is not None:
+            return super()._next_visible_ns()
         found = (robot.next_visible_ns() for robot in self.robots.values())
         return min((one for one in found if one is not None), default=None)
-
-    def run(self, stop: threading.Event) -> None:
-        """Keep time until ``stop`` is set or the node's context is shut down."""
-        deadline_ns = self.start()
-        while not stop.is_set() and self._node.context.ok():
-            wait_s = (deadline_ns - self._steady_ns()) / NS
-            if wait_s > 0.0 and stop.wait(wait_s):
-                return
-            try:
-                deadline_ns = self.catch_up()
-            except RuntimeError:  # the base of rclpy's RCLError
-                if self._node.context.ok():
-                    raise
-                return  # the context was shut down within the step
 
     def drive(self, twist: Twist, robot: str) -> None:
         """Command a robot from this process, like a message that arrives now; any thread may."""

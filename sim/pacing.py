@@ -24,6 +24,10 @@ class Lateness:
     steps: int
     late_ns: int
 
+    def __str__(self) -> str:
+        """Say it in words."""
+        return f"{self.steps} steps done {self.late_ns / 1e6:.0f} ms late"
+
 
 class Pacer:
     """Compares done steps with a clock: none is left out, and none is done before its end."""

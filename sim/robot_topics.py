@@ -6,12 +6,12 @@ import importlib
 from collections import deque
 from typing import Any
 
-from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 
 from sim.camera_publisher import CameraPublisher
 from sim.motion import Twist
+from sim.polled import PolledGroup, never
 from sim.publishers import (
     OdometryPublisher,
     ScanPublisher,
@@ -24,14 +24,6 @@ from sim.simulation import Simulation, Step
 
 _LEAST_QUEUE = 100
 """Commands that may arrive from one look to the next; a robot that always looks misses none."""
-
-
-class PolledGroup(CallbackGroup):
-    """A callback group that no executor may serve: its owner takes the messages itself."""
-
-    def can_execute(self, entity: Any) -> bool:
-        """Never."""
-        return False
 
 
 class RobotTopics:
@@ -60,7 +52,7 @@ class RobotTopics:
         self.command: Any = node.create_subscription(
             getattr(importlib.import_module(f"{package}.msg"), name),
             command.topic,
-            _never,
+            never,
             qos_profile(command),
             callback_group=PolledGroup(),
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
@@ -139,7 +131,3 @@ class RobotTopics:
         """Other types that are published on the topic of the commands."""
         found = self._node.get_publishers_info_by_topic(self._command.topic)
         return tuple(sorted({item.topic_type for item in found} - {self._command.type}))
-
-
-def _never(message: Any) -> None:
-    """A callback that is never called, since no executor serves it."""

@@ -62,8 +62,8 @@ class Step:
         command: What was asked for, before any limit; zero after a rejected command.
         contact: What the robot touches, such as ``boxes[2]``, or None.
         readings: Of the other sensors, those that are due.
-        is_pictured: Whether a picture of the camera is due. Who wants it takes it, for most
-            pictures are seen by nobody: taking one changes nothing.
+        is_pictured: Whether a picture of the camera is due. It is made only where somebody
+            subscribes, since that takes time and changes nothing in the simulation.
     """
 
     index: int

@@ -376,29 +376,20 @@ def _(need: needs.WithTurtles, user: _User) -> Iterator[_Lack]:
             yield ("uses",), text
 
 
-@_lacks.register
-def _(need: needs.Contacts, user: _User) -> Iterator[_Lack]:
-    if need.about and user.value(need.about) != need.value:
-        return
-    for scenario in user.scenarios:
-        if scenario.simulator is not None and scenario.simulator.contact is None:
-            text = (
-                f"the simulator of the scenario {scenario.id!r} does not say what its robot "
-                "touches: give it the topic 'contact'"
-            )
-            yield ("with", need.about) if need.about else ("uses",), text
+_UNTOLD = {
+    "contact": "does not say what its robot touches: give it the topic 'contact'",
+    "map": "does not say what stands around its robot: give it a 'map'",
+}
 
 
 @_lacks.register
-def _(need: needs.Obstacles, user: _User) -> Iterator[_Lack]:
-    if need.about and user.value(need.about) is None:
+def _(need: needs.OfSimulator, user: _User) -> Iterator[_Lack]:
+    given = user.value(need.about)
+    if need.about and (given is None or need.value not in (None, given)):
         return
     for scenario in user.scenarios:
-        if scenario.simulator is not None and scenario.simulator.map is None:
-            text = (
-                f"what stands in the simulator of the scenario {scenario.id!r} is not known: give "
-                "it a 'map'"
-            )
+        if scenario.simulator is not None and getattr(scenario.simulator, need.key) is None:
+            text = f"the simulator of the scenario {scenario.id!r} {_UNTOLD[need.key]}"
             yield ("with", need.about) if need.about else ("uses",), text
 
 

@@ -59,22 +59,16 @@ class WithTurtles(Need):
 
 
 @dataclass(frozen=True)
-class Contacts(Need):
-    """A robot of which it is known whether it touches something."""
+class OfSimulator(Need):
+    """What a simulator of the author's has to tell, where there is one."""
 
-    words = "with a `simulator` its topic of `contact`"
+    words = "with a `simulator` its `{key}`"
+    key: str
+    """``contact``, the topic of what its robot touches, or ``map``, what stands around it."""
     about: str | None = None
-    """Parameter that needs it, if one does, where it has this value."""
+    """Parameter that needs it, if one does where it is given."""
     value: str | None = None
-
-
-@dataclass(frozen=True)
-class Obstacles(Need):
-    """A robot of which it is known what stands around it."""
-
-    words = "with a `simulator` its `map`"
-    about: str | None = None
-    """Parameter that needs it, if one does."""
+    """The value with which that parameter needs it; by default any."""
 
 
 @dataclass(frozen=True)

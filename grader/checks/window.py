@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from grader.checks.check import NamedFields, Parameters
-from grader.checks.need import Contacts, Recorded, SimulatedRobot
+from grader.checks.need import OfSimulator, Recorded, SimulatedRobot
 from grader.findings.fields import unlike, words
 from grader.findings.value import EXACT, value_at
 from grader.findings.words import code
@@ -36,7 +36,7 @@ class Phase(Parameters):
         Recorded("message", or_sent=True),
         Recorded("node", suffix="/transition_event"),
         SimulatedRobot("robot"),
-        Contacts("robot", "touches"),
+        OfSimulator("contact", "robot", "touches"),
     )
 
     message: TopicName | None = Field(

@@ -6,7 +6,6 @@ first step that begins after the middleware had received it.
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,8 +24,8 @@ from turtlesim.msg import Color
 from turtlesim.msg import Pose as PoseMessage
 from turtlesim.srv import Kill, SetPen, Spawn, TeleportAbsolute, TeleportRelative
 
-from sim.motion import NS, Pose
-from sim.pacing import Lateness, Pacer
+from sim.motion import Pose
+from sim.real_time import LateSink, RealTime
 from sim.turtles.bounds import Colour
 from sim.turtles.polling import Inbox, Request
 from sim.turtles.rotating import RotationGoal, RotationServer
@@ -40,14 +39,11 @@ _LEAST_QUEUE = 100
 _LONGEST_NAME = 60
 
 
-class Sink(Protocol):
+class Sink(LateSink, Protocol):
     """Receiver of the truth, such as a recording; called from the loop, so it must be quick."""
 
     def on_step(self, step: Step, stamp_ns: int) -> None:
         """Called after each step."""
-
-    def on_late(self, lateness: Lateness) -> None:
-        """Called when steps are late, which are done right after this call."""
 
     def on_answer(self, request: Request, response: Any) -> None:
         """Called before a request to a service of the turtles is answered."""
@@ -63,8 +59,8 @@ class _Ends:
     rotation: RotationServer
 
 
-class RosTurtles:
-    """Turtles that listen and publish; see :class:`sim.node.RosSimulator` for its loop."""
+class RosTurtles(RealTime):
+    """Turtles that listen and publish."""
 
     def __init__(
         self,
@@ -74,8 +70,8 @@ class RosTurtles:
         steady_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         """Offer everything in a node of the caller, see :func:`make_node`; nothing moves yet."""
-        self._node: Any = node
-        self._turtles, self._sink, self._steady_ns = turtles, sink, steady_ns
+        super().__init__(node, sink, steady_ns, STEP_NS)
+        self._turtles, self._sink = turtles, sink
         self._inbox = Inbox(node, self._tell)
         self._inbox.serve_own()
         self._inbox.serve(Spawn, "/spawn", self._spawn)
@@ -85,8 +81,6 @@ class RosTurtles:
         self._ends: dict[str, _Ends] = {}
         self.goals: list[RotationGoal] = []
         """Goals of the action rotate_absolute so far."""
-        self._pacer: Pacer | None = None
-        self._stamp_ns = 0
         self._meet()
 
     @property
@@ -100,46 +94,13 @@ class RosTurtles:
         """Names of what can be called."""
         return self._inbox.services
 
-    def start(self) -> int:
-        """Let simulated time begin now."""
-        self._pacer = Pacer(self._steady_ns(), STEP_NS)
-        # Not the node's clock, for a student may set its parameter use_sim_time.
-        self._stamp_ns = time.time_ns()
-        return self._pacer.deadline_ns
+    def _take(self, now_ns: int) -> None:
+        self._inbox.take(self._stamp_ns, now_ns)
 
-    def catch_up(self) -> int:
-        """Do every step that is over; returns when to call again, on the steady clock."""
-        if self._pacer is None:
-            return self.start()
-        pacer, now_ns = self._pacer, self._steady_ns()
-        due = pacer.due(now_ns)
-        if not due:
-            return pacer.deadline_ns
-        lateness = pacer.lateness(now_ns)
-        if lateness is not None and self._sink is not None:
-            self._sink.on_late(lateness)
-        self._inbox.take(self._stamp_ns, now_ns - pacer.begin_ns)
-        for _ in range(due):
-            self._inbox.act(self._turtles.time_ns)
-            self._meet()
-            step = self._turtles.advance()
-            pacer.done += 1
-            self._publish(step)
-        return pacer.plan(0)
-
-    def run(self, stop: threading.Event) -> None:
-        """Keep time until ``stop`` is set or the node's context is shut down."""
-        deadline_ns = self.start()
-        while not stop.is_set() and self._node.context.ok():
-            wait_s = (deadline_ns - self._steady_ns()) / NS
-            if wait_s > 0.0 and stop.wait(wait_s):
-                return
-            try:
-                deadline_ns = self.catch_up()
-            except RuntimeError:  # the base of rclpy's RCLError
-                if self._node.context.ok():
-                    raise
-                return  # the context was shut down within the step
+    def _advance(self) -> None:
+        self._inbox.act(self._turtles.time_ns)
+        self._meet()
+        self._publish(self._turtles.advance())
 
     def _publish(self, step: Step) -> None:
         if self._sink is not None:

@@ -14,22 +14,15 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
+
+from sim.polled import PolledGroup, never
 
 Act = Callable[[], None]
 
 _MOST_TAKEN = 100
 """Of one subscription or service at a look, for a student may send faster than it is taken."""
 _MOST_PENDING = 5_000
-
-
-class PolledGroup(CallbackGroup):
-    """A callback group that no executor may serve."""
-
-    def can_execute(self, entity: Any) -> bool:
-        """Never."""
-        return False
 
 
 @dataclass(frozen=True)
@@ -69,13 +62,13 @@ class Inbox:
 
     def subscribe(self, kind: Any, topic: str, qos: Any, act: Callable[[Any], None]) -> Any:
         """Take messages on a topic."""
-        made = self._node.create_subscription(kind, topic, _never, qos, callback_group=self._group)
+        made = self._node.create_subscription(kind, topic, never, qos, callback_group=self._group)
         self._subscriptions[made] = act
         return made
 
     def serve(self, kind: Any, name: str, act: Callable[[Request], None]) -> Any:
         """Take requests to a service."""
-        made = self._node.create_service(kind, name, _never, callback_group=self._group)
+        made = self._node.create_service(kind, name, never, callback_group=self._group)
         self._services[made] = act
         return made
 
@@ -147,7 +140,3 @@ def _called_back(request: Request) -> None:
     service = request.service
     with suppress(Exception):
         request.answer(service.callback(request.message, service.srv_type.Response()))
-
-
-def _never(*_: Any) -> None:
-    """A callback that is never called, since no executor serves it."""

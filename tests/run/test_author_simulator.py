@@ -1,4 +1,4 @@
-"""A simulator of the author's: what it says is the truth, and what fails in it is nobody's fault.
+"""A simulator of the author's: it tells the truth, and costs no points if it fails.
 
 It is an ordinary node of a package of its own, see small_simulator.py.
 """

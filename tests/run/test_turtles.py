@@ -21,7 +21,6 @@ from tests.run.conftest import SUBMISSION, assignment, install
 pytestmark = [pytest.mark.ros, pytest.mark.compiles]
 
 HEADER = """
-import time
 import rclpy
 from geometry_msgs.msg import Twist
 from rclpy.action import ActionClient
@@ -69,12 +68,16 @@ def test_what_a_node_does_to_turtles_is_recorded(run: Callable[..., Recording]) 
 call(SetPen, "/turtle1/set_pen", r=255, width=5)
 assert call(Spawn, "/spawn", x=2.0, y=3.0, name="bob").name == "bob"
 publisher = node.create_publisher(Twist, "/turtle1/cmd_vel", 10)
-while not publisher.get_subscription_count():
-    time.sleep(0.05)
+speeds = []
+take = lambda pose: speeds.append(pose.linear_velocity)
+node.create_subscription(Pose, "/turtle1/pose", take, 10)
+while not (publisher.get_subscription_count() and speeds):
+    rclpy.spin_once(node)
 message = Twist()
 message.linear.x = 1.0
 publisher.publish(message)
-time.sleep(1.5)
+while not any(speeds) or speeds[-1]:
+    rclpy.spin_once(node)
 call(Kill, "/kill", name="bob")
 rotate = ActionClient(node, RotateAbsolute, "/turtle1/rotate_absolute")
 rotate.wait_for_server()
@@ -117,9 +120,8 @@ value = ParameterValue(type=1, bool_value=True)
 asked = [Parameter(name="use_sim_time", value=value)]
 call(SetParameters, "/turtlesim/set_parameters", parameters=asked)
 call(TeleportAbsolute, "/turtle1/teleport_absolute", x=float("nan"))
-while True:
-    pose.publish(Pose(x=1.0, y=1.0))
-    time.sleep(0.02)
+node.create_timer(0.02, lambda: pose.publish(Pose(x=1.0, y=1.0)))
+rclpy.spin(node)
 """,
         until={"elapsed": "2 s"},
     )

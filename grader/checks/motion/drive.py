@@ -11,7 +11,7 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters, moved_in
-from grader.checks.need import Obstacles, SimulatedRobot
+from grader.checks.need import OfSimulator, SimulatedRobot
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
@@ -48,7 +48,7 @@ _WAY_TOLERANCE_M = 2e-3
 class Drives(RobotParameters):
     """Parameters of motion.drives."""
 
-    needs = (SimulatedRobot(commanded=True), Obstacles("until_distance"))
+    needs = (SimulatedRobot(commanded=True), OfSimulator("map", "until_distance"))
 
     speed: Speed = Field(description="Expected speed ahead.")
     tolerance: Ratio = Field(0.10, description="Largest error of the speed, as a share of it.")

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check
 from grader.checks.motion.robot_check import RobotParameters, moved_in
-from grader.checks.need import Obstacles, SimulatedRobot
+from grader.checks.need import OfSimulator, SimulatedRobot
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.findings.finding import Finding, evidence_at
@@ -23,7 +23,7 @@ _STRIDE = 5
 class FollowsLine(RobotParameters):
     """Parameters of motion.follows_line."""
 
-    needs = (SimulatedRobot(), Obstacles())
+    needs = (SimulatedRobot(), OfSimulator("map"))
 
     line: int = Field(0, ge=0, description="Which of the `lines` of the world file, from 0 on.")
     distance: PositiveLength = Field(

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters, moved_in
-from grader.checks.need import Obstacles, SimulatedRobot
+from grader.checks.need import OfSimulator, SimulatedRobot
 from grader.diagnosis.explanation import cause_of, mistaken, remedy
 from grader.diagnosis.motion.missed_place import PlaceMissed
 from grader.diagnosis.motion.no_motion import why_not_moved
@@ -165,7 +165,7 @@ class KeepsDistance(RobotParameters):
     """Parameters of motion.keeps_distance."""
 
     of_bags = False
-    needs = (SimulatedRobot(), Obstacles())
+    needs = (SimulatedRobot(), OfSimulator("map"))
 
     distance: PositiveLength = Field(
         description="Distance from the LiDAR to the nearest obstacle, such as the wall."

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import RobotParameters, moved_in
-from grader.checks.need import Contacts, Obstacles, SimulatedRobot
+from grader.checks.need import OfSimulator, SimulatedRobot
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why_not_moved
@@ -44,7 +44,7 @@ class Stops(RobotParameters):
     """Parameters of motion.stops."""
 
     of_bags = False
-    needs = (SimulatedRobot(), Obstacles())
+    needs = (SimulatedRobot(), OfSimulator("map"))
 
     distance: PositiveLength = Field(
         description="Distance of the obstacle straight ahead, from the LiDAR."
@@ -251,7 +251,7 @@ class NoContact(RobotParameters):
     """Parameters of motion.no_contact."""
 
     of_bags = False
-    needs = (SimulatedRobot(), Contacts())
+    needs = (SimulatedRobot(), OfSimulator("contact"))
 
     asks = "touches nothing"
 

@@ -20,7 +20,7 @@ from grader.recording.simulated import Truth
 from sim.motion import Twist
 
 _DEGREES_RAD_S = 25.0
-"""Four turns in a second: nobody means that."""
+"""Faster than four turns in a second: the number is probably meant in degrees."""
 _DEGREES_RAD = 6.5
 """More than a full turn."""
 _TURNS = 2.0

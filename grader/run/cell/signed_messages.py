@@ -13,11 +13,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
+
+from sim.polled import PolledGroup, never
 
 _DEPTH = 1000
 _TAKEN, _NOTHING = 0, 401
@@ -64,14 +65,6 @@ class Signed:
     value: Any
 
 
-class _Never(MutuallyExclusiveCallbackGroup):
-    """No executor takes its messages."""
-
-    def can_execute(self, entity: Any) -> bool:
-        """Whether the executor may call it."""
-        return False
-
-
 class SignedMessages:
     """A subscription from which messages are taken when asked for."""
 
@@ -82,9 +75,9 @@ class SignedMessages:
         self._subscription = node.create_subscription(
             kind,
             topic,
-            lambda _: None,
+            never,
             profile,
-            callback_group=_Never(),
+            callback_group=PolledGroup(),
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
             raw=True,
         )

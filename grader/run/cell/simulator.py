@@ -6,7 +6,6 @@ The truth comes from the simulator's memory and never from a topic that a studen
 from __future__ import annotations
 
 import math
-import threading
 from itertools import chain
 from operator import attrgetter
 from pathlib import Path
@@ -117,9 +116,10 @@ class SimulatedRobot:
             incident = Incident(stamp_ns, event.kind.value, event.text, robot=self._name)
             self.incidents.append(incident)
 
-    def note_late(self, text: str, late_s: float) -> None:
+    def note_late(self, lateness: Lateness) -> None:
         """Note steps that are late because of the host."""
-        incident = Incident(self._stamp_ns, "late", text, late_s, robot=self._name)
+        late_s = lateness.late_ns / NS
+        incident = Incident(self._stamp_ns, "late", str(lateness), late_s, robot=self._name)
         self.incidents.append(incident)
 
     def _follow(self, step: Step, stamp_ns: int) -> None:
@@ -148,21 +148,17 @@ class Simulator:
         self._world = read_scenario_world(Path(order.world), order.values)
         simulations = make_simulations(self._world, options.each(own), order.seed)
         self._ros = RosSimulator(node, simulations, self, recorders=1)
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._ros.run, args=(self._stop,), daemon=True)
         self.robots = {
             name: SimulatedRobot(name, one, self._ros) for name, one in simulations.items()
         }
 
     def start(self) -> None:
         """Let simulated time run, in a thread of its own."""
-        self._thread.start()
+        self._ros.run_in_thread()
 
     def stop(self) -> None:
         """Stop simulated time; the truth ends here."""
-        self._stop.set()
-        if self._thread.is_alive():
-            self._thread.join()
+        self._ros.end()
 
     @property
     def truth(self) -> tuple[Truth, ...]:
@@ -187,7 +183,5 @@ class Simulator:
 
     def on_late(self, lateness: Lateness) -> None:
         """Note steps that are late because of the host; called by the simulator."""
-        late_ms = lateness.late_ns / 1e6
-        text = f"{lateness.steps} steps done {late_ms:.0f} ms late"
         for robot in self.robots.values():
-            robot.note_late(text, lateness.late_ns / NS)
+            robot.note_late(lateness)

@@ -5,7 +5,6 @@ Like that of a robot it comes from memory, and never from a topic or a service.
 
 from __future__ import annotations
 
-import threading
 import time
 from dataclasses import replace
 from operator import attrgetter
@@ -41,19 +40,15 @@ class SimulatedTurtles(TurtleTruth):
         super().__init__()
         world = read_scenario_world(Path(order.world), order.values)
         self._ros = RosTurtles(make_node(context), Turtles(world.turtles), self)
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._ros.run, args=(self._stop,), daemon=True)
         self._asked: list[Asked] = []
 
     def start(self) -> None:
         """Let simulated time run, in a thread of its own."""
-        self._thread.start()
+        self._ros.run_in_thread()
 
     def stop(self) -> None:
         """Stop simulated time; the truth ends here."""
-        self._stop.set()
-        if self._thread.is_alive():
-            self._thread.join()
+        self._ros.end()
 
     @property
     def services(self) -> frozenset[str]:
@@ -90,9 +85,8 @@ class SimulatedTurtles(TurtleTruth):
 
     def on_late(self, lateness: Lateness) -> None:
         """Note steps that are late because of the host; called by the simulation."""
-        late_ms = lateness.late_ns / 1e6
-        text = f"{lateness.steps} steps done {late_ms:.0f} ms late"
-        self.incidents.append(Incident(self.stamp_ns, "late", text, lateness.late_ns / NS))
+        late_s = lateness.late_ns / NS
+        self.incidents.append(Incident(self.stamp_ns, "late", str(lateness), late_s))
 
 
 def _asked_goal(goal: RotationGoal) -> Asked:

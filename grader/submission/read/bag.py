@@ -120,7 +120,7 @@ def _read(
     root: Path, folder: str, given: str, where: tuple[RosInstallation, Sandbox | None]
 ) -> ReadBag:
     path, kills = shown(folder), oom_kills()
-    outcome, data = _READER.run_keeping(root, (str(root / folder), str(_CPU_S)), *where, given)
+    outcome, data = _READER.run(root, (str(root / folder), str(_CPU_S)), *where, given)
     problem = _why_not_read(outcome, path, kills)
     if problem is not None:
         return ReadBag(BagRecord(path, problem))

@@ -57,7 +57,7 @@ def read_cpp(
         given = json.dumps([str(located.root / path) for path in read])
         limits = (str(_FILE_S), str(_TOTAL_S))
         try:
-            outcome = _READER.run(located.root, ("given", *limits), ros, sandbox, given)
+            outcome, _ = _READER.run(located.root, ("given", *limits), ros, sandbox, given)
             lines = outcome.output.split("\n")[:-1]
         except GraderFault as fault:
             # Only what needs it is not judged then.

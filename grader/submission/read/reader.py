@@ -46,24 +46,13 @@ class Reader:
         ros: RosInstallation,
         sandbox: Sandbox | None,
         given: str = "",
-    ) -> Outcome:
-        """Run it.
+    ) -> tuple[Outcome, bytes]:
+        """Run it, and read what it wrote into the file ``kept`` in its working directory.
 
         Args:
             root: The submission's private copy; what the program writes lies beside it meanwhile.
             given: What it finds in the file ``given``, in its working directory.
         """
-        return self.run_keeping(root, arguments, ros, sandbox, given)[0]
-
-    def run_keeping(
-        self,
-        root: Path,
-        arguments: Sequence[str],
-        ros: RosInstallation,
-        sandbox: Sandbox | None,
-        given: str = "",
-    ) -> tuple[Outcome, bytes]:
-        """The same, and what it wrote into the file ``kept`` there."""
         scratch = root.with_name("reading")
         scratch.mkdir()
         (scratch / "given").write_text(given, encoding="ascii")
