@@ -63,8 +63,8 @@ def follows_line(recording: Recording, parameters: FollowsLine) -> Finding:
     left = next((number for number, far_m in enumerate(away) if far_m > within_m), None)
     gone = list(followed_m(line, truth[:left], within_m))
     done_m = gone[-1] if gone else 0.0
-    seen = f"at most {metres(max(away[:left], default=0.0))} from it, along {metres(done_m)} of "
-    seen += metres(whole_m)
+    seen = f"it followed {metres(done_m)} of {metres(whole_m)}, at most "
+    seen += f"{metres(max(away[:left], default=0.0))} off the line"
     last = truth[-1 if left is None else left]
     label = "the run ended" if left is None else "it left the line"
     evidence = evidence_at(recording, label, last.time_ns, plot)

@@ -17,9 +17,10 @@ from grader.spec.quantity import PositiveLength
 class Closes(TurtleParameters):
     """Parameters of turtle.closes."""
 
-    asks = "ends where it began"
-
     position: PositiveLength = Field(0.15, description="How near its ends must be.")
+
+    def _asked(self) -> str:
+        return f"ends within {metres(self.position)} of where it began"
 
 
 @check("turtle.closes", Subject.RECORDING, Closes)
