@@ -384,8 +384,7 @@ _UNTOLD = {
 
 @_lacks.register
 def _(need: needs.OfSimulator, user: _User) -> Iterator[_Lack]:
-    given = user.value(need.about)
-    if need.about and (given is None or need.value not in (None, given)):
+    if not need.applies_to(user.bound.parameters):
         return
     for scenario in user.scenarios:
         if scenario.simulator is not None and getattr(scenario.simulator, need.key) is None:

@@ -9,7 +9,7 @@ from enum import Enum
 from functools import wraps
 from typing import Any, ClassVar
 
-from grader.checks.need import Doubt, Need
+from grader.checks.need import Doubt, Need, OfSimulator
 from grader.findings.finding import Finding, Status
 from grader.findings.value import EXACT, NoSuchField, Tolerance
 from grader.spec.source import Model
@@ -60,8 +60,9 @@ class Parameters(Model):
 
     @property
     def judges_bags(self) -> bool:
-        """Whether a bag has all that it looks at, with these parameters."""
-        return self.of_bags
+        """Whether a bag has all that it looks at, with these parameters: it has no walls."""
+        walls = (need for need in self.needs if isinstance(need, OfSimulator))
+        return self.of_bags and not any(need.applies_to(self) for need in walls)
 
     @property
     def asked_for(self) -> str:

@@ -70,6 +70,11 @@ class OfSimulator(Need):
     value: str | None = None
     """The value with which that parameter needs it; by default any."""
 
+    def applies_to(self, parameters: object) -> bool:
+        """Whether a check with these parameters needs it."""
+        given = getattr(parameters, self.about) if self.about else True
+        return given is not None and self.value in (None, given)
+
 
 @dataclass(frozen=True)
 class Recorded(Need):

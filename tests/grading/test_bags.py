@@ -292,6 +292,11 @@ def with_yaml(tmp_path: Path, old: str, new: str) -> Path:
             "uses: motion.no_contact",
             "'motion.no_contact' looks at more than a bag holds",
         ),
+        (
+            "uses: motion.visits\n    with: {places: [[1, 0], [1, 1], [0, 1]], position: 15 cm}",
+            "uses: motion.follows_line",
+            "'motion.follows_line' looks at more than a bag holds",
+        ),
         ("at_least: 5 Hz}", "at_least: 5 Hz}\n    after: {log: ready}", "which does not show this"),
         ("timeout: 2 min", "timeout: 2 min\n    world: worlds/a.yaml", "leave 'world' out"),
         ("timeout: 2 min", "timeout: 2 min\n    odometry: {enabled: false}", "is not enabled"),

@@ -58,11 +58,6 @@ class Drives(RobotParameters):
         "By default it always counts.",
     )
 
-    @property
-    def judges_bags(self) -> bool:
-        """Whether it need not know what is ahead."""
-        return self.until_distance is None
-
     def _asked(self) -> str:
         how = f"{speed(self.speed)} (within {percent(self.tolerance)})"
         return f"drives at {how} while nothing is near ahead"

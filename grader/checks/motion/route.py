@@ -164,7 +164,6 @@ def _middle(place: Sequence[float], position_m: float) -> tuple[float, float, fl
 class KeepsDistance(RobotParameters):
     """Parameters of motion.keeps_distance."""
 
-    of_bags = False
     needs = (SimulatedRobot(), OfSimulator("map"))
 
     distance: PositiveLength = Field(

@@ -43,7 +43,6 @@ _SCANS = 6
 class Stops(RobotParameters):
     """Parameters of motion.stops."""
 
-    of_bags = False
     needs = (SimulatedRobot(), OfSimulator("map"))
 
     distance: PositiveLength = Field(
@@ -250,7 +249,6 @@ def _set_off(
 class NoContact(RobotParameters):
     """Parameters of motion.no_contact."""
 
-    of_bags = False
     needs = (SimulatedRobot(), OfSimulator("contact"))
 
     asks = "touches nothing"
