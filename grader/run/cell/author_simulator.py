@@ -22,6 +22,7 @@ from grader.recording.tracked import RealTimeFactor, Sighting, truth_of
 from grader.run.cell.graph import GraphObserver
 from grader.run.cell.probe import Probe, import_interface
 from grader.run.cell.signed_messages import Signed, SignedMessages
+from grader.run.cell.simulated import Simulated
 from grader.run.order import AuthorSimulatorOrder
 from grader.spec.unit import format_duration
 from sim.motion import Pose, Twist, wrap_angle
@@ -76,7 +77,7 @@ class TrackedRobot:
             self._contact_ns = time_ns
 
 
-class AuthorSimulator:
+class AuthorSimulator(Simulated):
     """What the cell needs of a simulator, from one that is a program of the author's."""
 
     def __init__(self, probe: Probe, graph: GraphObserver, order: AuthorSimulatorOrder) -> None:
@@ -93,11 +94,15 @@ class AuthorSimulator:
         }
         self._trusted = frozenset(self._topics)
         self._robot = TrackedRobot()
-        self.robots = {"": self._robot}
         self._began_ns = 0
         self._stop_ns = 0
         self._heard: set[str] = set()
         self._factor = RealTimeFactor(_FACTOR_WINDOW_S)
+
+    @property
+    def moving(self) -> tuple[TrackedRobot, ...]:
+        """Its robot."""
+        return (self._robot,)
 
     @property
     def name(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import select
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ from grader.run.cell.ending import EndingConditions, ExitBarrier
 from grader.run.cell.graph import GraphObserver
 from grader.run.cell.probe import Probe
 from grader.run.cell.progress_events import LineTeller, tell
+from grader.run.cell.simulated import Simulated, simulated_by_us
 from grader.run.host.disturbance import DisturbanceMeter, Stopwatch, is_blocked
 from grader.run.host.machine_faults import MachineFaults
 from grader.run.host.watchdog import Watchdog
@@ -34,8 +35,6 @@ from grader.spec.unit import format_duration
 
 if TYPE_CHECKING:
     from grader.run.cell.author_simulator import AuthorSimulator
-    from grader.run.cell.simulator import SimulatedRobot, Simulator
-    from grader.run.cell.turtles import SimulatedTurtles
 
 _TICK_S = 0.05
 _CALM_TICK_S = 0.1
@@ -100,23 +99,14 @@ class Cell:
             )
         self._exit_barrier = ExitBarrier(self._output, self._graph, self._students)
         self._waits: list[Wait] = []
-        self._simulator: Simulator | AuthorSimulator | None = None
-        self._turtles: SimulatedTurtles | None = None
+        self._simulated: Simulated | None = None
         own: AuthorSimulator | None = None
-        driven: Mapping[str, SimulatedRobot] = {}
-        if order.simulator is not None and order.simulator.has_turtles:
-            from grader.run.cell.turtles import SimulatedTurtles
-
-            self._turtles = SimulatedTurtles(probe.node.context, order.simulator)
-        elif order.simulator is not None:
-            from grader.run.cell.simulator import Simulator
-
-            self._simulator = Simulator(probe.node, order.simulator)
-            driven = self._simulator.robots
+        if order.simulator is not None:
+            self._simulated = simulated_by_us(probe.node, order.simulator)
         elif order.author_simulator is not None:
             from grader.run.cell.author_simulator import AuthorSimulator
 
-            self._simulator = own = AuthorSimulator(probe, self._graph, order.author_simulator)
+            self._simulated = own = AuthorSimulator(probe, self._graph, order.author_simulator)
         self._companions: Companions | None = None
         if order.companions:
             self._companions = Companions(order, self._meter, self._graph, own)
@@ -130,13 +120,11 @@ class Cell:
             self._start_again,
             self._waits,
             self._faults,
-            driven,
+            self._simulated.driven if self._simulated is not None else {},
         )
-        self._simulated = self._simulator or self._turtles
         self._player = Player(order.stimuli, self._context)
-        robots = [*(self._simulator.robots.values() if self._simulator else ())]
-        robots += [self._turtles] if self._turtles else []
-        self._ending = EndingConditions(probe, self._output, robots, self._player)
+        moving = self._simulated.moving if self._simulated is not None else ()
+        self._ending = EndingConditions(probe, self._output, moving, self._player)
         self._later: list[ProcessCommand] = []
         self._next_graph = 0.0
         self._launched_ns = 0
@@ -202,7 +190,7 @@ class Cell:
             calls=tuple(sorted(calls, key=lambda call: call.requested_ns)),
             services=self._graph.services,
             clients=self._graph.clients,
-            asked=(*self._context.asked, *(self._turtles.asked if self._turtles else ())),
+            asked=(*self._context.asked, *(self._simulated.asked if self._simulated else ())),
             goals=tuple(self._context.goals),
             waits=tuple(self._waits),
             joins=tuple(self._context.joins.values()),
@@ -215,8 +203,8 @@ class Cell:
             faults=tuple(dict.fromkeys(self._faults)),
             truth=tuple(self._simulated.truth) if self._simulated else (),
             incidents=tuple(self._simulated.incidents) if self._simulated else (),
-            scenes=self._simulator.scenes if self._simulator else {},
-            turtles=tuple(self._turtles.events) if self._turtles else (),
+            scenes=self._simulated.scenes if self._simulated else {},
+            turtles=tuple(self._simulated.events) if self._simulated else (),
             values=self._order.values,
             names=self._order.names,
             environment={
@@ -408,7 +396,7 @@ class Cell:
         matching: list[Any] = [e for e in self._graph.endpoints if self._probe.matches(e)]
         for endpoint in matching:
             self._probe.subscribe_leniently(endpoint)
-        servers = {*self._player.servers, *(self._turtles.services if self._turtles else ())}
+        servers = {*self._player.servers, *(self._simulated.services if self._simulated else ())}
         matching += [one for one in self._graph.clients if one.name in servers]
         for topic in self._player.topics:
             matching += self._context.endpoints(Kind.SUBSCRIPTION, topic)

@@ -14,10 +14,8 @@ from grader.run.process.output import OutputReader
 from grader.run.process.student import StudentProcesses
 
 if TYPE_CHECKING:
-    from grader.run.cell.author_simulator import TrackedRobot
     from grader.run.cell.probe import Probe
-    from grader.run.cell.simulator import SimulatedRobot
-    from grader.run.cell.turtles import SimulatedTurtles
+    from grader.run.cell.simulated import Moving
     from grader.run.stimuli.player import Player
 
 _AFTER_CONTACT_S = 1.0
@@ -30,17 +28,17 @@ class EndingConditions:
         self,
         probe: Probe,
         output: OutputReader,
-        robots: Iterable[SimulatedRobot | SimulatedTurtles | TrackedRobot],
+        moving: Iterable[Moving],
         player: Player,
     ) -> None:
         self._player = player
         self._probe = probe
         self._output = output
-        self._robots = tuple(robots)
+        self._moving = tuple(moving)
 
     def is_over(self) -> bool:
         """Whether a robot has touched something: no verdict can change any more."""
-        return any(robot.in_contact_s > _AFTER_CONTACT_S for robot in self._robots)
+        return any(one.in_contact_s > _AFTER_CONTACT_S for one in self._moving)
 
     def met(self, until: UntilOrder, watch: Stopwatch) -> bool:
         """Whether everything that an ``until`` names holds; one without conditions is never met."""
@@ -51,11 +49,11 @@ class EndingConditions:
             conditions.append(self._quiet_s(watch) >= self._longest_quiet_s(until.quiet_s))
         if until.elapsed_s is not None:
             conditions.append(watch.elapsed_s >= until.elapsed_s)
-        for robot in self._robots:
+        for one in self._moving:
             if until.at_rest_s is not None:
-                conditions.append(robot.at_rest_s >= until.at_rest_s)
+                conditions.append(one.at_rest_s >= until.at_rest_s)
             if until.travelled_m is not None:
-                conditions.append(robot.travelled_m >= until.travelled_m)
+                conditions.append(one.travelled_m >= until.travelled_m)
         if until.stimuli_done:
             conditions.append(self._player.is_done)
         if until.any:

@@ -15,6 +15,7 @@ from rclpy.node import Node
 from grader.assignment.simulation import read_scenario_world
 from grader.recording.model import NS
 from grader.recording.simulated import Filmed, Incident, Scene, Truth
+from grader.run.cell.simulated import Simulated
 from grader.run.order import SimulatorOrder
 from sim.description import RobotOptions, SimulatorOptions
 from sim.motion import Pose, Twist
@@ -139,7 +140,7 @@ class SimulatedRobot:
             self._contact_ns = stamp_ns
 
 
-class Simulator:
+class Simulator(Simulated):
     """The robots of a run in their world, driven by what the student publishes."""
 
     def __init__(self, node: Node, order: SimulatorOrder) -> None:
@@ -159,6 +160,16 @@ class Simulator:
     def stop(self) -> None:
         """Stop simulated time; the truth ends here."""
         self._ros.end()
+
+    @property
+    def moving(self) -> tuple[SimulatedRobot, ...]:
+        """Its robots."""
+        return tuple(self.robots.values())
+
+    @property
+    def driven(self) -> dict[str, SimulatedRobot]:
+        """All of them."""
+        return self.robots
 
     @property
     def truth(self) -> tuple[Truth, ...]:

@@ -37,6 +37,11 @@ class TurtleTruth:
         """Simulated seconds at rest since one last moved; 0 while one moves or none has moved."""
         return (self.stamp_ns - self._rest_since_ns) / NS if self._rest_since_ns else 0.0
 
+    @property
+    def in_contact_s(self) -> float:
+        """A wall that is hit ends nothing: turtles go on along it."""
+        return 0.0
+
     def keep(self, step: Step, stamp_ns: int, background: Colour) -> None:
         """Keep a step."""
         self.stamp_ns = stamp_ns

@@ -16,7 +16,8 @@ from rclpy.context import Context
 from grader.assignment.simulation import read_scenario_world
 from grader.recording.interaction import Asked
 from grader.recording.model import NS
-from grader.recording.simulated import Incident
+from grader.recording.simulated import Incident, Truth, TurtleEvent
+from grader.run.cell.simulated import Simulated
 from grader.run.cell.turtle_truth import TurtleTruth
 from grader.run.order import SimulatorOrder
 from grader.run.stimuli.filling import plain
@@ -30,14 +31,14 @@ if TYPE_CHECKING:
 _MOST_ASKED = 5_000
 
 
-class SimulatedTurtles(TurtleTruth):
+class SimulatedTurtles(Simulated):
     """Turtles on their canvas, driven by what the student sends; keeps every step so far."""
 
     def __init__(self, context: Context, order: SimulatorOrder) -> None:
         # The interfaces of turtlesim may lie in an underlay that the cell has found by now.
         from sim.turtles.node import RosTurtles, make_node
 
-        super().__init__()
+        self._seen = TurtleTruth()
         world = read_scenario_world(Path(order.world), order.values)
         self._ros = RosTurtles(make_node(context), Turtles(world.turtles), self)
         self._asked: list[Asked] = []
@@ -56,13 +57,28 @@ class SimulatedTurtles(TurtleTruth):
         return self._ros.services
 
     @property
-    def in_contact_s(self) -> float:
-        """A wall that is hit ends nothing: turtles go on along it."""
-        return 0.0
+    def moving(self) -> tuple[TurtleTruth, ...]:
+        """All turtles together."""
+        return (self._seen,)
+
+    @property
+    def truth(self) -> list[Truth]:
+        """Every step so far of all turtles, oldest first."""
+        return self._seen.truth
+
+    @property
+    def incidents(self) -> list[Incident]:
+        """What happened so far, oldest first."""
+        return self._seen.incidents
+
+    @property
+    def events(self) -> list[TurtleEvent]:
+        """What happened besides motion."""
+        return self._seen.events
 
     def on_step(self, step: Step, stamp_ns: int) -> None:
         """Keep the truth; called by the simulation."""
-        self.keep(step, stamp_ns, self._ros.background)
+        self._seen.keep(step, stamp_ns, self._ros.background)
 
     def on_answer(self, request: Request, response: Any) -> None:
         """Keep what was asked, and what the answer is."""
@@ -86,7 +102,7 @@ class SimulatedTurtles(TurtleTruth):
     def on_late(self, lateness: Lateness) -> None:
         """Note steps that are late because of the host; called by the simulation."""
         late_s = lateness.late_ns / NS
-        self.incidents.append(Incident(self.stamp_ns, "late", str(lateness), late_s))
+        self.incidents.append(Incident(self._seen.stamp_ns, "late", str(lateness), late_s))
 
 
 def _asked_goal(goal: RotationGoal) -> Asked:
