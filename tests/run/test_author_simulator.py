@@ -70,6 +70,8 @@ class Driver(Node):
         self.start = None
 
     def drive(self):
+        if not self.publisher.get_subscription_count():
+            return
         now = self.get_clock().now().nanoseconds / 1e9
         self.start = self.start or now
         command = Twist()
@@ -98,6 +100,7 @@ print("found:", found)
 rclpy.init()
 """,
 ).format(lasts=2.0, more="pass", also="pass")
+AT_REST = {"at_rest": "1 s"}
 GIVEN: dict[str, Any] = {
     "package": "course_sim",
     "executable": "small_simulator",
@@ -128,7 +131,7 @@ def beside_simulator(run_node: RunNode, tmp_path: Path) -> RunNode:
         source: str = driver(),
         program: str | None = None,
         more: Any = (),
-        elapsed: str = "4 s",
+        until: Any = AT_REST,
         **own: Any,
     ) -> Recording:
         if program is not None:
@@ -139,7 +142,7 @@ def beside_simulator(run_node: RunNode, tmp_path: Path) -> RunNode:
             underlays=(*more, course),
             simulator={**GIVEN, **own},
             launch=[{"executable": "bot_pub", "parameters": {"use_sim_time": True}}],
-            until={"elapsed": elapsed},
+            until=until,
             timeout="15 s",
         )
 
@@ -191,7 +194,7 @@ def test_a_forged_truth_does_not_count_and_is_said(simulate: RunNode) -> None:
 def test_a_simulator_that_fails_in_a_run_is_no_fault_of_the_student_s(
     simulate: RunNode, parameters: dict[str, float], fault: str
 ) -> None:
-    run = simulate(driver(), parameters=parameters, elapsed="12 s")
+    run = simulate(driver(), parameters=parameters, until={"elapsed": "12 s"})
     assert run.ending is Ending.FAULT
     assert fault in run.faults[0]
 
@@ -217,7 +220,7 @@ def test_a_simulator_that_never_gets_ready_is_an_error(
 
 
 def test_a_simulator_that_is_silent_at_the_end_is_an_error_as_well(simulate: RunNode) -> None:
-    run = simulate(driver(), parameters={"silent_after": 4.0}, elapsed="5 s")
+    run = simulate(driver(), parameters={"silent_after": 4.0}, until={"elapsed": "5 s"})
     assert "has published nothing on /model/pose for" in run.faults[0]
 
 
