@@ -142,6 +142,7 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
             work(0)
             repeats: Counter[str] = Counter()
             before_s, own_s = runner.cpu_s, time.process_time()
+            students_s = runner.students_cpu_s
             began_s = time.monotonic()
             with ThreadPoolExecutor(max_workers=runner.admission.most) as pool:
                 futures = [pool.submit(work, number) for number in range(count)]
@@ -151,8 +152,11 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
                         print(f"{name}: {number} of {count}", file=sys.stderr, flush=True)
             wall_s = time.monotonic() - began_s
             cpu_s = runner.cpu_s - before_s + time.process_time() - own_s
+            students_s = runner.students_cpu_s - students_s
         samples[f"batch of {name}: submissions per minute"].append(60 * count / wall_s)
         samples[f"batch of {name}: CPU of each"].append(cpu_s / count)
+        samples[f"batch of {name}: CPU of each that is ours"].append((cpu_s - students_s) / count)
+        samples[f"batch of {name}: ours to the students' own"].append(cpu_s / students_s - 1)
         samples[f"batch of {name}: runs repeated"].append(repeats.total())
         for why, number in repeats.most_common():
             print(f"{name}: {number} times run again: {why}", file=sys.stderr)

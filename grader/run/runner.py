@@ -332,12 +332,14 @@ class Runner:
         sandbox: What cells and students run in, or None.
         verbose: Tell what the student's processes print, as progress.
         cpu_s: CPU time of all cells so far.
+        students_cpu_s: That of the student's processes in them.
     """
 
     ros: RosInstallation
     admission: Admission = field(default_factory=Admission)
     progress: Progress = lambda _scenario, _event: None
     cpu_s: float = 0.0
+    students_cpu_s: float = 0.0
     sandbox: Sandbox | None = None
     verbose: bool = False
     _ready: list[CellProcess] = field(default_factory=list)
@@ -364,6 +366,7 @@ class Runner:
         """
         with self.admission.cell(alone=alone) as ticket:
             cell = self._take_cell(request.scenario)
+            students_cpu_s = 0.0
             try:
                 order = self._order(request, cell)
                 recording.parent.mkdir(parents=True, exist_ok=True)
@@ -372,6 +375,7 @@ class Runner:
                     for event in cell.run(order):
                         if event["event"] in _STARTED_EVENTS:
                             ticket.started()
+                        students_cpu_s = event.get("students_cpu_s", 0.0)
                         self.progress(order.scenario, event)
                 except MiddlewareHung:
                     hung = hung_recording(order, request.submission, launched_ns)
@@ -383,6 +387,7 @@ class Runner:
                 with self._lock:
                     self._cells.discard(cell)
                     self.cpu_s += cell.cpu_s
+                    self.students_cpu_s += students_cpu_s
 
     def __enter__(self) -> Runner:
         return self

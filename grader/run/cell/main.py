@@ -65,7 +65,8 @@ def _keep(recording: Recording, probe: Probe, order: CellOrder, folder: Path) ->
     write_recording(
         folder / RECORDING_FILE, recording, messages, definitions, order.submission.encode()
     )
-    tell("recorded")
+    used = os.times()
+    tell("recorded", students_cpu_s=used.children_user + used.children_system)
 
 
 def main(folder: Path, avoid_domains: tuple[int, ...], rights: Rights | None = None) -> int:
