@@ -22,7 +22,7 @@ from grader.machine.resources import cache_folder
 from grader.recording.mcap_reader import read_recording
 from grader.run.replay import replay as replay_recording
 from grader.run.replay import replay_scenario
-from grader.run.runner import RunRequest
+from grader.run.request import RunRequest
 from grader.submission.intake.locate import check_path
 from grader.submission.prepare import Preparation, prepare
 

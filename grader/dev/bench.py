@@ -39,7 +39,8 @@ from grader.report.files import write_whole
 from grader.report.model.facts import Clock
 from grader.run.admission import Admission
 from grader.run.cell.domain import lock_domain
-from grader.run.runner import Runner, RunRequest
+from grader.run.request import RunRequest
+from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose
 from grader.submission.prepare import Preparation, Prepared, prepare

@@ -23,7 +23,7 @@ from grader.recording.model import Recording, to_json
 from grader.recording.submission import BagRecord, SubmissionRecord
 from grader.report.files import write_whole
 from grader.run.from_bag import BagOrder, record_bag
-from grader.run.runner import RunRequest, scenario_seed
+from grader.run.request import RunRequest, scenario_seed
 from grader.submission.prepare import Prepared
 
 _LONGEST_WORDS = 300

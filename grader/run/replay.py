@@ -19,7 +19,8 @@ from grader.machine.scratch import Scratch
 from grader.recording.mcap_reader import read_inputs, read_recording
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import NS, Ending, Kind, Owner, Qos, Recording
-from grader.run.runner import Runner, RunRequest
+from grader.run.request import RunRequest
+from grader.run.runner import Runner
 from grader.spec.safe_text import clean, one_line
 
 if TYPE_CHECKING:

@@ -37,7 +37,8 @@ from grader.recording.mcap_writer import write_recording
 from grader.recording.model import Ending, Endpoint, Kind, Node, Owner, Qos, Recording
 from grader.recording.submission import BuildRecord, PackageRecord, SubmissionRecord
 from grader.report.model.facts import Clock
-from grader.run.runner import Runner, RunRequest
+from grader.run.request import RunRequest
+from grader.run.runner import Runner
 from grader.spec.names import Names, Thing, WrongName
 from grader.submission.build.colcon import BuildLimits
 from grader.submission.prepare import Preparation, Prepared

@@ -17,7 +17,8 @@ from grader.recording.model import Recording
 from grader.recording.submission import SubmissionRecord
 from grader.run.imposing.mistake import Mistake
 from grader.run.process.descendants import command_line
-from grader.run.runner import Runner, RunRequest
+from grader.run.request import RunRequest
+from grader.run.runner import Runner
 from grader.spec.names import NO_NAMES, Names
 
 PACKAGE, EXECUTABLE = "bot_publisher", "bot_pub"

@@ -9,7 +9,7 @@ from pathlib import Path
 from grader.machine import ros
 from grader.recording.mcap_reader import read_recording
 from grader.run.replay import replay, replay_scenario
-from grader.run.runner import RunRequest
+from grader.run.request import RunRequest
 from tests.run.conftest import SUBMISSION, assignment
 
 if __name__ == "__main__":

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from grader.machine import ros
 from grader.recording.mcap_reader import read_recording
-from grader.run.runner import Runner, RunRequest
+from grader.run.request import RunRequest
+from grader.run.runner import Runner
 from tests.run import nodes
 from tests.run.conftest import SUBMISSION, assignment, install
 

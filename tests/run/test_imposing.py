@@ -9,7 +9,7 @@ import pytest
 
 from grader.machine import resources
 from grader.run.imposing.mistake import Mistake
-from grader.run.runner import RunRequest
+from grader.run.request import RunRequest
 from grader.spec.names import Names, Thing, WrongName
 from tests.run.conftest import EXECUTABLE, RunNode
 

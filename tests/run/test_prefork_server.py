@@ -21,7 +21,8 @@ from grader.recording.mcap_reader import read_recording
 from grader.run.cell.cell_process import CellProcess
 from grader.run.cell.prefork_server import PreforkServer
 from grader.run.process.descendants import descendants
-from grader.run.runner import Runner, RunRequest
+from grader.run.request import RunRequest
+from grader.run.runner import Runner
 from grader.sandbox import bubblewrap
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
@@ -45,7 +46,7 @@ def prefork_servers() -> set[int]:
     return {
         pid
         for pid, command in descendants(os.getpid()).items()
-        if "grader.run.cell.prefork_server" in command
+        if "grader.run.cell.prefork_process" in command
         and f"PPid:\t{os.getpid()}\n" in Path(f"/proc/{pid}/status").read_text()
     }
 
@@ -113,11 +114,11 @@ def test_no_cell_is_made_where_files_of_the_students_python_were_deleted(
     prefork_server = PreforkServer(ros.find(), sandbox)
     check = sandbox.watched()
     check()
-    assert prefork_server.is_alive
+    assert prefork_server.is_usable
     next(sandbox.python_tree.glob("lib/python3*/site-packages/rclpy/node.py")).unlink()
     with pytest.raises(GraderFault, match="files of the sandbox's Python were deleted"):
         check()
-    assert not prefork_server.is_alive
+    assert not prefork_server.is_usable
     prefork_server.close()
 
 

@@ -17,7 +17,8 @@ from grader.machine.scratch import PREFIX
 from grader.recording.mcap_reader import read_inputs, read_recording
 from grader.recording.model import NS
 from grader.run.replay import replay_scenario
-from grader.run.runner import Runner, RunRequest
+from grader.run.request import RunRequest
+from grader.run.runner import Runner
 from tests.recording.written import write_robot_run
 from tests.run.conftest import SUBMISSION, assignment, install, running
 from tests.run.nodes import HEADER

@@ -14,7 +14,7 @@ from grader.findings.finding import Status
 from grader.machine import ros
 from grader.machine.ros import RosInstallation
 from grader.recording.model import Ending
-from grader.run.runner import launch_file_program, with_shares
+from grader.run.programs import launch_file_program, with_shares
 from grader.run.stimuli.parameters import next_call_s
 from tests.checks.builder import judge
 from tests.run.conftest import RunNode

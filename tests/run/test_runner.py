@@ -15,7 +15,7 @@ class FakeServer:
     """A prefork server whose cells run on."""
 
     def __init__(self, *_: object) -> None:
-        self.is_alive = True
+        self.is_usable = True
         self.is_closed = False
 
     def close(self) -> None:
@@ -32,7 +32,7 @@ def test_cells_that_run_keep_their_folders_where_a_prefork_server_is_replaced(
     runner = Runner(ros.RosInstallation("wheels", Path("python"), ()))
     first = runner._new_cell(())
     assert isinstance(first, FakeServer)
-    first.is_alive = False
+    first.is_usable = False
     second = runner._new_cell(())
     assert isinstance(second, FakeServer)
     assert second is not first

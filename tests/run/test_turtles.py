@@ -14,7 +14,8 @@ from grader.machine.resources import cache_folder
 from grader.measure.turtle.drawing import drawn
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Ending, Owner, Recording
-from grader.run.runner import Runner, RunRequest
+from grader.run.request import RunRequest
+from grader.run.runner import Runner
 from grader.submission.underlay.store import UnderlayStore
 from tests.run.conftest import SUBMISSION, assignment, install
 

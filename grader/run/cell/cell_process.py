@@ -15,7 +15,8 @@ from typing import Any
 
 from grader.errors import GraderFault
 from grader.run.cell.middleware_hang import ENDED_BY, MiddlewareHung
-from grader.run.cell.prefork_server import STATUS, PreforkServer, readable
+from grader.run.cell.prefork_protocol import Report, read_report, readable
+from grader.run.cell.prefork_server import PreforkServer
 from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
 from grader.run.process.descendants import kill_by_variable
 
@@ -57,15 +58,15 @@ class CellProcess:
         request = {"arguments": [str(self.folder), *avoid], "imports": list(imports)}
         in_read, in_write = os.pipe()
         out_read, out_write = os.pipe()
-        self._status, status_write = os.pipe()
-        theirs = (in_read, out_write, status_write)
+        self._reports, reports_write = os.pipe()
+        theirs = (in_read, out_write, reports_write)
         try:
             with self._errors.open("wb") as errors:
                 self._server.give(self.folder)
-                descriptors = [in_read, out_write, errors.fileno(), status_write]
+                descriptors = [in_read, out_write, errors.fileno(), reports_write]
                 self._server.request(request, descriptors)
         except OSError as error:
-            for descriptor in (in_write, out_read, self._status):
+            for descriptor in (in_write, out_read, self._reports):
                 os.close(descriptor)
             raise GraderFault(f"the process starting runs has ended: {error.strerror}") from error
         finally:
@@ -139,9 +140,9 @@ class CellProcess:
             if self.returncode is None:
                 self.await_fork(limit_s)
                 # There is no status when the prefork server itself was killed.
-                status = self._read_status(limit_s)
-                self.returncode, self.cpu_s = status or (-signal.SIGKILL, 0.0)
-                os.close(self._status)
+                ended = self._await_report(limit_s) or Report(-signal.SIGKILL, 0.0)
+                self.returncode, self.cpu_s = ended
+                os.close(self._reports)
 
     def _kill(self) -> None:
         with self._waiting:
@@ -153,11 +154,10 @@ class CellProcess:
     def await_fork(self, limit_s: float | None = None) -> None:
         """Wait until :attr:`pid` is known, or the prefork server has ended."""
         if self.pid is None:
-            status = self._read_status(limit_s)
-            self.pid = status and status[0]
+            started = self._await_report(limit_s)
+            self.pid = started and started.value
 
-    def _read_status(self, limit_s: float | None) -> tuple[int, float] | None:
-        if not readable((self._status,), limit_s):
+    def _await_report(self, limit_s: float | None) -> Report | None:
+        if not readable((self._reports,), limit_s):
             raise subprocess.TimeoutExpired("cell", limit_s or 0.0)
-        data = os.read(self._status, STATUS.size)
-        return STATUS.unpack(data) if data else None
+        return read_report(self._reports)
