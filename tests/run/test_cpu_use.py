@@ -15,20 +15,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.run.host.disturbance import (
-    CpuMeter,
-    CpuTimes,
-    DisturbanceMeter,
-    Interval,
-    Scheduled,
-    Stopwatch,
-    Waits,
-    beyond,
-    interval,
-    others_share,
-    scheduled,
-    uncounted,
-)
+from grader.run.host.cpu_times import CpuMeter, CpuTimes, Interval, interval, others_share
+from grader.run.host.disturbance import DisturbanceMeter
+from grader.run.host.run_delay import Scheduled, Waits, beyond, scheduled, uncounted
+from grader.run.host.stopwatch import Stopwatch
 from grader.run.process.descendants import Family
 from grader.sandbox.usage import idle_ticks
 

@@ -20,8 +20,10 @@ from grader.run.cell.graph import GraphObserver
 from grader.run.cell.probe import Probe
 from grader.run.cell.progress_events import LineTeller, tell
 from grader.run.cell.simulated import Simulated, simulated_by_us
-from grader.run.host.disturbance import DisturbanceMeter, Stopwatch, is_blocked
+from grader.run.host.disturbance import DisturbanceMeter
 from grader.run.host.machine_faults import MachineFaults
+from grader.run.host.run_delay import is_blocked
+from grader.run.host.stopwatch import Stopwatch
 from grader.run.host.watchdog import Watchdog
 from grader.run.order import CellOrder, ProcessCommand
 from grader.run.process.descendants import Family
@@ -79,7 +81,8 @@ class Cell:
         self._has_node = False
         # Later a program could pretend to wait, as the parent of a vfork(2) does.
         self._meter = DisturbanceMeter(
-            Family(os.getpid()).look, blocked=lambda pid: not self._has_node and is_blocked(pid)
+            Family(os.getpid()).look,
+            is_blocked=lambda pid: not self._has_node and is_blocked(pid),
         )
         self._students = StudentProcesses(self._output, self._meter, order.process_sandbox)
         self._other_domains: tuple[int, ...] = ()

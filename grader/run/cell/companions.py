@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from grader.recording.model import NS, Owner
 from grader.run.cell.graph import GraphObserver
-from grader.run.host.disturbance import DisturbanceMeter, Stopwatch
+from grader.run.host.disturbance import DisturbanceMeter
+from grader.run.host.stopwatch import Stopwatch
 from grader.run.order import CellOrder
 from grader.run.process.output import OutputReader
 from grader.run.process.student import StudentProcesses

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from grader.recording.model import NS, Owner
 from grader.run.cell.graph import GraphObserver
-from grader.run.host.disturbance import Stopwatch
+from grader.run.host.stopwatch import Stopwatch
 from grader.run.order import UntilOrder
 from grader.run.process.output import OutputReader
 from grader.run.process.student import StudentProcesses

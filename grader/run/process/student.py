@@ -14,7 +14,8 @@ from pathlib import Path
 
 from grader.recording.event import Breach
 from grader.recording.model import NS, Process
-from grader.run.host.disturbance import DisturbanceMeter, Stopwatch
+from grader.run.host.disturbance import DisturbanceMeter
+from grader.run.host.stopwatch import Stopwatch
 from grader.run.order import RunLimits
 from grader.run.process.descendants import (
     descendant_pids,

@@ -8,7 +8,7 @@ from typing import Any
 from grader.assignment.stimuli.kinds.request import CallService, Lifecycle
 from grader.recording.interaction import NO_SERVER
 from grader.recording.model import NS
-from grader.run.host.disturbance import Stopwatch
+from grader.run.host.stopwatch import Stopwatch
 from grader.run.stimuli.context import Patience, Playing, StimulusContext, plays
 
 _POLL_S = 0.02

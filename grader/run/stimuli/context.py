@@ -13,7 +13,8 @@ from grader.recording.interaction import EXECUTOR_SERVICES, Asked, Goal
 from grader.recording.model import NS, Endpoint, Join, Kind, Owner
 from grader.run.cell.graph import GraphObserver
 from grader.run.cell.probe import Probe
-from grader.run.host.disturbance import DisturbanceMeter, Stopwatch
+from grader.run.host.disturbance import DisturbanceMeter
+from grader.run.host.stopwatch import Stopwatch
 from grader.run.order import RunLimits
 from grader.run.process.student import StudentProcesses
 from grader.run.stimuli.service_calls import ServiceCalls

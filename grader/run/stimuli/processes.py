@@ -7,7 +7,7 @@ import time
 
 from grader.assignment.stimuli.kinds.process import Kill, Restart
 from grader.recording.event import Intervention
-from grader.run.host.disturbance import Stopwatch
+from grader.run.host.stopwatch import Stopwatch
 from grader.run.stimuli.context import Playing, StimulusContext, plays
 
 
