@@ -120,9 +120,6 @@ class AuthorSimulator(Simulated):
         self._robot.seen = self._robot.seen[-1:]
         self._factor = RealTimeFactor(_FACTOR_WINDOW_S)
 
-    def start(self) -> None:
-        """Nothing: its time has run since it was started."""
-
     def stop(self) -> None:
         """The truth ends here."""
         self.look()

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from grader.recording.event import Pause, Wait
+from grader.recording.event import Breach, Pause, Wait
 from grader.recording.model import NS, Ending, Endpoint, Kind, Owner, Recording
 from grader.recording.submission import SubmissionRecord
 from grader.run.cell.companions import Companions
@@ -102,17 +102,18 @@ class Cell:
             )
         self._exit_barrier = ExitBarrier(self._output, self._graph, self._students)
         self._waits: list[Wait] = []
-        self._simulated: Simulated | None = None
-        own: AuthorSimulator | None = None
+        self._simulated = Simulated()
+        author_simulator: AuthorSimulator | None = None
         if order.simulator is not None:
             self._simulated = simulated_by_us(probe.node, order.simulator)
         elif order.author_simulator is not None:
             from grader.run.cell.author_simulator import AuthorSimulator
 
-            self._simulated = own = AuthorSimulator(probe, self._graph, order.author_simulator)
+            author_simulator = AuthorSimulator(probe, self._graph, order.author_simulator)
+            self._simulated = author_simulator
         self._companions: Companions | None = None
         if order.companions:
-            self._companions = Companions(order, self._meter, self._graph, own)
+            self._companions = Companions(order, self._meter, self._graph, author_simulator)
         self._faults: list[str] = []
         self._context = StimulusContext(
             probe,
@@ -123,14 +124,14 @@ class Cell:
             self._start_again,
             self._waits,
             self._faults,
-            self._simulated.driven if self._simulated is not None else {},
+            self._simulated.driven,
         )
         self._player = Player(order.stimuli, self._context)
-        moving = self._simulated.moving if self._simulated is not None else ()
-        self._ending = EndingConditions(probe, self._output, moving, self._player)
+        self._ending = EndingConditions(probe, self._output, self._simulated.moving, self._player)
         self._later: list[ProcessCommand] = []
         self._next_graph = 0.0
-        self._launched_ns = 0
+        self._launched_ns = self._stop_ns = 0
+        self._pauses: tuple[Pause, ...] = ()
         self._matched_ns: int | None = None
 
     def run(self) -> Recording:
@@ -142,79 +143,85 @@ class Cell:
         self._launched_ns = time.time_ns()
         try:
             ending = self._start_companions() or self._observe()
-            self._probe.recording = False
-            stop_ns = time.time_ns()
-            self._player.finish()
-            if self._simulated is not None:
-                # With its last command it would drive on while nothing steers it.
-                self._simulated.stop()
-            pauses = self._pause() if self._order.pauses else ()
-            tell("stopping")
-            self._students.stop(self._order.limits)
-            if self._companions is not None:
-                self._faults += self._companions.stop()
+            self._stop()
         finally:
-            self._students.clean_up()
-            if self._companions is not None:
-                self._companions.clean_up()
-            self._faults += self._students.faults()
-            breaches = self._watchdog.stop() if self._watchdog is not None else ()
-        written = self._output.close(_PIPES_LIMIT_S)
-        log = sorted((*written, *self._probe.logs), key=lambda line: line.time_ns)
-        disturbance = self._meter.stop()
-        processes, lines, declarations = launched(
-            {one.name for one in self._order.commands if one.is_launch_file},
-            stop_ns,
+            breaches = self._clean_up()
+        recording = self._recording(ending, breaches)
+        ended = machine_faults.out_of_memory(recording.processes, breaches)
+        ended = ended or self._students.ended_from_outside(breaches)
+        self._faults += filter(None, (machine_faults.clock_was_set(), ended))
+        return replace(recording, faults=tuple(dict.fromkeys(self._faults)))
+
+    def _stop(self) -> None:
+        """End the observation, and then the programs."""
+        self._probe.recording = False
+        self._stop_ns = time.time_ns()
+        self._player.finish()
+        # With its last command a robot would drive on while nothing steers it.
+        self._simulated.stop()
+        if self._order.pauses:
+            self._pauses = self._pause()
+        tell("stopping")
+        self._students.stop(self._order.limits)
+        if self._companions is not None:
+            self._faults += self._companions.stop()
+
+    def _clean_up(self) -> tuple[Breach, ...]:
+        """Leave nothing of the programs behind; returns which limits they passed."""
+        self._students.clean_up()
+        if self._companions is not None:
+            self._companions.clean_up()
+        self._faults += self._students.faults()
+        return self._watchdog.stop() if self._watchdog is not None else ()
+
+    def _recording(self, ending: Ending, breaches: tuple[Breach, ...]) -> Recording:
+        printed = self._output.close(_PIPES_LIMIT_S)
+        processes, log, declarations = launched(
+            {command.name for command in self._order.commands if command.is_launch_file},
+            self._stop_ns,
             self._students.records(),
-            log,
+            sorted((*printed, *self._probe.logs), key=lambda line: line.time_ns),
             self._output.declarations,
         )
-        out_of_memory = machine_faults.out_of_memory(processes, breaches)
-        ended = out_of_memory or self._students.ended_from_outside(breaches)
-        found = (machine_faults.clock_was_set(), ended)
-        self._faults += [fault for fault in found if fault is not None]
-        others = ", ".join(map(str, self._other_domains))
-        calls = [call for call in self._probe.calls if call.requested_ns <= stop_ns]
+        calls = [call for call in self._probe.calls if call.requested_ns <= self._stop_ns]
         calls += self._context.calls.calls
+        environment = {**self._order.environment, "domain_id": str(self._domain_id)}
+        if self._other_domains:
+            environment["other_domains"] = ", ".join(map(str, self._other_domains))
         return Recording(
             scenario=self._order.scenario,
             seed=self._order.seed,
             ending=ending,
             launched_ns=self._launched_ns,
             matched_ns=self._matched_ns,
-            stop_ns=stop_ns,
+            stop_ns=self._stop_ns,
             end_ns=time.time_ns(),
             submission=SubmissionRecord(id="", sha256=""),
             nodes=self._graph.nodes,
             endpoints=tuple(map(self._with_heartbeats, self._graph.endpoints)),
             processes=processes,
-            log=lines,
+            log=log,
             declarations=declarations,
             calls=tuple(sorted(calls, key=lambda call: call.requested_ns)),
             services=self._graph.services,
             clients=self._graph.clients,
-            asked=(*self._context.asked, *(self._simulated.asked if self._simulated else ())),
+            asked=(*self._context.asked, *self._simulated.asked),
             goals=tuple(self._context.goals),
             waits=tuple(self._waits),
             joins=tuple(self._context.joins.values()),
-            pauses=pauses,
+            pauses=self._pauses,
             interventions=tuple(self._context.interventions),
             breaches=breaches,
             sent=dict.fromkeys(self._player.topics, ()),
             answers=self._player.answers,
-            disturbance=disturbance,
-            faults=tuple(dict.fromkeys(self._faults)),
-            truth=tuple(self._simulated.truth) if self._simulated else (),
-            incidents=tuple(self._simulated.incidents) if self._simulated else (),
-            scenes=self._simulated.scenes if self._simulated else {},
-            turtles=tuple(self._simulated.events) if self._simulated else (),
+            disturbance=self._meter.stop(),
+            truth=tuple(self._simulated.truth),
+            incidents=tuple(self._simulated.incidents),
+            scenes=self._simulated.scenes,
+            turtles=tuple(self._simulated.events),
             values=self._order.values,
             names=self._order.names,
-            environment={
-                **self._order.environment,
-                "domain_id": str(self._domain_id),
-                **({"other_domains": others} if others else {}),
-            },
+            environment=environment,
         )
 
     def _with_heartbeats(self, endpoint: Endpoint) -> Endpoint:
@@ -253,14 +260,13 @@ class Cell:
 
     def _observe(self) -> Ending:
         # The first to start is the last.
-        self._later = sorted(self._order.commands, key=lambda one: one.after_s)[::-1]
+        self._later = sorted(self._order.commands, key=lambda command: command.after_s)[::-1]
         ending = self._launch()
         ending = ending or self._await_sandboxes() or self._await_node() or self._await_match()
         if ending is None:
             tell("matched", limit_s=self._order.limits.timeout_s)
             self._player.begin()
-            if self._simulated is not None:
-                self._simulated.start()
+            self._simulated.start()
             ending = self._await_until()
         if self._order.process_sandbox is not None:
             self._other_domains = tuple(d for d in joined_domains() if d != self._domain_id)
@@ -281,16 +287,20 @@ class Cell:
             return (Pause(began_ns, began_ns),)
         self._students.pause()
         for watch in self._ticks():
-            paused = (one for one in self._output.declarations if one.kind == "paused")
-            told_ns = [one.time_ns for one in paused if one.time_ns >= began_ns]
-            since_s = (time.time_ns() - max(told_ns)) / NS if told_ns else 0.0
-            if not told_ns:
+            paused_ns = [
+                declared.time_ns
+                for declared in self._output.declarations
+                if declared.kind == "paused" and declared.time_ns >= began_ns
+            ]
+            if not paused_ns:
                 # Wakes executors that wait for nothing else.
                 for node in self._graph.nodes:
                     self._probe.call_executor(node.name, "list_parameters")
-            if since_s > length_s or watch.elapsed_s > _UNTIL_PAUSED_S + length_s:
+            elif time.time_ns() - max(paused_ns) > length_s * NS:
                 break
-        received = {name: tuple(found) for name, found in self._probe.afterwards.items()}
+            if watch.elapsed_s > _UNTIL_PAUSED_S + length_s:
+                break
+        received = {name: tuple(times) for name, times in self._probe.afterwards.items()}
         return (Pause(began_ns, time.time_ns(), received),)
 
     def _launch(self, since_launch_s: float = 0.0) -> Ending | None:
@@ -399,8 +409,8 @@ class Cell:
         matching: list[Any] = [e for e in self._graph.endpoints if self._probe.matches(e)]
         for endpoint in matching:
             self._probe.subscribe_leniently(endpoint)
-        servers = {*self._player.servers, *(self._simulated.services if self._simulated else ())}
-        matching += [one for one in self._graph.clients if one.name in servers]
+        servers = {*self._player.servers, *self._simulated.services}
+        matching += [client for client in self._graph.clients if client.name in servers]
         for topic in self._player.topics:
             matching += self._context.endpoints(Kind.SUBSCRIPTION, topic)
         if matching and self._matched_ns is None:

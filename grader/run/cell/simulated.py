@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -32,29 +31,30 @@ class Moving(Protocol):
         """Length of its path so far."""
 
 
-class Simulated(ABC):
-    """A simulation in a cell. Its truth comes from memory, or from messages of known publishers."""
+class Simulated:
+    """A simulation in a cell; by itself one in which nothing moves.
+
+    Its truth comes from memory, or from messages of known publishers.
+    """
 
     @property
-    @abstractmethod
     def moving(self) -> Sequence[Moving]:
         """What moves in it."""
+        return ()
 
     @property
-    @abstractmethod
     def truth(self) -> Sequence[Truth]:
         """Every step so far, oldest first."""
+        return ()
 
     @property
-    @abstractmethod
     def incidents(self) -> Sequence[Incident]:
         """What happened so far, oldest first."""
+        return ()
 
-    @abstractmethod
     def start(self) -> None:
         """Let simulated time begin."""
 
-    @abstractmethod
     def stop(self) -> None:
         """The truth ends here."""
 
