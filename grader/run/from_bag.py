@@ -37,15 +37,13 @@ from grader.recording.model import (
 from grader.recording.odometry import Timed, jump, motion, rejected
 from grader.recording.simulated import Scene
 from grader.recording.submission import BagRecord, SubmissionRecord
+from grader.run.bag_clocks import clocks_set_back, other_clocks
 from grader.spec.unit import format_duration
 from sim.robot import robot_model
 
 if TYPE_CHECKING:
     from grader.assignment.model import Scenario
 
-_SAME_CLOCK_S = 2.0
-"""Stamps in headers that are farther from a bag's own times come from another clock."""
-_MOST_SAMPLES = 50
 _NODE = "unknown node"
 """A bag does not say who published."""
 
@@ -90,12 +88,13 @@ class _Reading:
         self._rename = order.scenario.bag.rename
         self._find = definition_finder(order.prefixes)
         self._notes: list[str] = []
-        every = self._messages()
+        messages = self._messages()
         # A static transform is published long before a bag begins, and recorded when it does.
-        late_ns = [one.recorded_ns - one.published_ns for one in every]
-        self._late_ns = round(statistics.median(late_ns)) if every else 0
-        self.begin_ns = min((one.recorded_ns for one in every), default=0) - self._late_ns
-        self.end_ns = max((one.published_ns for one in every), default=self.begin_ns)
+        latencies_ns = [message.recorded_ns - message.published_ns for message in messages]
+        self._latency_ns = round(statistics.median(latencies_ns)) if messages else 0
+        first_ns = min((message.recorded_ns for message in messages), default=0)
+        self.begin_ns = first_ns - self._latency_ns
+        self.end_ns = max((message.published_ns for message in messages), default=self.begin_ns)
         limit_ns = self.begin_ns + round(order.scenario.timeout * NS)
         self.is_cut = self.end_ns > limit_ns
         if self.is_cut:
@@ -103,7 +102,9 @@ class _Reading:
             first = format_duration(order.scenario.timeout)
             self._notes.append(f"only the first {first} of the {lasts} in it are judged")
             self.end_ns = limit_ns
-        self.raw = self._numbered([one for one in every if one.published_ns <= self.end_ns])
+        self.raw = self._numbered(
+            [message for message in messages if message.published_ns <= self.end_ns]
+        )
 
     @cached_property
     def definitions(self) -> dict[str, str]:
@@ -118,13 +119,22 @@ class _Reading:
     def recording(self) -> Recording:
         """What is in the bag, as what was observed."""
         order, scenario = self._order, self._scenario
-        odometry, commands = (
-            self._values(one.topic) if scenario.has_robot else []
-            for one in (scenario.topics.odometry, scenario.topics.command)
-        )
+        odometry: list[Timed] = []
+        commands: list[Timed] = []
+        if scenario.has_robot:
+            odometry = self._values(scenario.topics.odometry.topic)
+            commands = self._values(scenario.topics.command.topic)
         truth = motion(odometry, commands, scenario.robot.pose)
         self._notes += self._faults_of_recording(odometry)
-        values = {name: float(value.number) for name, value in scenario.values.items()}
+        environment = {
+            "assignment": order.assignment,
+            "ros_distro": order.bag.distro or "unknown",
+            BAG: order.bag.path,
+        }
+        if self._notes:
+            environment[BAG_NOTES] = "\n".join(self._notes)
+        if not order.kept.has_published:
+            environment[BAG_RECEIVED] = "true"
         return Recording(
             scenario=scenario.id,
             seed=0,
@@ -138,71 +148,70 @@ class _Reading:
             truth=truth,
             incidents=rejected(commands),
             scenes={"": self._scene()} if scenario.has_robot else {},
-            values=values,
-            environment={
-                "assignment": order.assignment,
-                "ros_distro": order.bag.distro or "unknown",
-                BAG: order.bag.path,
-                **({BAG_NOTES: "\n".join(self._notes)} if self._notes else {}),
-                **({} if order.kept.has_published else {BAG_RECEIVED: "true"}),
-            },
+            values={name: float(value.number) for name, value in scenario.values.items()},
+            environment=environment,
         )
 
     def _messages(self) -> list[BagMessage]:
         """The messages on topics that are recorded, each once, in the order of their times."""
-        found: dict[tuple[str, int, int, bytes], BagMessage] = {}
-        twice: Counter[str] = Counter()
-        for one in self._order.kept.messages():
-            channel = self._renamed(one.channel)
+        messages: dict[tuple[str, int, int, bytes], BagMessage] = {}
+        copies: Counter[str] = Counter()
+        for message in self._order.kept.messages():
+            channel = self._renamed(message.channel)
             if self._is_read(channel):
-                key = (channel.name, one.recorded_ns, one.published_ns, one.cdr)
-                twice[channel.name] += key in found
-                found[key] = replace(one, channel=channel)
-        for topic, number in twice.items():
-            if number:
-                seen = f"{counted(number, 'message')} on {code(topic)} are in it more than once"
-                self._notes.append(f"{seen}, and count once")
-        return sorted(found.values(), key=lambda one: (one.published_ns, one.recorded_ns))
+                key = (channel.name, message.recorded_ns, message.published_ns, message.cdr)
+                if key in messages:
+                    copies[channel.name] += 1
+                messages[key] = replace(message, channel=channel)
+        for topic, number in copies.items():
+            self._notes.append(
+                f"{counted(number, 'message')} on {code(topic)} are in it more than once, and "
+                "count once"
+            )
+        return sorted(messages.values(), key=lambda one: (one.published_ns, one.recorded_ns))
 
     def _is_read(self, channel: BagChannel) -> bool:
         """Whether a topic is recorded, with this type and, where that is known, its definition."""
-        own = self._own_hashes.get(channel.type, "")
-        is_other = channel.hash and own and channel.hash != own
-        return self._types.get(channel.name) == channel.type and not is_other
+        if self._types.get(channel.name) != channel.type:
+            return False
+        known_hashes = {channel.hash, self._hashes_here[channel.type]} - {""}
+        return len(known_hashes) <= 1
 
     def _renamed(self, channel: BagChannel) -> BagChannel:
         """A topic by the name that the assignment has for it."""
-        own = channel.name
+        new_name = self._rename.get(channel.name)
+        if new_name is not None:
+            return replace(channel, name=new_name)
         # What is renamed onto a topic comes in place of the one that has the name itself.
-        taken = own in self._rename.values() and own not in self._rename
-        return replace(channel, name="" if taken else self._rename.get(own, own))
+        return replace(channel, name="") if channel.name in self._rename.values() else channel
 
     def _numbered(self, messages: Sequence[BagMessage]) -> list[RawMessage]:
         numbers: Counter[str] = Counter()
-        found = []
+        numbered = []
         for one in messages:
             numbers[one.channel.name] += 1
-            found.append(
+            numbered.append(
                 RawMessage(
                     topic=one.channel.name,
                     type=one.channel.type,
                     cdr=one.cdr,
                     stamp_ns=one.published_ns,
-                    received_ns=max(0, one.recorded_ns - self._late_ns),
+                    received_ns=max(0, one.recorded_ns - self._latency_ns),
                     sequence=numbers[one.channel.name],
                 )
             )
-        return found
+        return numbered
 
     def _endpoints(self) -> Iterator[Endpoint]:
         """The publishers, as the student's, and the subscription that stands for the reader."""
         for topic, type in self._types.items():
-            read = BagChannel(topic, type, self._own_hashes[type])
+            read = BagChannel(topic, type, self._hashes_here[type])
             yield self._endpoint(Kind.SUBSCRIPTION, Owner.PROBE, read, Qos())
         for channel in map(self._renamed, self._order.kept.channels):
-            # That nothing is said of its publishers does not mean that it had none.
-            for qos in (channel.publishers or (Qos(),)) if channel.name in self._types else ():
-                yield self._endpoint(Kind.PUBLISHER, Owner.STUDENT, channel, qos)
+            if channel.name in self._types:
+                # That nothing is said of its publishers does not mean that it had none.
+                for qos in channel.publishers or (Qos(),):
+                    yield self._endpoint(Kind.PUBLISHER, Owner.STUDENT, channel, qos)
 
     def _endpoint(self, kind: Kind, owner: Owner, channel: BagChannel, qos: Qos) -> Endpoint:
         return Endpoint(
@@ -218,16 +227,18 @@ class _Reading:
         )
 
     @cached_property
-    def _own_hashes(self) -> dict[str, str]:
-        return {type: self._own_hash(type) for type in self._types.values()}
+    def _hashes_here(self) -> dict[str, str]:
+        return {type: self._hash_here(type) for type in self._types.values()}
 
-    def _own_hash(self, type: str) -> str:
+    def _hash_here(self, type: str) -> str:
         """The hash of a definition here, which ROS installs beside it; nothing without it."""
         for prefix in self._order.prefixes:
-            with suppress(OSError, ValueError, KeyError, TypeError, StopIteration):
-                written = json.loads((prefix / "share" / f"{type}.json").read_text("utf-8"))
-                hashes = written["type_hashes"]
-                return str(next(one["hash_string"] for one in hashes if one["type_name"] == type))
+            with suppress(OSError, ValueError, KeyError, TypeError):
+                description = json.loads((prefix / "share" / f"{type}.json").read_text("utf-8"))
+                hashes = {
+                    one["type_name"]: one["hash_string"] for one in description["type_hashes"]
+                }
+                return str(hashes[type])
         return ""
 
     @cached_property
@@ -236,12 +247,13 @@ class _Reading:
 
     def _values(self, topic: str) -> list[Timed]:
         """The messages on a topic that can be read, with their times."""
-        found: list[Timed] = []
-        for one in (one for one in self.raw if one.topic == topic):
-            # Other bytes than its type has: they are counted when the recording is read.
-            with suppress(Exception):
-                found.append((one.stamp_ns, self._decoders[one.type](one.cdr)))
-        return found
+        values: list[Timed] = []
+        for message in self.raw:
+            if message.topic == topic:
+                # Other bytes than its type has: they are counted when the recording is read.
+                with suppress(Exception):
+                    values.append((message.stamp_ns, self._decoders[message.type](message.cdr)))
+        return values
 
     def _scene(self) -> Scene:
         """The robot as the author describes it; nothing is known of what stands around it."""
@@ -275,7 +287,8 @@ class _Reading:
         for topic, number in publishers.items():
             if number > 1:
                 yield f"{number} publishers were on {code(topic)} while it was recorded"
-        yield from self._clocks()
+        yield from clocks_set_back(self.raw)
+        yield from other_clocks(self.raw, self._stamp_ns)
         fastest = robot_model(self._scenario.robot).limits.speed_m_s
         jumped = jump(odometry, fastest)
         if jumped is not None:
@@ -283,34 +296,9 @@ class _Reading:
             after = format_duration(round((at_ns - self.begin_ns) / NS, 2))
             yield f"the odometry jumps by {metres(way_m)} {after} after its beginning"
 
-    def _clocks(self) -> Iterator[str]:
-        """Times that do not go together: of another computer, of a simulation, or set meanwhile."""
-        before: dict[str, int] = {}
-        told = set()
-        for one in sorted(self.raw, key=lambda one: one.received_ns):
-            back_ns = before.get(one.topic, one.stamp_ns) - one.stamp_ns
-            if back_ns > NS and one.topic not in told:
-                told.add(one.topic)
-                back = format_duration(back_ns / NS)
-                yield f"the clock of {code(one.topic)} jumps back by {back}"
-            before[one.topic] = one.stamp_ns
-        for topic in sorted({one.topic for one in self.raw}):
-            messages = [one for one in self.raw if one.topic == topic]
-            sampled = messages[:: max(1, len(messages) // _MOST_SAMPLES)]
-            ages_s = [age for one in sampled if (age := self._age_s(one)) is not None]
-            off_s = statistics.median(ages_s) if ages_s else 0.0
-            if abs(off_s) > _SAME_CLOCK_S:
-                off = format_duration(round(abs(off_s), 1))
-                way = "behind" if off_s > 0.0 else "ahead of"
-                yield (
-                    f"the stamps in the headers of {code(topic)} are {off} {way} the times of the "
-                    "bag: they come "
-                    "from another clock, such as that of a simulation or of another computer"
-                )
-
-    def _age_s(self, message: RawMessage) -> float | None:
-        """How much older the stamp in its header is than a message, or None without one."""
+    def _stamp_ns(self, message: RawMessage) -> int | None:
+        """The stamp in the header of a message, or None where it has none."""
         with suppress(Exception):
             stamp: Mapping[str, int] = self._decoders[message.type](message.cdr)["header"]["stamp"]
-            return (message.stamp_ns - stamp["sec"] * NS - stamp["nanosec"]) / NS
+            return stamp["sec"] * NS + stamp["nanosec"]
         return None

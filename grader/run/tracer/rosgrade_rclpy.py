@@ -19,7 +19,7 @@ from rosgrade_report import (  # type: ignore[import-not-found]
     PAUSE_PIPE,
     SEEN_FD,
     THRESHOLDS,
-    of_middleware,
+    middleware_variables,
     pipe_at,
     quietly,
     report,
@@ -254,7 +254,7 @@ def _freeze(_context: Any) -> None:
 def _patch_context(module: Any) -> None:
     def made(context: Any, _: Any) -> None:
         changed = {name for name in MIDDLEWARE if os.environ.get(name) != MIDDLEWARE[name]}
-        changed.update(name for name in of_middleware() if name not in MIDDLEWARE)
+        changed.update(name for name in middleware_variables() if name not in MIDDLEWARE)
         if str(context.get_domain_id()) != MIDDLEWARE.get("ROS_DOMAIN_ID", "0"):
             changed.add("ROS_DOMAIN_ID")
         report("init", changed=" ".join(sorted(changed)))
