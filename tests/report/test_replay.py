@@ -8,7 +8,7 @@ from itertools import accumulate
 import pytest
 
 from grader.assignment.model import RandomRange
-from grader.report.html.replay import DIGITS, NOTHING, embedded, make_replay, with_goals
+from grader.report.html.replay import DIGITS, NO_RETURN_CM, embedded, make_replay, with_goals
 from tests.grade.sample import Told, make_loaded
 from tests.report.gallery import ahead_until, gallery, reference
 from tests.report.sample import make_run
@@ -38,7 +38,7 @@ def test_beams_are_those_of_the_scans_to_the_centimetre(run, replay):
     for beam, true in enumerate(first["ranges"][::every]):
         high, low = scans["ranges"][2 * beam : 2 * beam + 2]
         number = 64 * DIGITS.index(high) + DIGITS.index(low)
-        assert number == NOTHING if math.isinf(true) else abs(number / 100 - true) <= 0.0051
+        assert number == NO_RETURN_CM if math.isinf(true) else abs(number / 100 - true) <= 0.0051
     assert len(scans["ranges"]) == 2 * scans["beams"] * len(scans["times"])
 
 

@@ -39,7 +39,9 @@ def places(finding: FindingPart) -> tuple[SourceError, ...]:
 
 def excerpt(place: SourceError, source: Mapping[str, str]) -> Excerpt | None:
     """The lines around a place; None where the file, or the line in it, is not known."""
-    lines = source.get(place.file, "").split("\n")
+    if place.file not in source:
+        return None
+    lines = source[place.file].split("\n")
     line = place.line or _line_of(place, lines)
     if not 1 <= line <= len(lines):
         return None
@@ -52,9 +54,13 @@ def excerpt(place: SourceError, source: Mapping[str, str]) -> Excerpt | None:
 def _line_of(place: SourceError, lines: list[str]) -> int:
     """The first line with a name in the message, or with what such messages are about; or 0."""
     anchors = _ANCHORS.get(PurePosixPath(place.file).name, ())
-    names = _NAME.findall(place.message) if anchors else ()
-    found = (n for text in (*names, *anchors) for n, line in enumerate(lines, 1) if text in line)
-    return next(found, 0)
+    if not anchors:
+        return 0
+    for text in (*_NAME.findall(place.message), *anchors):
+        for number, line in enumerate(lines, start=1):
+            if text in line:
+                return number
+    return 0
 
 
 KEPT_LINES = 150
@@ -91,5 +97,5 @@ def shorten(recording: Recording) -> Output:
 
 
 def _cut(text: str) -> str:
-    more = len(text) - KEPT_CHARACTERS
-    return f"{text[:KEPT_CHARACTERS]}… ({more:,} more characters)" if more > 0 else text
+    excess = len(text) - KEPT_CHARACTERS
+    return f"{text[:KEPT_CHARACTERS]}… ({excess:,} more characters)" if excess > 0 else text
