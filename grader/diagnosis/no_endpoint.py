@@ -226,8 +226,7 @@ def misspelt_name(symptom: NoEndpoint) -> Finding | None:
         for item in symptom.there
         if not ended or declarations.process_of(symptom.recording, item.node) in (None, *ended)
     ]
-    base, match = wanted.rpartition("/")[2], None
-    mistake, why = "misspelt_name", ""
+    match, mistake, why = None, "misspelt_name", ""
     for item in suspects:
         prefix = item.name.removesuffix(wanted)
         if item.name.lower() == wanted.lower():
@@ -237,8 +236,7 @@ def misspelt_name(symptom: NoEndpoint) -> Finding | None:
             mistake = "prefixed_name"
     match = match or nearest(wanted, [item.name for item in suspects])
     found = f"the node {symptom.word.does} {code(match or '')} instead of {code(wanted)}{why}"
-    create = symptom.create
-    return mistaken(mistake, found, symptom.evidence, base=base, create=create) if match else None
+    return mistaken(mistake, found, symptom.evidence, create=symptom.create) if match else None
 
 
 @explanation(NoEndpoint, after=(process_ended,))

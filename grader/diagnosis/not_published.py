@@ -14,10 +14,10 @@ from grader.diagnosis.no_messages import (
 from grader.diagnosis.process.not_called import callback_raised, no_cpu_time
 from grader.diagnosis.process.raised import defined_at
 from grader.findings.finding import Evidence, Finding, moment, until_the_end
-from grader.findings.words import code, counted, listing
+from grader.findings.words import code, codes, counted, listing
 from grader.measure import declarations
 from grader.measure.declarations import is_compiled
-from grader.recording.model import NS, Kind, Recording
+from grader.recording.model import NS, Kind, Owner, Recording
 from grader.spec.unit import format_duration
 
 _LOG_LINES = 5
@@ -62,7 +62,26 @@ def publish_never_called(symptom: NoMessages) -> Finding | None:
     )
 
 
-@explanation(NoMessages, after=(no_answer,), concept="timers")
+@explanation(NoMessages, after=(no_answer,), concept="names")
+def hears_nothing(symptom: NoMessages) -> Finding | None:
+    """It subscribes to a topic without a publisher, and its type comes on another topic."""
+    ends = symptom.recording.endpoints
+    sources = {one.topic: one.type for one in ends if one.kind is Kind.PUBLISHER}
+    own = [one for one in ends if one.kind is Kind.SUBSCRIPTION and one.owner is Owner.STUDENT]
+    for deaf in (one for one in own if one.topic not in sources):
+        meant = sources.keys() - {one.topic for one in own}
+        names = codes(sorted(name for name in meant if sources[name] == deaf.type))
+        if names:
+            return mistaken(
+                "hears_nothing",
+                f"{symptom.seen}: the node subscribes to {code(deaf.topic)}, which has no "
+                f"publisher; {code(deaf.type)} comes on {names}",
+                Evidence(moments=symptom.moments),
+            )
+    return None
+
+
+@explanation(NoMessages, concept="timers")
 def no_timer(symptom: NoMessages) -> Finding | None:
     """No timer was created, so nothing calls the callback that publishes."""
     recording = symptom.recording

@@ -171,6 +171,11 @@ class TestPublished:
         ("there", "topic", "words"),
         [
             (endpoint("/cmdvel"), "/cmd_vel", "publishes on `/cmdvel` instead of `/cmd_vel`"),
+            (
+                endpoint("/turtle1/cmdvel"),
+                "/turtle1/cmd_vel",
+                "the name like this: `self.create_publisher(Type, 'turtle1/cmd_vel', 10)`",
+            ),
             (endpoint("/Cmd_Vel"), "/cmd_vel", "upper and lower case differ"),
             (
                 endpoint("/bot_publisher/cmd_vel"),
@@ -181,7 +186,7 @@ class TestPublished:
             (
                 endpoint("/robot/cmd_vel", node="/robot/bot_publisher"),
                 "/cmd_vel",
-                "and any namespace",
+                "and any other namespace",
             ),
             (
                 endpoint(kind=Kind.SUBSCRIPTION),

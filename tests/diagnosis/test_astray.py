@@ -1,9 +1,12 @@
 """Why a turtle went astray: a test for each explanation, with its name."""
 
+from dataclasses import replace
+
 from sim.motion import Pose
 from sim.turtles.turtle import Jump, Velocity
-from tests.checks.builder import failing, judge, text
+from tests.checks.builder import at, declarations, failing, judge, text
 from tests.checks.turtles import MIDDLE, moves, swim
+from tests.diagnosis.test_standing import stands
 
 X, Y = MIDDLE
 CORNERS = [[X, Y], [X + 2, Y], [X + 2, Y + 2], [X, Y + 2]]
@@ -50,3 +53,18 @@ def test_never_commanded():
     found = failing("turtle.draws", swim(lambda turtles, time_s: None, 1.0), **SQUARE)
     assert "`turtle1` drew no line" in found
     assert "/turtle1/cmd_vel" in found
+
+
+def test_callback_hangs():
+    def late(began_s):
+        found = stands("self.kill.call(request)", began_s=began_s, seen_s=8.9)
+        told = (*declarations(exiting_ns=at(9.5)), found)
+        run = swim(moves((1.0, 0.0, 1.0)), 8.0, POND, declarations=told)
+        messages = {topic: sent[:200] for topic, sent in run.messages.items()}
+        return failing("turtle.catches", replace(run, messages=messages), prey=["far"])
+
+    found = late(4.5)
+    assert "`scan_callback` does not return: it is in line 19, `self.kill.call(request)`" in found
+    assert "use call_async()" in found
+    # What commands in its callback is not stuck there.
+    assert "does not return" not in late(1.0)

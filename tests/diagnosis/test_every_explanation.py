@@ -282,6 +282,9 @@ CASES: list[Group] = [
             "NoMessages.never_spun": silent(declarations=declarations(spin=False)),
             "NoMessages.blocked_executor": silent(calls=HANGS),
             "NoMessages.no_answer": answering(LISTENER, times_s=every(0.3, 5)),
+            "NoMessages.hears_nothing": silent(
+                endpoints=(endpoint(), reader(), LISTENER, replace(stimulus(), topic="/chat"))
+            ),
             "NoMessages.no_timer": silent(declarations=declarations(timer_s=None)),
             "NoMessages.publish_not_reached": silent(),
             "NotDelivered.other_type": answering(replace(LISTENER, type="std_msgs/msg/Int64")),

@@ -108,6 +108,7 @@ def test_a_future_of_async_that_is_not_kept_is_told_where_a_callback_blocks(came
         ("with self.lock:", "holds this lock already"),
         ("self.mutex.acquire()", "holds this lock already"),
         ("name = input('name?')", "no keyboard"),
+        ("self.client.wait_for_service()", "No server of this name and type"),
         ("time.sleep(60)", "While a callback sleeps"),
     ],
 )
@@ -133,6 +134,13 @@ def test_a_loop_before_spin_is_named_and_not_a_missing_spin() -> None:
         "rclpy.spin() is not reached, because `__init__` does not return: it is in line 18" in found
     )
     assert "was never called" not in found
+
+
+def test_a_server_that_never_comes_is_told_before_spin_too() -> None:
+    loop = "while not self.client.wait_for_service(timeout_sec=1.0):"
+    stand = stands("self.get_logger().info('waiting')", loop, in_callback=False)
+    run = blocked(declarations=(*declarations(spin=False, timer_s=None), stand))
+    assert "No server of this name" in failing("messages.count", run, **WITHIN)
 
 
 def test_a_program_that_spins_does_not_stand_in_main() -> None:

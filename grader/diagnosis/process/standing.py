@@ -22,6 +22,7 @@ _WAITS = {
     r"\bspin|future|\.done\(|\.result\(": "waits_for_a_future",
     r"lock|acquire\(": "waits_for_a_lock",
 }
+_SERVER = re.compile(r"\bwait_for_(service|(action_)?server)\(")
 # What g++ says of a future that is not kept.
 _UNKEPT = re.compile(
     r"^(?P<file>[^\s:]+):(?P<line>\d{1,7}):.*ignoring return.*\basync\(", re.MULTILINE
@@ -141,6 +142,8 @@ def _words(function: str, line: int, text: str, when: str, in_callback: bool) ->
 def _hint(text: str, loop: str, in_callback: bool) -> str:
     if "input(" in text:
         return remedy("no_keyboard")
+    if _SERVER.search(text) or _SERVER.search(loop):
+        return remedy("waits_for_a_server")
     if not in_callback:
         return remedy("not_in_a_callback")
     for pattern, mistake in _WAITS.items():

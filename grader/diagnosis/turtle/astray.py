@@ -11,11 +11,13 @@ from itertools import pairwise
 from grader.diagnosis.explanation import explanation, mistaken
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
+from grader.diagnosis.process.not_called import at_its_place
 from grader.diagnosis.process.process_exit import NotDone, process_ended
+from grader.diagnosis.process.standing import stuck
 from grader.findings.finding import Evidence, Finding, evidence_at
 from grader.findings.words import code, counted
 from grader.measure.motion.command import VelocityCommand, number
-from grader.recording.model import Recording
+from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 from sim.motion import Twist
 
@@ -104,6 +106,18 @@ def never_commanded(symptom: TurtleAstray) -> Finding | None:
     if symptom.sent or symptom.jumps:
         return None
     return why_silent(symptom.recording, symptom.topic).after(symptom.what)
+
+
+@explanation(TurtleAstray, concept="executors")
+def callback_hangs(symptom: TurtleAstray) -> Finding | None:
+    """A callback does not return until the end, and commands nothing more."""
+    stand = stuck(symptom.recording)
+    if stand is None or stand.lasted_s is None:
+        return None
+    since_ns = symptom.recording.stop_ns - stand.lasted_s * NS
+    if any(one.time_ns > since_ns for one in symptom.sent):
+        return None
+    return at_its_place(Finding(symptom.what, "", symptom.shown), symptom.what, stand)
 
 
 @explanation(TurtleAstray)
