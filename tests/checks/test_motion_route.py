@@ -137,8 +137,9 @@ def test_a_robot_that_follows_the_wall_on_its_left():
     parameters = {"distance": "0.5 m", "tolerance": "5 cm"}
     finding = judge("motion.keeps_distance", run, side="left", **parameters)
     assert finding.status is Status.PASSED
-    assert "at this distance (100 %)" in finding.observed
-    assert "never was" in failing("motion.keeps_distance", run, side="right", **parameters)
+    assert "at this distance for 1.55 m of the 1.55 m since it first was" in finding.observed
+    found = failing("motion.keeps_distance", run, side="right", **parameters)
+    assert "it never was at this distance, but from 0.5 m to 0.5 m away" in found
 
 
 def test_a_robot_that_drives_away_from_the_wall_fails():

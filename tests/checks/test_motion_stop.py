@@ -397,6 +397,13 @@ class TestRest:
             "motion.stays_at_rest", run, after="start"
         )
 
+    def test_backwards_until_nothing_is_ahead_is_told(self):
+        run = drive(
+            on_scan(lambda ranges: (-0.2 if ranges[0] < 2.0 else 0.0, 0.0)), world=WALL, seconds=12
+        )
+        said = failing("motion.stops", run, **STOPS)
+        assert "it drove backwards" in said and "sign of the difference" in said
+
     def test_setting_off_again_is_reported(self):
         def forgetful(senses: Senses):
             if not senses.new_scan or senses.scan is None:

@@ -6,6 +6,7 @@ import pytest
 
 from grader.findings.finding import Status
 from grader.measure.turtle.drawing import drawn
+from grader.recording.interaction import Asked
 from grader.recording.window import cut
 from sim.motion import Pose
 from sim.turtles.turtle import Jump, Pen, Velocity
@@ -17,6 +18,10 @@ SQUARE = [[X, Y], [X + 2, Y], [X + 2, Y + 2], [X, Y + 2]]
 # 16 ms divide neither 2 s nor a right angle at 1 rad/s.
 LEG, TURN = (1.0, 0.0, 2.0), (0.0, math.pi / 2 / 1.584, 1.584)
 FOUR = moves(LEG, TURN, LEG, TURN, LEG, TURN, LEG)
+
+
+def requests(service, *names):
+    return tuple(Asked(service, "", {"name": name}, at(2.0)) for name in names)
 
 
 def figure(**changes):
@@ -170,8 +175,20 @@ def test_spawned_turtles_are_at_their_places():
         if time_s == 0.16:
             turtles.spawn(Pose(2.0, 3.0, 0.0), "bob")
 
-    run = swim(script, 1.0)
+    run = swim(script, 1.0, asked=requests("/spawn", "bob", "/amy"))
     assert judge("turtle.spawns", run, turtles={"bob": [2, 3]}).status is Status.PASSED
     assert "1 m off" in failing("turtle.spawns", run, turtles={"bob": [2, 2]})
     found = judge("turtle.spawns", run, turtles={"bob": [2, 3], "amy": [1, 1]})
-    assert (found.credit, found.observed) == (0.5, "no `amy`: only `bob`")
+    assert (found.credit, found.observed) == (0.5, "no `amy`: only `bob`; not spawned: `/amy`")
+
+
+def test_who_never_asks_for_a_turtle_is_told_why():
+    found = failing("turtle.spawns", swim(moves(LEG)), turtles={"bob": [2, 3]})
+    assert "no `bob`: `/bot_publisher` created no client" in found
+
+
+def test_kills_in_vain_are_told_with_their_name():
+    asked = requests("/kill", *["near"] * 3)
+    run = swim(hunter(["near"]), 10.0, POND, asked=asked)
+    found = judge("turtle.catches", run, **PREY).observed
+    assert "not `far`, in 3 requests to `/kill`, the last with the name `near`" in found

@@ -206,7 +206,10 @@ def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding:
     begin = next((index for index, is_right in enumerate(kept) if is_right), None)
     if begin is None:
         shown = evidence_at(recording, "the run began", truth[0].time_ns, plot)
+        distances = [sight.distance_m for step in truth if (sight := nearest(scene, step))]
         seen = "it never was at this distance"
+        if distances:
+            seen += f", but from {metres(min(distances))} to {metres(max(distances))} away"
         return why_off_course(recording) or mistaken("never_at_distance", seen, shown)
     end_s = recording.since_launch_s(truth[-1].time_ns)
     plot = replace(plot, judged=(recording.since_launch_s(truth[begin].time_ns), end_s))
@@ -214,7 +217,8 @@ def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding:
     whole_m = sum(way_m((a, b)) for a, b, _ in steps)
     right_m = sum(way_m((a, b)) for a, b, is_right in steps if is_right)
     ratio = right_m / whole_m if whole_m else 0.0
-    seen = f"{metres(right_m)} of {metres(whole_m)} at this distance ({percent(round(ratio, 2))})"
+    since = f"the {metres(whole_m)} since it first was"
+    seen = f"at this distance for {metres(right_m)} of {since} ({percent(round(ratio, 2))})"
     evidence = evidence_at(recording, "first at this distance", truth[begin].time_ns, plot)
     if right_m >= parameters.way and ratio >= parameters.share:
         return Finding.as_asked(seen, evidence)

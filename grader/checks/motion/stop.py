@@ -26,6 +26,7 @@ from grader.measure.motion.scan import front, misreading
 from grader.measure.motion.track import (
     REST_M_S,
     first_rest,
+    gone_ahead_m,
     index_at,
     is_at_rest,
     over_time,
@@ -80,9 +81,11 @@ def stops(recording: Recording, parameters: Stops) -> Finding:
     stop_if(deeper)
     if sight is not None and off_m is not None and off_m < 0.0:
         return _late(recording, scene, rest, sight, parameters)
-    misread = misreading(recording, step)
     where = f"{sight.name} still {metres(sight.distance_m)} ahead" if sight else "nothing ahead"
     seen = f"stopped early, with {where}"
+    if gone_ahead_m(recording.truth[: rest + 1]) < 0.0:
+        return mistaken("drove_backwards", f"{seen}: it drove backwards", evidence)
+    misread = misreading(recording, step)
     if misread:
         return mistaken("misread_scan", f"{seen}: {misread.words}", evidence, hint=misread.hint)
     return mistaken("stopped_early", seen, evidence)

@@ -17,6 +17,7 @@ from grader.measure.turtle.hunt import Catch, Hunt
 from grader.recording.model import Recording
 from grader.spec.quantity import PositiveLength
 
+_KILL = "/kill"
 _NEAR_M = 0.5
 _MARGIN_M = 0.2
 """Of two that are nearly as near, either is the nearest."""
@@ -124,6 +125,12 @@ def _missing(hunt: Hunt, asked: Catches, evidence: Evidence) -> Finding:
         return mistaken("turtle_not_spawned", seen, evidence)
     end_ns = recording.truth[-1].time_ns
     seen = f"{number} killed; not {codes(left, 'or')}"
+    asked_kills = recording.asked_of(_KILL)
+    if len(asked_kills) > len(caught):
+        named = code(asked_kills[-1].fields["name"])
+        times = counted(len(asked_kills), "request")
+        seen = f"{seen}, in {times} to {code(_KILL)}, the last with the name {named}"
+        return mistaken("turtle_not_killed", seen, evidence)
     reached = [name for name in left if _is_near(hunt.distance_m(name, end_ns), asked)]
     if reached:
         near = f"{seen}, although {code(asked.turtle)} was at {code(reached[0])} at the end"

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import WithTurtles
 from grader.diagnosis.explanation import mistaken
+from grader.diagnosis.not_asked import why_not_asked
 from grader.diagnosis.turtle.astray import why_no_turtles
 from grader.findings.finding import Evidence, Finding, moment, until_the_end
 from grader.findings.words import code, codes, counted, metres, point
 from grader.recording.model import Recording
 from grader.spec.quantity import PositiveLength
 from sim.coordinates import Point
+
+_SPAWN = "/spawn"
 
 
 class Spawns(Parameters):
@@ -58,12 +62,17 @@ def spawns(recording: Recording, parameters: Spawns) -> Finding:
     credit = 1.0 - len(missing + wrong) / len(parameters.turtles)
     if missing:
         there = f": only {codes(places)}" if places else ""
-        seen = f"no {codes(missing, 'or')}{there}"
-        found = mistaken("turtle_not_spawned", seen, shown)
+        seen, asked = f"no {codes(missing, 'or')}{there}", recording.asked_of(_SPAWN)
+        if len(asked) < len(parameters.turtles):
+            found = why_not_asked(recording, _SPAWN, len(parameters.turtles)).after(seen)
+        else:
+            refused = {str(one.fields["name"]) for one in asked} - places.keys() - {""}
+            seen += f"; not spawned: {codes(sorted(refused))}" if refused else ""
+            found = mistaken("turtle_not_spawned", seen, shown)
     elif wrong:
         name = wrong[0]
         seen = f"{code(name)} was spawned at {point(*places[name])}, {metres(off_m[name])} off"
         found = mistaken("turtle_misplaced", seen, shown)
     else:
         return Finding.as_asked(counted(len(off_m), "turtle"), shown)
-    return Finding(found.observed, found.hint, shown, credit=credit)
+    return replace(found, credit=credit)
