@@ -192,3 +192,15 @@ def test_kills_in_vain_are_told_with_their_name():
     run = swim(hunter(["near"]), 10.0, POND, asked=asked)
     found = judge("turtle.catches", run, **PREY).observed
     assert "not `far`, in 3 requests to `/kill`, the last with the name `near`" in found
+
+
+def test_a_hunter_must_not_be_teleported_where_that_is_asked_for():
+    def script(turtles, time_s):
+        if time_s == 0.16:
+            turtles.teleport("turtle1", Jump(Pose(6.2, 5.0, 0.0)))
+            turtles.kill("near")
+
+    run = swim(script, 1.0, POND)
+    assert judge("turtle.catches", run, prey=["near"]).status is Status.PASSED
+    found = failing("turtle.catches", run, prey=["near"], teleports=False)
+    assert "`turtle1` was teleported" in found

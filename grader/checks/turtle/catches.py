@@ -11,7 +11,7 @@ from grader.checks.check import Subject, check, stop_if
 from grader.checks.turtle.turtle_check import TurtleParameters, astray
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.turtle.astray import why_no_turtles
-from grader.findings.finding import Evidence, Finding, moment, until_the_end
+from grader.findings.finding import Evidence, Finding, evidence_at, moment, until_the_end
 from grader.findings.words import code, codes, counted, metres
 from grader.measure.turtle.hunt import Catch, Hunt
 from grader.recording.model import Recording
@@ -43,6 +43,7 @@ class Catches(TurtleParameters):
         description="`listed`: as in `prey`; `nearest`: always the one that is the nearest to "
         "`turtle` when the one before is killed.",
     )
+    teleports: bool = Field(True, description="Whether `turtle` may be teleported.")
 
     def _asked(self) -> str:
         how = {Order.LISTED: " in this order", Order.NEAREST: ", always the nearest"}
@@ -57,6 +58,14 @@ def catches(recording: Recording, parameters: Catches) -> Finding:
     Each that is caught rightly, before the first that is not, gives an equal share of the points.
     """
     stop_if(why_no_turtles(recording))
+    jumps = [
+        one
+        for one in recording.turtles
+        if one.kind == "teleported" and one.turtle == parameters.turtle
+    ]
+    if jumps and not parameters.teleports:
+        shown = evidence_at(recording, "teleported", jumps[0].time_ns)
+        return mistaken("turtle_teleported", f"{code(parameters.turtle)} was teleported", shown)
     hunt = Hunt(recording, parameters.turtle, parameters.prey)
     caught, evidence = hunt.catches, _evidence(recording, hunt.catches)
     wrong = next((n for n, one in enumerate(caught) if not _is_right(one, n, parameters)), None)
