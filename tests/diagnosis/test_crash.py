@@ -155,6 +155,12 @@ def test_what_ends_a_program_in_python_is_read_as_before() -> None:
     assert "with SIGABRT (abort)" in found
 
 
+def test_an_assertion_of_a_message_ends_a_program_in_python() -> None:
+    said = "python: _set_pen_s.c:58: convert_from_py: Assertion `PyLong_Check(field)' failed."
+    found = ended(-6, said, declarations=(declared("started"),))
+    assert "An integer field of a message got something else" in found
+
+
 def test_a_compiled_program_that_returns_at_once() -> None:
     found = ended(0, "", declarations=(STARTED, declared("node", node="/bot_publisher")))
     assert "with exit code 0: main() returned without" in found

@@ -48,7 +48,8 @@ class Catches(TurtleParameters):
     def _asked(self) -> str:
         how = {Order.LISTED: " in this order", Order.NEAREST: ", always the nearest"}
         near = f", each within {metres(self.within)} of {code(self.turtle)}" if self.within else ""
-        return f"{codes(self.prey)} are killed{how.get(self.order, '')}{near}"
+        way = "" if self.teleports else f"; {code(self.turtle)} is not teleported"
+        return f"{codes(self.prey)} are killed{how.get(self.order, '')}{near}{way}"
 
 
 @check("turtle.catches", Subject.RECORDING, Catches)

@@ -160,7 +160,8 @@ class ProcessExit(Symptom[Finding], concept="nodes"):
         """The exception that ended it, or the crash of a compiled program."""
         failure = fatal_failure(self.recording, self.process.name)
         if not declarations.is_compiled(self.recording, self.process.name):
-            return None if self.killed else failure
+            is_cause = not self.killed or (failure is not None and failure.type == "Assertion")
+            return failure if is_cause else None
         if failure is None and self.killed and self.killed.name in _CRASHES:
             words = TABLE.signals[self.killed.name]
             return Failure(self.killed.name, words, (), compiled=True)

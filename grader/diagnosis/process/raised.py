@@ -22,6 +22,7 @@ _LINKS = (
 _IGNORED = "Exception ignored in"
 _FRAME = re.compile(r'\s+File "(?P<file>[^"]+)", line (?P<line>\d{1,7})(?:, in (?P<where>.+))?')
 _RAISED = re.compile(r"(?P<type>[A-Za-z_][A-Za-z0-9_.]{0,200})(?:: (?P<message>.*))?")
+_ASSERTED = re.compile(r".+: Assertion (?P<message>.+ failed\.)")
 _CALLED = re.compile(r"(\w+)\(\)")
 _NOT_CALLABLE = re.compile(r"'(\w+)' object is not callable")
 _INSTALL_FOLDERS = ("site-packages", "dist-packages")
@@ -76,8 +77,12 @@ def failures(recording: Recording, process: str) -> tuple[Failure, ...]:
     """Every failure that a process wrote to stderr: tracebacks, or what ends compiled programs."""
     of_process = (line for line in recording.log if line.process == process)
     lines = [line.text for line in of_process if line.stream == "stderr"]
-    return parse_failures(lines) or (
-        parse_crashes(lines) if declarations.is_compiled(recording, process) else ()
+    if declarations.is_compiled(recording, process):
+        return parse_failures(lines) or parse_crashes(lines)
+    # The C code that converts a message ends the process without a traceback.
+    asserted = (_ASSERTED.fullmatch(line) for line in lines)
+    return parse_failures(lines) or tuple(
+        Failure("Assertion", one["message"], ()) for one in asserted if one
     )
 
 
