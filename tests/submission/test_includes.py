@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pytest
+
 from grader.submission.read.cmake import read_commands
 from grader.submission.read.cpp_contents import outline
-from grader.submission.read.includes import needed_files, read_included
+from grader.submission.read.includes import needed_files, read_included, with_own_headers
 
 CMAKE = """\
 find_package(ament_cmake REQUIRED)
@@ -94,6 +96,24 @@ def test_an_executable_needs_its_sources_their_libraries_and_headers() -> None:
     assert files >= {"p/src/one.cpp", "p/src/drive.cpp", "p/include/bot/drive.hpp"}
     assert "p/src/two.cpp" not in files and lines == {6}
     assert needed_files("script.py", commands, "p/", own) is None
+
+
+@pytest.mark.parametrize(
+    "cmake",
+    [
+        "add_executable(one ./src/one.cpp)",
+        "add_executable(one ${CMAKE_CURRENT_SOURCE_DIR}/src/one.cpp)",
+        "add_executable(one)\ntarget_sources(one PRIVATE src/one.cpp)",
+    ],
+)
+def test_the_sources_of_an_executable_may_be_named_in_any_way(cmake: str) -> None:
+    files, _ = needed_files("one", read_commands(cmake), "p/", ()) or (set(), set())
+    assert "p/src/one.cpp" in files
+
+
+def test_a_header_may_include_another_one() -> None:
+    own = [("a.cpp", "a.hpp"), ("a.hpp", "b.hpp"), ("b.hpp", "a.hpp"), ("c.cpp", "c.hpp")]
+    assert with_own_headers(["a.cpp"], own) == {"a.cpp", "a.hpp", "b.hpp"}
 
 
 def test_an_endless_list_of_includes_is_cut() -> None:

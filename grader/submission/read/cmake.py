@@ -24,6 +24,7 @@ _TOKEN = re.compile(
     re.VERBOSE | re.DOTALL,
 )
 _REFERENCE = re.compile(r"\$\{(\w+)\}")
+_FOLDER = ("CMAKE_CURRENT_SOURCE_DIR", "CMAKE_SOURCE_DIR", "PROJECT_SOURCE_DIR")
 # A list may be made of itself again and again.
 _LONGEST_VALUE = 10_000
 
@@ -53,7 +54,7 @@ class CMakeCommand:
 
 def read_commands(text: str) -> tuple[CMakeCommand, ...]:
     """The commands of a CMakeLists.txt in their order."""
-    variables: dict[str, str] = {}
+    variables = dict.fromkeys(_FOLDER, ".")
     found = []
     for name, written, line in _commands(text):
         arguments = tuple(_expanded(written, variables))

@@ -102,15 +102,27 @@ def needed_files(
         }
         pending += sorted((linked & targets.keys()) - about)
         about |= linked & targets.keys()
-    files = {folder + word for name in about for word in targets[name].arguments[1:]}
-    pending = sorted(files)
-    while pending:
-        file = pending.pop()
-        more = {header for includer, header in own if includer == file} - files
-        files |= more
-        pending += more
+    files = {
+        folder + posixpath.normpath(word)
+        for one in commands
+        if one.name in (*_PROGRAMS, "target_sources") and {*one.arguments[:1]} & about
+        for word in one.arguments[1:]
+    }
     lines = {one.line for one in commands if one.name in _USES and {*one.arguments[:1]} & about}
-    return files, lines
+    return with_own_headers(files, own), lines
+
+
+def with_own_headers(files: Iterable[str], own: Iterable[tuple[str, str]]) -> set[str]:
+    """Files, and the headers of their package that they include, directly or not."""
+    included: dict[str, set[str]] = {}
+    for file, header in own:
+        included.setdefault(file, set()).add(header)
+    found, pending = set(files), sorted(files)
+    while pending:
+        more = included.get(pending.pop(), set()) - found
+        found |= more
+        pending += more
+    return found
 
 
 def _own_header(header: str, includer: str, files: Collection[str]) -> str | None:
