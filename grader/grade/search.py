@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 
@@ -28,6 +28,7 @@ from grader.recording.model import Recording
 from grader.recording.submission import PackageRecord, SourceError, SourceFile, SubmissionRecord
 from grader.submission.read.answers import FILE as ANSWERS_FILE
 from grader.submission.read.cmake import read_commands
+from grader.submission.read.includes import with_own_headers
 from grader.submission.read.reachable import only_for
 
 _WORDS = {
@@ -138,7 +139,7 @@ class Search:
             elif of not in (None, package.name):
                 continue
             elif variable.in_ == "executables":
-                yield from (one for one in programs_of(package) if self._is_program(package, one))
+                yield from self._programs(package)
             elif variable.in_ == "interfaces":
                 yield from self._interfaces(package)
             elif variable.in_ == "launch_files":
@@ -184,11 +185,29 @@ class Search:
                 if here and of in (None, item.type):
                     yield item.name
 
-    def _is_program(self, package: PackageRecord, executable: str) -> bool:
-        """Whether the source of an executable creates what its role needs."""
-        parts = self.role.parts
-        sources = only_for(package, executable).sources if parts else ()
-        return all(any(_creates(source, *one) for source in sources) for one in parts)
+    def _programs(self, package: PackageRecord) -> list[str]:
+        """Executables whose source creates what the role needs, as far as its text shows.
+
+        One file shows it best. Else a helper of a base class may create it for others, so all files
+        of an executable count together; and CMakeLists.txt may not say which these are.
+        """
+        needed = {one: only_for(package, one) for one in programs_of(package)}
+        looks = (
+            {
+                name: [_with_headers(one, part) for one in part.sources]
+                for name, part in needed.items()
+            },
+            {name: [part.sources] for name, part in needed.items()},
+            {name: [package.sources] for name in needed},
+        )
+        doing = (
+            [name for name, files in look.items() if self._is_done_in(files)] for look in looks
+        )
+        return next(filter(None, doing), [])
+
+    def _is_done_in(self, looks: Sequence[Sequence[SourceFile]]) -> bool:
+        """Whether each part of the role is done by some of these groups of files."""
+        return all(any(_creates(files, *one) for files in looks) for one in self.role.parts)
 
     def _interfaces(self, package: PackageRecord) -> Iterator[str]:
         """Interfaces of a package; of those of any name, what has the kind of the example."""
@@ -330,16 +349,27 @@ def _does(recording: Recording, node: str, key: str, wanted: str) -> bool:
     )
 
 
-def _creates(source: SourceFile, key: str, wanted: str) -> bool:
-    """Whether a file creates what a role says, as far as its text shows."""
+def _with_headers(source: SourceFile, package: PackageRecord) -> list[SourceFile]:
+    """A file, and the headers of its package that it includes."""
+    read = with_own_headers([source.path], package.own_headers)
+    return [one for one in package.sources if one.path in read]
+
+
+def _creates(files: Sequence[SourceFile], key: str, wanted: str) -> bool:
+    """Whether files create together what a role says."""
     functions = {name for word in _DONE_BY[key][1] for name in word.functions}
-    made = [one for one in source.calls if one.short in functions]
+    made = [one for file in files for one in file.calls if one.short in functions]
     if not _TYPE.fullmatch(wanted):
         return any(_is(wanted, f"/{one.literal.lstrip('/')}", "") for one in made)
+    return bool(made) and any(_names(file, wanted) for file in files)
+
+
+def _names(source: SourceFile, wanted: str) -> bool:
+    """Whether a file imports or includes a type."""
     package, kind, name = wanted.split("/")
     header = f"{wanted}.hpp".lower().replace("_", "")
     imported = dict(source.names).values()
-    return bool(made) and (
+    return (
         f"{package}.{kind}.{name}" in imported
         or (name in source.uses and bool({package, f"{package}.{kind}"} & {*imported}))
         or any(one.lower().replace("_", "") == header for one, _, _ in source.includes)

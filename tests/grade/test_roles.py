@@ -302,6 +302,58 @@ def test_a_message_and_a_service_of_any_name_are_told_apart_by_their_kind(
     assert (found["talker"], found["asker"], found["node"]) == ("say", "hear", "/me")
 
 
+def compiled(**files: tuple[str, ...]) -> SubmissionRecord:
+    """A package in C++: each program has a source, and its types are included by its header."""
+    sources, headers = [], []
+    for name, types in files.items():
+        source_file, header = f"src/bot_publisher/{name}.cpp", f"src/bot_publisher/{name}.hpp"
+        calls = (SourceCall("create_publisher", 7), SourceCall("create_service", 8))
+        sources.append(SourceFile(source_file, "", calls=calls))
+        included = tuple((one, line, False) for line, one in enumerate(types, start=1))
+        sources.append(SourceFile(header, "", includes=included))
+        headers.append((source_file, header))
+    mine = dataclasses.replace(
+        package(executables=tuple(files), sources=tuple(sources)),
+        entry_points=(),
+        own_headers=tuple(headers),
+        build_type="ament_cmake",
+        cmake="".join(f"add_executable({name} {name}.cpp)\n" for name in files),
+    )
+    return dataclasses.replace(
+        submission(mine), packages=(mine, *team(WORD, QUESTION).packages[1:])
+    )
+
+
+def test_the_type_of_a_role_may_be_included_by_a_header(free: LoadedAssignment) -> None:
+    record = compiled(say=("own/msg/word.hpp",), hear=("own/srv/question.hpp",))
+    found = values(graded(free, record))
+    assert (found["talker"], found["asker"]) == ("say", "hear")
+
+
+def test_a_helper_in_another_file_may_create_it(free: LoadedAssignment) -> None:
+    base, creates = "bot_publisher.base", ("create_publisher", "create_service")
+    record = team(WORD, QUESTION, say=("own.msg.Word", base), hear=("own.srv.Question", base))
+    mine = record.packages[0]
+    users = (dataclasses.replace(one, calls=()) for one in mine.sources)
+    calls = tuple(SourceCall(one, 7) for one in creates)
+    helper = SourceFile("bot_publisher/base.py", base, calls=calls)
+    mine = dataclasses.replace(mine, sources=(*users, helper))
+    record = dataclasses.replace(record, packages=(mine, *record.packages[1:]))
+    found = values(graded(free, record))
+    assert (found["talker"], found["asker"]) == ("say", "hear")
+
+
+def test_which_program_is_meant_is_asked_where_its_files_are_not_known(
+    free: LoadedAssignment,
+) -> None:
+    record = compiled(say=("own/msg/word.hpp",), hear=("own/srv/question.hpp",))
+    cmake = "add_executable(say ${SAY})\nadd_executable(hear ${HEAR})\n"
+    mine = dataclasses.replace(record.packages[0], cmake=cmake)
+    record = dataclasses.replace(record, packages=(mine, *record.packages[1:]))
+    finding = graded(free, record).result("talker_executable").decisive.finding
+    assert finding.asks and "`hear` and `say`" in finding.observed
+
+
 def test_one_program_may_have_two_roles_of_the_contract(free: LoadedAssignment) -> None:
     record = team(WORD, QUESTION, all=("own.msg.Word", "own.srv.Question"))
     grade = graded(free, record, ends("/me", {}, {"/talk": "own/msg/Word"}))
