@@ -29,7 +29,8 @@ from grader.submission.read.answers import read_answers
 from grader.submission.read.bag import ReadBag, read_bags
 from grader.submission.read.cpp import read_cpp
 from grader.submission.read.document import read_headings
-from grader.submission.read.package import Package, read_package, record_packages
+from grader.submission.read.package import Package, read_package
+from grader.submission.read.package_record import record_packages
 from grader.submission.read.parameter_file import read_parameter_files
 from grader.submission.read.rosdistro import PACKAGES
 from grader.submission.read.source import Allowance
@@ -100,9 +101,10 @@ def prepare(path: Path | str, how: Preparation) -> Prepared:
         with how.place(is_second), opened(source) as located:
             if how.source_folder is not None:
                 keep_source(located.root, how.source_folder)
-            bags = _read_bags(located, how) if how.with_bags else None
-            prepared = _prepare(located, how, store, is_second)
-            return prepared if bags is None else _with_bags(prepared, bags)
+            bags: Sequence[ReadBag] = ()
+            if how.with_bags:
+                bags = read_bags(located, how.ros, how.sandbox, how.bag_types)
+            return _with_bags(_prepare(located, how, store, is_second), bags)
 
     try:
         return once_more(attempt)
@@ -110,13 +112,9 @@ def prepare(path: Path | str, how: Preparation) -> Prepared:
         return refused(source, error)
 
 
-def _read_bags(located: Located, how: Preparation) -> tuple[ReadBag, ...]:
-    return read_bags(located, how.ros, how.sandbox, how.bag_types)
-
-
-def _with_bags(prepared: Prepared, found: Sequence[ReadBag]) -> Prepared:
-    record = replace(prepared.record, bags=tuple(one.record for one in found))
-    kept = {one.record.path: one.kept for one in found if one.kept is not None}
+def _with_bags(prepared: Prepared, bags: Sequence[ReadBag]) -> Prepared:
+    record = replace(prepared.record, bags=tuple(bag.record for bag in bags))
+    kept = {bag.record.path: bag.kept for bag in bags if bag.kept is not None}
     return replace(prepared, record=record, bags=kept)
 
 
@@ -139,13 +137,8 @@ def needed_packages(path: Path, ros: RosInstallation) -> set[str]:
             packages = [read_package(located, folder, ros, allowance) for folder in folders]
     except SubmissionError:
         return set()
-    used = {name for package in packages for name in package.used}
-    return (used & PACKAGES) - {package.name for package in packages}
-
-
-def _named(packages: Sequence[Package]) -> set[str]:
-    used = {name for package in packages for name in package.named}
-    return used - {package.name for package in packages}
+    required = {name for package in packages for name in package.required_packages}
+    return (required & PACKAGES) - {package.name for package in packages}
 
 
 def fingerprint(path: Path | str) -> str:
@@ -174,29 +167,12 @@ def _hash(source: Path) -> str:
 
 
 def _prepare(located: Located, how: Preparation, store: UnderlayStore, is_second: bool) -> Prepared:
-    ros, allowance = how.ros, Allowance()
-    outlines = read_cpp(located, ros, how.sandbox)
-    answers, answers_problem = read_answers(located.root, located.files)
-    packages = [
-        read_package(located, folder, ros, allowance, outlines)
-        for folder in located.packages[:_MAX_PACKAGES]
-    ]
-    record = SubmissionRecord(
-        located.id,
-        located.sha256,
-        find_problem(located, packages if how.needs_build else None),
-        record_packages(packages, ros, None),
-        leftovers=located.leftovers,
-        files=tuple(shown(file.path) for file in located.files[:_MOST_PATHS]),
-        headings=read_headings(located.root, located.files),
-        answers=answers,
-        answers_problem=answers_problem,
-        parameter_files=read_parameter_files(located.root, located.files),
-    )
+    packages, record = _read(located, how)
     if record.problem is not None or not how.needs_build:
         return Prepared(record, None)
-    used = _named(packages)
-    ros = store.completed(store.needed(ros, used), used)
+    possible = {name for package in packages for name in package.possible_packages}
+    possible -= {package.name for package in packages}
+    ros = store.completed(store.needed(how.ros, possible), possible)
     sources = Sources(
         files={file.path for file in located.files},
         folders={package.name: package.folder for package in packages},
@@ -218,6 +194,30 @@ def _prepare(located: Located, how: Preparation, store: UnderlayStore, is_second
         installed = inspect(built.install, sources.folders, hashes)
     record = replace(record, packages=record_packages(packages, ros, installed), build=built.build)
     return Prepared(record, built.install, ros.underlays)
+
+
+def _read(located: Located, how: Preparation) -> tuple[list[Package], SubmissionRecord]:
+    """The packages of a submission, and its record as far as there is one without a build."""
+    allowance = Allowance()
+    outlines = read_cpp(located, how.ros, how.sandbox)
+    answers, answers_problem = read_answers(located.root, located.files)
+    packages = [
+        read_package(located, folder, how.ros, allowance, outlines)
+        for folder in located.packages[:_MAX_PACKAGES]
+    ]
+    record = SubmissionRecord(
+        located.id,
+        located.sha256,
+        find_problem(located, packages if how.needs_build else None),
+        record_packages(packages, how.ros, None),
+        leftovers=located.leftovers,
+        files=tuple(shown(file.path) for file in located.files[:_MOST_PATHS]),
+        headings=read_headings(located.root, located.files),
+        answers=answers,
+        answers_problem=answers_problem,
+        parameter_files=read_parameter_files(located.root, located.files),
+    )
+    return packages, record
 
 
 def find_problem(located: Located, packages: Sequence[Package] | None) -> str | None:

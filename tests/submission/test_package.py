@@ -6,7 +6,8 @@ from grader.machine.ros import RosInstallation
 from grader.recording.submission import Import, PackageRecord
 from grader.submission.build.installed import InstallSpace
 from grader.submission.intake.locate import opened
-from grader.submission.read.package import read_package, record_packages
+from grader.submission.read.package import read_package
+from grader.submission.read.package_record import record_packages
 from tests.submission.samples import MANIFEST, NODE, Tree
 
 FOLDER = "src/bot_publisher"

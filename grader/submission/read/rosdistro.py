@@ -26,4 +26,7 @@ PYTHON_MODULES: dict[str, tuple[str, ...]] = {
     # The tutorials declare tf2_ros, but since Foxy its Python half is a package of its own.
     "tf2_ros": ("tf2_ros", "tf2_ros_py"),
 }
-"""Importable module -> packages, any of which provides it; the first is the usual one."""
+"""Importable module -> packages, any of which provides it.
+
+The first is the one that people declare, the last the one that installs the module.
+"""
