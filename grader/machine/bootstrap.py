@@ -32,7 +32,10 @@ Version = Tuple[int, int]
 OnLine = Callable[[str], object]
 
 DISTRO = "jazzy"
+_JAZZY = f"ROS 2 {DISTRO.title()}"
 SUPPORTED = ((3, 13), (3, 12), (3, 11), (3, 10))
+"""The Pythons that there are wheels of ROS for, the preferred first."""
+_PYTHON_OF_JAZZY = (3, 12)
 WHEELS_PLATFORM = "linux-x86_64"
 VENV = ".venv"
 STAMP = "rosgrade-setup.json"
@@ -55,7 +58,7 @@ _FROM_SYSTEM = {"numpy", "empy", "lark-parser"}
 # One package of the lock has no wheel and is built by these, so they are installed before it.
 _BUILD_TOOLS = {"setuptools"}
 _MARK, _ERROR_MARK = "rosgrade: ", "rosgrade: error: "
-_TOLD_EACH = 20
+_PACKAGES_PER_LINE = 20
 """Packages between two lines of progress."""
 
 
@@ -98,34 +101,41 @@ def plan(
         ros_python: The Python version that the sourced ROS was built for, or None.
     """
     distro = _sourced(environ)
-    jazzy = f"ROS 2 {DISTRO.title()}"
+    refusal = _refusal(distro, platform, ros_python)
+    if refusal:
+        raise SetupError(refusal)
+    usable = (ros_python,) if distro else SUPPORTED
+    unusable: List[str] = []
+    for interpreter in interpreters:
+        if interpreter.version in usable:
+            return Plan("system" if distro else "wheels", interpreter)
+        unusable.append(_dotted(interpreter.version))
+    advised = ros_python or _PYTHON_OF_JAZZY
+    raise SetupError(
+        f"rosgrade needs Python {_dotted(advised) if distro else _supported()} and here is only "
+        f"{', '.join(unusable) or 'none'}: sudo apt install python{_dotted(advised)}-venv"
+    )
+
+
+def _refusal(distro: str, platform: str, ros_python: Optional[Version]) -> str:
+    """Why no Python of this machine could help, in words for the user; empty if one may."""
     if distro and distro != DISTRO:
-        raise SetupError(
-            f"ROS 2 {distro.title()} is sourced in this shell and rosgrade is for {jazzy}: use a "
-            f"shell that sources nothing (rosgrade then installs its own ROS) or {jazzy}"
+        return (
+            f"ROS 2 {distro.title()} is sourced in this shell and rosgrade is for {_JAZZY}: use a "
+            f"shell that sources nothing (rosgrade then installs its own ROS) or {_JAZZY}"
         )
     if distro and ros_python not in SUPPORTED:
-        raise SetupError(
-            f"{jazzy} is sourced in this shell but holds no rclpy for Python {_supported()}: use a "
-            f"shell that sources nothing, or sudo apt install ros-{DISTRO}-rclpy "
+        return (
+            f"{_JAZZY} is sourced in this shell but holds no rclpy for Python {_supported()}: use "
+            f"a shell that sources nothing, or sudo apt install ros-{DISTRO}-rclpy "
             f"ros-{DISTRO}-common-interfaces"
         )
     if not distro and platform != WHEELS_PLATFORM:
-        raise SetupError(
-            f"{jazzy} comes as wheels for {WHEELS_PLATFORM} only and this is {platform}: source "
-            f"{jazzy} and try again, or use a container that has it, such as ros:{DISTRO}"
+        return (
+            f"{_JAZZY} comes as wheels for {WHEELS_PLATFORM} only and this is {platform}: source "
+            f"{_JAZZY} and try again, or use a container that has it, such as ros:{DISTRO}"
         )
-    wanted = (ros_python,) if distro else SUPPORTED
-    seen: List[str] = []
-    for interpreter in interpreters:
-        if interpreter.version in wanted:
-            return Plan("system" if distro else "wheels", interpreter)
-        seen.append(_dotted(interpreter.version))
-    needed = _dotted(ros_python) if distro else _supported()
-    raise SetupError(
-        f"rosgrade needs Python {needed} and here is only {', '.join(seen) or 'none'}: sudo apt "
-        f"install python{_dotted(ros_python or SUPPORTED[1])}-venv"
-    )
+    return ""
 
 
 def read_lock(lock_text: str) -> List[Locked]:
@@ -140,19 +150,17 @@ def read_lock(lock_text: str) -> List[Locked]:
     return entries
 
 
-def requirements(lock_text: str, plan: Plan) -> str:
-    """Return the part of the lock that is installed under this plan.
+def requirements(lock_text: str, chosen: Plan) -> str:
+    """Return the part of the lock that is installed under a plan.
 
     With the system's ROS that is all but the ROS wheels and what the system's ROS was made for.
     """
-    entries = read_lock(lock_text)
-    if plan.ros == "system":
-        entries = [
-            entry
-            for entry in entries
-            if not entry.name.startswith("ros-") and entry.name not in _FROM_SYSTEM
-        ]
-    return "".join(entry.text for entry in entries)
+    return "".join(
+        entry.text
+        for entry in read_lock(lock_text)
+        if chosen.ros == "wheels"
+        or not (entry.name.startswith("ros-") or entry.name in _FROM_SYSTEM)
+    )
 
 
 def find_ros_python(ament_prefix_path: str) -> Optional[Version]:
@@ -194,17 +202,16 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
         sysconfig.get_platform(),
         find_ros_python(environ.get("AMENT_PREFIX_PATH", "")),
     )
-    without_rosgrade = {
+    is_kit = not (root / "pyproject.toml").exists()
+    source = max(root.glob("rosgrade-*.whl")) if is_kit else root / "pyproject.toml"
+    wanted = {
         # A virtual environment does not survive being moved.
         "root": str(root),
         "ros": chosen.ros,
         "python": _dotted(chosen.interpreter.version),
         "lock": hashlib.sha256(lock_text.encode()).hexdigest(),
-        "pyproject": "",
+        "pyproject": hashlib.sha256(source.read_bytes()).hexdigest(),
     }
-    is_kit = not (root / "pyproject.toml").exists()
-    source = max(root.glob("rosgrade-*.whl")) if is_kit else root / "pyproject.toml"
-    wanted = {**without_rosgrade, "pyproject": hashlib.sha256(source.read_bytes()).hexdigest()}
     venv = root / VENV
     with _alone(root):
         installed = _read_stamp(venv)
@@ -216,21 +223,14 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
         # A sandbox runs as another user where rosgrade runs as root; there is no secret in it.
         os.umask(0o022)
         lacks = lacking(chosen.interpreter)
-        if {**installed, "pyproject": ""} != without_rosgrade:
+        if _without_rosgrade(installed) != _without_rosgrade(wanted):
             if any(package.endswith("-venv") for package in lacks):
                 raise SetupError(
                     f"rosgrade needs Python's venv: sudo apt install {' '.join(lacks)}"
                 )
-            _remove(venv)
-            try:
-                _create(venv, chosen)
-                _install_lock(venv, requirements(lock_text, chosen))
-                _check_imports(venv, environ)
-            except BaseException:
-                _remove(venv)
-                raise
+            _make_environment(venv, chosen, lock_text, environ)
         # Only now, so that an interrupted set-up is not taken for a finished one.
-        _write_stamp(venv, without_rosgrade)
+        _write_stamp(venv, _without_rosgrade(wanted))
         _say("installing rosgrade itself")
         itself = ["--force-reinstall", str(source)] if is_kit else ["--editable", str(root)]
         options = ["--no-deps", "--no-build-isolation", *itself]
@@ -240,10 +240,27 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
         if chosen.ros == "wheels":
             _add_ros2(venv, environ)
     if lacks:
-        what = "for the sandbox and for packages that are compiled"
-        _say(f"not here, {what}: sudo apt install {' '.join(lacks)}")
+        purpose = "for the sandbox and for packages that are compiled"
+        _say(f"not here, {purpose}: sudo apt install {' '.join(lacks)}")
     if not is_kit:
         _say(f"ready: {VENV}/bin/rosgrade --help")
+
+
+def _without_rosgrade(stamp: Mapping[str, str]) -> Dict[str, str]:
+    """The stamp of the same environment as long as rosgrade itself is not in it."""
+    return {**stamp, "pyproject": ""}
+
+
+def _make_environment(venv: Path, chosen: Plan, lock_text: str, environ: Mapping[str, str]) -> None:
+    """Make the environment anew, with all but rosgrade itself; a half-made one is removed."""
+    _remove(venv)
+    try:
+        _create(venv, chosen)
+        _install_lock(venv, requirements(lock_text, chosen))
+        _check_imports(venv, environ)
+    except BaseException:
+        _remove(venv)
+        raise
 
 
 def main(root: Optional[str] = None) -> int:
@@ -260,47 +277,48 @@ def main(root: Optional[str] = None) -> int:
 
 def lacking(interpreter: Interpreter) -> List[str]:
     """Return the packages of Debian and Ubuntu that rosgrade needs and this machine lacks."""
-    found = [package for program, package in _PROGRAMS.items() if not shutil.which(program)]
+    packages = [package for program, package in _PROGRAMS.items() if not shutil.which(program)]
     for part, code in _PARTS_OF_PYTHON.items():
         if _run([interpreter.path, "-I", "-c", code]).returncode:
-            found.append(f"python{_dotted(interpreter.version)}-{part}")
-    return found
+            packages.append(f"python{_dotted(interpreter.version)}-{part}")
+    return packages
 
 
 def _create(venv: Path, chosen: Plan) -> None:
-    version = _dotted(chosen.interpreter.version)
-    python = chosen.interpreter.path
-    system = chosen.ros == "system"
-    _say(f"creating {VENV} (Python {version}{', with the sourced ROS' * system})")
-    options = ["--system-site-packages"] if system else []
-    command = [python, "-I", "-m", "venv", *options, str(venv)]
+    what, options = f"Python {_dotted(chosen.interpreter.version)}", []
+    if chosen.ros == "system":
+        what += ", with the sourced ROS"
+        options = ["--system-site-packages"]
+    _say(f"creating {VENV} ({what})")
+    command = [chosen.interpreter.path, "-I", "-m", "venv", *options, str(venv)]
     _expect(command, "the virtual environment could not be made")
 
 
 def _install_lock(venv: Path, lock_text: str) -> None:
     entries = read_lock(lock_text)
     # Some have an entry for each version of Python.
-    count = len({entry.name for entry in entries})
-    seen = 0
+    total = len({entry.name for entry in entries})
+    arrived = 0
 
-    def tell(line: str) -> None:
-        nonlocal seen
+    def tell_progress(line: str) -> None:
+        nonlocal arrived
         if line.startswith(("Collecting ", "Requirement already satisfied: ")):
-            seen += 1
-            if seen % _TOLD_EACH == 0:
-                _say(f"{seen} of {count} packages are here")
-        elif seen > _TOLD_EACH and line.startswith("Installing collected packages"):
-            _say(f"{seen} of {count} packages are here and being unpacked")
+            arrived += 1
+            if arrived % _PACKAGES_PER_LINE == 0:
+                _say(f"{arrived} of {total} packages are here")
+        elif arrived > _PACKAGES_PER_LINE and line.startswith("Installing collected packages"):
+            _say(f"{arrived} of {total} packages are here and being unpacked")
 
-    _say(f"fetching {count} packages")
-    for stage, tools in enumerate((True, False)):
-        text = "".join(entry.text for entry in entries if (entry.name in _BUILD_TOOLS) == tools)
+    _say(f"fetching {total} packages")
+    tools = [entry for entry in entries if entry.name in _BUILD_TOOLS]
+    others = [entry for entry in entries if entry.name not in _BUILD_TOOLS]
+    for stage, part in enumerate((tools, others)):
         path = venv / f"requirements-{stage}.txt"
-        path.write_text(text, encoding="utf-8")
+        path.write_text("".join(entry.text for entry in part), encoding="utf-8")
         # Built without isolation, a source uses the locked tools: nothing unlocked is fetched.
         options = ["--no-deps", "--no-build-isolation", "--use-pep517", "--require-hashes"]
         problem = "the packages could not be installed; is the package index reachable?"
-        _pip(venv, [*options, "-r", str(path)], problem, tell)
+        _pip(venv, [*options, "-r", str(path)], problem, tell_progress)
 
 
 def _add_ros2(venv: Path, environ: Mapping[str, str]) -> None:
@@ -309,34 +327,44 @@ def _add_ros2(venv: Path, environ: Mapping[str, str]) -> None:
     rosgrade = str(venv / "bin" / "rosgrade")
     command = [rosgrade, "underlay", "add", "--wait", "10", "ros2cli"]
 
-    def tell(line: str) -> None:
+    def pass_on(line: str) -> None:
         if not line.startswith(_ERROR_MARK):
             print(line, end="", flush=True)
 
     try:
-        done = _run(command, _clean(environ), tell)
-        problem = "" if not done.returncode else (done.stdout.splitlines() or ["no reason"])[-1]
+        done = _run(command, _clean(environ), pass_on)
+        if not done.returncode:
+            return
+        reason = _last_line(done.stdout)
     except OSError as error:
-        problem = str(error)
-    if problem:
-        reason = problem.replace(_ERROR_MARK, "")
-        _say(f"no ros2 yet ({reason}); to get it: {VENV}/bin/rosgrade underlay add ros2cli")
+        reason = str(error)
+    reason = reason.replace(_ERROR_MARK, "")
+    _say(f"no ros2 yet ({reason}); to get it: {VENV}/bin/rosgrade underlay add ros2cli")
 
 
 def _import_underlays(root: Path, environ: Mapping[str, str]) -> None:
     """Take the built packages that a course gives along; quick where they are there already."""
-    named = root / UNDERLAYS_PLACE
-    place = named.read_text(encoding="utf-8").strip() if named.is_file() else ""
-    place = str(root / UNDERLAYS_FILE) if (root / UNDERLAYS_FILE).is_file() else place
+    archive, address = root / UNDERLAYS_FILE, root / UNDERLAYS_PLACE
+    if archive.is_file():
+        place = str(archive)
+    elif address.is_file():
+        place = address.read_text(encoding="utf-8").strip()
+    else:
+        return
     if not place:
         return
     command = [str(root / VENV / "bin" / "rosgrade"), "underlay", "import", place]
     done = _run(command, _clean(environ))
-    last = (done.stdout.splitlines() or ["no reason"])[-1]
+    answer = _last_line(done.stdout)
     if done.returncode:
-        _say(f"built packages were not imported ({last.replace(_ERROR_MARK, '')})")
+        _say(f"built packages were not imported ({answer.replace(_ERROR_MARK, '')})")
     else:
-        _say(f"built packages: {last.replace(_MARK, '')}")
+        _say(f"built packages: {answer.replace(_MARK, '')}")
+
+
+def _last_line(output: str) -> str:
+    """The line in which a command of rosgrade says how it ended."""
+    return (output.splitlines() or ["no reason"])[-1]
 
 
 def _clean(environ: Mapping[str, str]) -> Dict[str, str]:
@@ -388,12 +416,13 @@ def _expect(
 
 def _interpreter(path: Optional[str]) -> Iterator[Interpreter]:
     """Yield the interpreter at `path` if it runs: a version manager's stand-in may not."""
+    if not path:
+        return
     # The real path, as `path` may lie in the very environment that is about to be replaced.
     code = "import os, sys; print(*sys.version_info[:2], os.path.realpath(sys.executable))"
-    done = _run([path, "-I", "-c", code]) if path else None
-    found = re.fullmatch(r"(\d+) (\d+) (.+)\n", done.stdout) if done else None
-    if found:
-        yield Interpreter((int(found.group(1)), int(found.group(2))), found.group(3))
+    answer = re.fullmatch(r"(\d+) (\d+) (.+)\n", _run([path, "-I", "-c", code]).stdout)
+    if answer:
+        yield Interpreter((int(answer.group(1)), int(answer.group(2))), answer.group(3))
 
 
 def _sourced(environ: Mapping[str, str]) -> str:
