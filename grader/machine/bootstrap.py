@@ -203,7 +203,7 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
         find_ros_python(environ.get("AMENT_PREFIX_PATH", "")),
     )
     is_kit = not (root / "pyproject.toml").exists()
-    source = max(root.glob("rosgrade-*.whl")) if is_kit else root / "pyproject.toml"
+    source = newest_wheel(root) if is_kit else root / "pyproject.toml"
     wanted = {
         # A virtual environment does not survive being moved.
         "root": str(root),
@@ -244,6 +244,15 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
         _say(f"not here, {purpose}: sudo apt install {' '.join(lacks)}")
     if not is_kit:
         _say(f"ready: {VENV}/bin/rosgrade --help")
+
+
+def newest_wheel(kit: Path) -> Path:
+    """Return the wheel of rosgrade; a newer kit may have been unpacked over an older one."""
+
+    def version(wheel: Path) -> List[int]:
+        return [int(number) for number in re.findall(r"\d+", wheel.name.split("-")[1])]
+
+    return max(kit.glob("rosgrade-*.whl"), key=version)
 
 
 def _without_rosgrade(stamp: Mapping[str, str]) -> Dict[str, str]:

@@ -333,3 +333,9 @@ def test_a_set_up_imports_the_built_packages_that_lie_beside_it_and_goes_on_with
 def test_a_set_up_that_fails_leaves_nothing_half_made(tmp_path: Path) -> None:
     assert set_up(tmp_path, "one", "bootstrap._install_lock = None") != 0
     assert not (tmp_path / ".venv").exists()
+
+
+def test_of_the_wheels_of_two_kits_the_newer_one_is_installed(tmp_path: Path) -> None:
+    for version in ("0.9.0", "0.10.0", "0.2.1"):
+        (tmp_path / f"rosgrade-{version}-py3-none-any.whl").touch()
+    assert bootstrap.newest_wheel(tmp_path).name == "rosgrade-0.10.0-py3-none-any.whl"
