@@ -18,7 +18,8 @@ from grader.errors import UsageError
 from grader.machine import resources
 from grader.machine.bootstrap import APT, UNDERLAYS_FILE, UNDERLAYS_PLACE
 from grader.report.files import refuse_inputs, refuse_part, write_whole
-from grader.submission.underlay.transfer import check_archive, is_address
+from grader.submission.underlay.portable import check_archive
+from grader.submission.underlay.transfer import is_address
 
 _CHECKOUT = ("pyproject.toml", "requirements.lock", "README.md", "LICENSE")
 _FOLDERS = ("grader", "sim", "templates", "docs/concepts")

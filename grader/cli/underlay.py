@@ -22,6 +22,7 @@ from grader.sandbox.choice import Choice
 from grader.spec.nearest_name import nearest_or_all
 from grader.submission.underlay import transfer
 from grader.submission.underlay.definition import SETS, find_underlay, packages_of_ros
+from grader.submission.underlay.portable import sha256_of
 from grader.submission.underlay.ros2_command import write_command
 from grader.submission.underlay.store import UnderlayStore
 
@@ -133,7 +134,7 @@ def export_command(
     wanted = [package for name in names or () for package in packages_of_ros(name).packages]
     written = transfer.export(store.packages, wanted, file)
     say(f"{file}: {', '.join(written)}")
-    say(f"To name where it lies: https://ADDRESS/{file.name}#sha256={transfer.sha256_of(file)}")
+    say(f"To name where it lies: https://ADDRESS/{file.name}#sha256={sha256_of(file)}")
 
 
 @app.command("import")

@@ -15,7 +15,7 @@ import pytest
 
 from grader.errors import UsageError
 from grader.machine.ros import RosInstallation
-from grader.submission.underlay import transfer
+from grader.submission.underlay import portable, transfer
 from grader.submission.underlay.building import digest
 from grader.submission.underlay.distribution import SNAPSHOT
 from grader.submission.underlay.kept import Installed
@@ -127,7 +127,7 @@ def rewritten(archive: Path, folder: Path, change: Change) -> Path:
         for member in old:
             content = old.extractfile(member)
             data = content.read() if content else b""
-            if member.name == transfer.MANIFEST:
+            if member.name == portable.MANIFEST:
                 contents = json.loads(data)
                 change(contents)
                 data = json.dumps(contents).encode()
