@@ -23,7 +23,7 @@ from grader.sandbox.limits import BUILD
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
 from grader.sandbox.usage import Usage
-from grader.submission.build.build import build_key
+from grader.submission.build.build_key import build_key
 from grader.submission.build.colcon import BuildLimits, builds_at_once
 from grader.submission.build.own_time import OwnTime
 from grader.submission.prepare import Preparation, Prepared, prepare

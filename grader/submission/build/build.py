@@ -7,87 +7,29 @@ business of a sandbox around them.
 
 from __future__ import annotations
 
-import errno
-import hashlib
-import json
-import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import NamedTuple, TypeVar
 
-from grader.errors import GraderFault, machine_fault
 from grader.machine.out_of_memory import oom_kills
 from grader.machine.resources import INSTALL
-from grader.machine.ros import RosInstallation
 from grader.recording.submission import BuildRecord
 from grader.submission.build import build_log, own_tests, standalone_build
 from grader.submission.build.bounded import Outcome, Starved
 from grader.submission.build.build_cache import BuildCache, CachedBuild
 from grader.submission.build.build_error_location import Sources, find_build_error, last_started
-from grader.submission.build.colcon import COMPILE_S, BuildLimits, BuildSetting, Colcon
+from grader.submission.build.build_key import build_key
+from grader.submission.build.colcon import COMPILE_S, BuildSetting, Colcon
+from grader.submission.build.ended import BuildKilled, check_machine, passed_limit
 from grader.submission.build.installed import tidy
 from grader.submission.build.ros_damage import damaged, state_of
-from grader.submission.build.toolchain import missing_here, missing_tools, watched_folders
+from grader.submission.build.toolchain import missing_here, missing_tools
 from grader.submission.intake.locate import Located, only
-from grader.submission.intake.members import MIB
 from grader.submission.read.rosdistro import PACKAGES
 
-if TYPE_CHECKING:
-    from grader.sandbox.sandbox import Sandbox
-
 _T = TypeVar("_T")
-# Raise it when the same submission would now be built differently.
-_VERSION = 7
-_TOOLS = ("cc", "c++", "cmake", "ld", "make", "ninja")
-_SUMMARY = re.compile(r"Summary: \d+ packages? finished")
-_SIGNALLED = 128
-# What colcon, Python, compilers and make say of a program of theirs that was killed.
-_KILLED = re.compile(r"code -9\b|\bSIGKILL\b|\bKilled\b")
-_LEAST_FREE_BYTES = 64 * MIB
-# Error messages of the programs that set up a sandbox, the last of which starts colcon.
-_NOT_STARTED = re.compile(r"(?:/\S*/)?(?:sh|unshare|mkdir|mount|setpriv|bwrap|prlimit): .*")
-
-
-def build_key(
-    sha256: str,
-    ros: RosInstallation,
-    limits: BuildLimits,
-    sandbox: Sandbox | None,
-    is_standalone: bool,
-    tested: frozenset[str] = frozenset(),
-) -> str:
-    """Name a build by everything that it depends on."""
-    watched = [prefix / "share/ament_index/resource_index/packages" for prefix in ros.prefixes]
-    # colcon and setuptools come with ROS, too.
-    watched += [ros.python, *ros.site_packages, *watched_folders()]
-    # What compiles and links, behind all links such as /etc/alternatives.
-    found = (shutil.which(name, path=ros.environment({})["PATH"]) for name in _TOOLS)
-    watched += [Path(tool).resolve() for tool in found if tool is not None]
-    parts = [
-        _VERSION,
-        sha256,
-        ros.source,
-        ros.distro,
-        str(ros.python),
-        [str(prefix) for prefix in ros.prefixes],
-        ros.inherited,
-        # An underlay is an install space in the cache, below the name of its build.
-        [str(underlay) for underlay in ros.underlays],
-        [(str(path), path.stat().st_mtime_ns) for path in watched if path.exists()],
-        sorted(ros.packages),
-        repr((limits.output, limits.room)),
-        sorted(sandbox.libraries) if sandbox is not None else None,
-        is_standalone,
-        sorted(tested),
-    ]
-    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
-
-
-class BuildKilled(GraderFault):
-    """A build was ended from outside; once more it may come to its end."""
 
 
 def once_more(attempt: Callable[[bool], _T]) -> _T:
@@ -96,6 +38,13 @@ def once_more(attempt: Callable[[bool], _T]) -> _T:
         return attempt(False)
     except (BuildKilled, Starved):
         return attempt(True)
+
+
+class _Built(NamedTuple):
+    """A build without the cache, and whether it would come to the same again on this machine."""
+
+    record: BuildRecord
+    is_certain: bool
 
 
 @dataclass(frozen=True)
@@ -142,9 +91,9 @@ class Builder:
         self.setting.on_progress("looking for an earlier build")
         with self.cache.locked(key, wait_s=wall_s + COMPILE_S):
             state = partial(state_of, self.setting.ros)
-            found = self.cache.find(key, state)
-            if found is not None:
-                return found
+            earlier = self.cache.find(key, state)
+            if earlier is not None:
+                return earlier
             parts = dict(self._parts(located, sources, standalone))
             with self.cache.unfinished() as unfinished:
                 # Beside the copy, so that relative paths in the log are the same on every run.
@@ -161,7 +110,11 @@ class Builder:
                     wall_s=wall_s,
                 )
                 record, is_certain = self._run(colcon, sources, parts)
-                seen_with = None if record.succeeded else state() if is_certain else ""
+                # A success holds for every state of the machine, a failure for this one only,
+                # and a failure for an uncertain reason is not taken again.
+                seen_with = None
+                if not record.succeeded:
+                    seen_with = state() if is_certain else ""
                 return self.cache.store(key, unfinished, record, seen_with)
 
     def _parts(
@@ -183,35 +136,29 @@ class Builder:
             if built.build.succeeded and built.install is not None:
                 yield name, built
 
-    def _run(
-        self, colcon: Colcon, sources: Sources, parts: Mapping[str, CachedBuild]
-    ) -> tuple[BuildRecord, bool]:
-        """Build without a look into the cache; also whether it would come to the same again."""
-        install = colcon.install
+    def _run(self, colcon: Colcon, sources: Sources, parts: Mapping[str, CachedBuild]) -> _Built:
+        """Build without a look into the cache, with the parts that were built before."""
+        limits, install = self.setting.limits, colcon.install
         for name, part in parts.items():
             assert part.install is not None
             standalone_build.lay(name, part.install, install)
             for line in part.build.log.splitlines():
                 self.setting.on_output(line)
-        finished = set(parts)
         # Made before the student's code runs, which could otherwise put a link in its place.
         install.mkdir(exist_ok=True)
-        kills = oom_kills()
-        check_python = self.setting.sandbox.watched() if self.setting.sandbox else None
-        outcome = colcon.build(finished)
-        self._check_machine(outcome, colcon, memory_ran_out=kills != oom_kills())
-        if check_python is not None and outcome.status != 0:
-            check_python()
+        finished = set(parts)
+        outcome = self._run_colcon(colcon, finished)
         problem = tidy(
             install,
             colcon.root,
-            most_bytes=self.setting.limits.install_bytes,
-            most_files=self.setting.limits.install_files,
+            most_bytes=limits.install_bytes,
+            most_files=limits.install_files,
         )
-        if problem is not None:
+        if problem is None:
+            problem = passed_limit(outcome, colcon.wall_s)
+        else:
             # Nothing of it is there any more.
             finished.clear()
-        problem = problem or _limit(outcome, colcon.wall_s)
         failed = sources.folders.keys() - finished
         record, is_certain = self._record(outcome, colcon, sources, failed, problem)
         if finished:
@@ -220,40 +167,30 @@ class Builder:
         else:
             # colcon writes its own setup files first.
             shutil.rmtree(install, ignore_errors=True)
-        builds = [part.build for part in parts.values()]
+        part_records = [part.build for part in parts.values()]
+        duration_s = record.duration_s + sum(part.duration_s for part in part_records)
         record = replace(
             record,
             tests=tuple(
                 own_tests.pytest_record(name, *colcon.test(sources.folders[name]))
                 for name in sorted(self.setting.tested & finished)
             ),
-            duration_s=round(record.duration_s + sum(one.duration_s for one in builds), 3),
-            log=build_log.ending("".join(one.log for one in builds) + record.log),
+            duration_s=round(duration_s, 3),
+            log=build_log.ending("".join(part.log for part in part_records) + record.log),
         )
-        return record, is_certain
+        return _Built(record, is_certain)
 
-    def _check_machine(self, outcome: Outcome, colcon: Colcon, *, memory_ran_out: bool) -> None:
-        """Raise an error for a failure that is not the student's fault."""
-        status, output = outcome.status, outcome.output
-        if status is None:
-            return
-        killed = status != 0 and _KILLED.search(output)
-        if killed and memory_ran_out:
-            raise GraderFault("this machine ran out of memory: a program of the build was killed")
-        unstarted = _NOT_STARTED.match(output) if status else None
-        if unstarted and "Starting >>>" not in output:
-            raise GraderFault(f"the sandbox of the build could not be started: {unstarted[0]}")
-        # A program of the build may also kill itself; then it does so again.
-        if _is_cut_off(status, output) or (killed and not self.is_second):
-            raise BuildKilled(
-                f"colcon ended in the middle of a build (status {status}), twice, although the "
-                "build was within its limits. Was it stopped, or did memory run out? Grade again"
-            )
-        if status != 0 and "No space left on device" in output:
-            for place in (colcon.scratch, colcon.install.parent):
-                full = machine_fault(OSError(errno.ENOSPC, "", str(place)))
-                if full is not None and shutil.disk_usage(place).free < _LEAST_FREE_BYTES:
-                    raise full
+    def _run_colcon(self, colcon: Colcon, finished: set[str]) -> Outcome:
+        """Build what is not finished yet; a fault of the machine raises."""
+        kills = oom_kills()
+        check_python = self.setting.sandbox.watched() if self.setting.sandbox else None
+        outcome = colcon.build(finished)
+        check_machine(
+            outcome, colcon, memory_ran_out=kills != oom_kills(), is_second=self.is_second
+        )
+        if check_python is not None and outcome.status != 0:
+            check_python()
+        return outcome
 
     def _record(
         self,
@@ -262,7 +199,12 @@ class Builder:
         sources: Sources,
         failed: set[str],
         problem: str | None,
-    ) -> tuple[BuildRecord, bool]:
+    ) -> _Built:
+        """What came of a build.
+
+        Args:
+            problem: Why the build was ended or cannot be used, or None.
+        """
         ros = [*self.setting.ros.underlays, *self.setting.ros.prefixes]
         paths = {
             str(colcon.root): "",
@@ -274,11 +216,13 @@ class Builder:
         log = build_log.clean(outcome.output, paths)
         succeeded = outcome.status == 0 and not failed and problem is None
         lacking = self._lacking(log, sources) if failed else set()
-        culprit = None if succeeded else find_build_error(log, failed, sources)
         timed_out = outcome.ended_by_us == "time"
-        is_certain = not timed_out and not lacking and not (culprit is None and problem is None)
-        if not succeeded and culprit is None:
-            culprit = last_started(log, sources, problem)
+        culprit, is_certain = None, False
+        if not succeeded:
+            culprit = find_build_error(log, failed, sources)
+            has_reason = culprit is not None or problem is not None
+            is_certain = has_reason and not timed_out and not lacking
+            culprit = culprit or last_started(log, sources, problem)
         log = build_log.folded(log)
         if problem is not None:
             log += f"\n[rosgrade: {problem}]\n"
@@ -292,45 +236,16 @@ class Builder:
             culprit=culprit,
             log=log,
         )
-        return record, is_certain
+        return _Built(record, is_certain)
 
     def _lacking(self, log: str, sources: Sources) -> set[str]:
         """What ROS 2 Jazzy has and is neither handed in nor whole on this machine."""
-        named = build_log.not_found(log)
-        wanted = named | build_log.modules_not_found(log)
-        missing = wanted & PACKAGES - self.setting.ros.packages - set(sources.folders)
-        tools = missing_tools(self.setting.ros.environment({})["PATH"])
+        ros = self.setting.ros
+        not_found = build_log.not_found(log)
+        packages = (not_found | build_log.modules_not_found(log)) & PACKAGES
         return (
-            missing
-            | missing_here(named)
-            | set(tools)
-            | damaged(log, self.setting.ros, sources.folders)
+            (packages - ros.packages - set(sources.folders))
+            | missing_here(not_found)
+            | set(missing_tools(ros.environment({})["PATH"]))
+            | damaged(log, ros, sources.folders)
         )
-
-
-def _is_cut_off(status: int, output: str) -> bool:
-    """Whether colcon ended without coming to its end.
-
-    In a sandbox no program of a build can send it a signal (see :func:`student_filter`), and none
-    can write to its memory: see :data:`~grader.submission.build.colcon.UNTOUCHABLE`.
-    """
-    if _SUMMARY.search(output):
-        # It ends with the status of what failed, such as sys.exit(137).
-        return False
-    # As a shell tells of a signal, and bubblewrap does.
-    if status < 0 or status > _SIGNALLED:
-        return True
-    return "Starting >>>" in output
-
-
-def _limit(outcome: Outcome, wall_s: float) -> str | None:
-    """The limit that a build passed, in words for the student."""
-    if outcome.ended_by_us is None:
-        return None
-    waited = "it waited for something" if outcome.waited else "it was still computing"
-    reasons = {
-        "time": f"after {wall_s:.0f} s: {waited}",
-        "output": "because it wrote too much output",
-    }
-    reason = reasons.get(outcome.ended_by_us, f"because {outcome.ended_by_us}")
-    return f"the build was ended {reason}"
