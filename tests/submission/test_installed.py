@@ -4,12 +4,8 @@ import os
 from pathlib import Path
 
 from grader.recording.submission import Definition
-from grader.submission.build.installed import (
-    hash_of,
-    inspect,
-    match_files,
-    tidy,
-)
+from grader.submission.build.installed import hash_of, inspect, match_files
+from grader.submission.build.tidy import tidy
 from tests.submission.samples import Tree
 
 SITE = "lib/python3.12/site-packages"

@@ -23,8 +23,8 @@ from grader.submission.build.build_error_location import Sources, find_build_err
 from grader.submission.build.build_key import build_key
 from grader.submission.build.colcon import COMPILE_S, BuildSetting, Colcon
 from grader.submission.build.ended import BuildKilled, check_machine, passed_limit
-from grader.submission.build.installed import tidy
 from grader.submission.build.ros_damage import damaged, state_of
+from grader.submission.build.tidy import tidy
 from grader.submission.build.toolchain import missing_here, missing_tools
 from grader.submission.intake.locate import Located, only
 from grader.submission.read.rosdistro import PACKAGES

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import stat
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
-from itertools import islice, takewhile
+from itertools import islice
 from pathlib import Path
 
 from grader.machine.ros import site_packages
@@ -65,30 +64,24 @@ class InstallSpace:
 
 
 def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) -> InstallSpace:
-    """Look at an install space; what is not a regular file there does not count."""
-    programs: dict[str, list[str]] = {}
-    # A wrong setup.cfg names the folder of another package, which need not be there.
-    for path in sorted((install / "lib").glob("*/*")):
-        if not path.parent.is_symlink() and _is_program(path) and _is_text(path.parent.name):
-            programs.setdefault(path.parent.name, []).append(path.name)
-    executables = {folder: tuple(names) for folder, names in programs.items()}
+    """Look at an install space; what is not a regular file there does not count.
+
+    Args:
+        sources: Path of each of the student's Python files -> hash of its content.
+    """
+    executables = _programs_by_folder(install / "lib")
     definitions = {}
     shared = {}
     python: dict[str, str] = {}
     for package in packages:
-        own = list(regular_files(install / "lib" / package))
+        scripts = list(regular_files(install / "lib" / package))
         executables[package] = tuple(
-            sorted({path.name for path in own if os.access(path, os.X_OK)})
+            sorted({path.name for path in scripts if os.access(path, os.X_OK)})
         )
-        python |= {path.relative_to(install).as_posix(): _hash(path) for path in own}
+        python |= {path.relative_to(install).as_posix(): _hash(path) for path in scripts}
         share = install / "share" / package
         definitions[package] = tuple(_definitions(share))
-        paths = list(islice(regular_files(share), _MOST_SHARED))
-        digests = {str(path): _hash(path) for path in paths if path.suffix == ".py"}
-        theirs = match_files(digests, sources)
-        shared[package] = tuple(
-            (path.relative_to(share).as_posix(), theirs.get(str(path), "")) for path in paths
-        )
+        shared[package] = _shared(share, sources)
     entry_points = {}
     for site in site_packages(install):
         modules = (path for path in regular_files(site) if path.suffix == ".py")
@@ -97,10 +90,9 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
             match = _DISTRIBUTION.fullmatch(metadata.name)
             if match:
                 entry_points[normalised(match["name"])] = _entry_points(metadata)
-    in_bin = sorted(path.name for path in regular_files(install / "bin"))
     return InstallSpace(
         executables,
-        tuple(in_bin),
+        tuple(sorted(path.name for path in regular_files(install / "bin"))),
         entry_points,
         python,
         match_files(python, sources),
@@ -110,62 +102,25 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
     )
 
 
-def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> str | None:
-    """See that an install space holds nothing that is dangerous to open or follow.
+def _programs_by_folder(lib: Path) -> dict[str, tuple[str, ...]]:
+    """Folder in ``lib`` -> its programs.
 
-    Symbolic links to the submission's files, or to nothing, are removed: they will lead nowhere.
-    The others are made relative, as the install space will be moved.
-
-    Returns:
-        Why it cannot be used at all, in which case it is removed, or None.
+    A wrong setup.cfg names the folder of another package, which need not be there.
     """
-    if install.is_symlink():
-        install.unlink()
-        return "the build put a symbolic link in place of the install space"
-    total = count = 0
-    planted: list[str] = []
-    base, own = os.path.realpath(install), os.path.realpath(sources)
-    for parent, folders, names in os.walk(install):
-        for name in [*folders, *names]:
-            path = Path(parent, name)
-            status = path.lstat()
-            if stat.S_ISLNK(status.st_mode):
-                end = os.path.realpath(path)
-                if not f"{end}/".startswith(f"{base}/"):
-                    if _exists(end) and not f"{end}/".startswith(f"{own}/"):
-                        target = str(path.readlink())
-                        planted.append(f"{_named(path, install)}, a link out to {target!r}")
-                    path.unlink()
-                elif not _exists(end):
-                    path.unlink()
-                elif path.readlink().is_absolute():
-                    path.unlink()
-                    path.symlink_to(os.path.relpath(end, os.path.realpath(parent)))
-            elif not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
-                planted.append(f"{_named(path, install)}, which is not a file, folder or link")
-                path.unlink()
-            total += status.st_size
-            count += 1
-    if total > most_bytes or count > most_files:
-        shutil.rmtree(install)
-        return f"the build installed more than {most_files} files or {most_bytes} bytes"
-    if planted:
-        shutil.rmtree(install)
-        return f"the build installed {min(planted)}"
-    return None
+    programs: dict[str, tuple[str, ...]] = {}
+    for path in sorted(lib.glob("*/*")):
+        folder = path.parent
+        if not folder.is_symlink() and _is_program(path) and _is_text(folder.name):
+            programs[folder.name] = (*programs.get(folder.name, ()), path.name)
+    return programs
 
 
-def _exists(path: str) -> bool:
-    """Whether a path leads to something; it may be one that no file system can have."""
-    try:
-        return Path(path).exists()
-    except OSError:
-        return False
-
-
-def _named(path: Path, install: Path) -> str:
-    """A path in quotes, since the student chose the name."""
-    return repr(str(path.relative_to(install)))
+def _shared(share: Path, sources: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+    """What is in ``share/<package>``, with the student's file of a Python file."""
+    paths = list(islice(regular_files(share), _MOST_SHARED))
+    hashes = {str(path): _hash(path) for path in paths if path.suffix == ".py"}
+    origins = match_files(hashes, sources)
+    return tuple((path.relative_to(share).as_posix(), origins.get(str(path), "")) for path in paths)
 
 
 def normalised(distribution: str) -> str:
@@ -192,22 +147,31 @@ def _is_text(name: str) -> bool:
 
 
 def match_files(python: Mapping[str, str], sources: Mapping[str, str]) -> dict[str, str]:
-    """Installed path -> the student's file of the same content whose path ends most alike."""
-    same: dict[str, list[str]] = {}
+    """Installed path -> the student's file of the same content whose path ends most alike.
+
+    Both are given with the hash of each file.
+    """
+    paths_by_hash: dict[str, list[str]] = {}
     for path, digest in sorted(sources.items()):
-        same.setdefault(digest, []).append(path)
+        paths_by_hash.setdefault(digest, []).append(path)
     return {
         # Of thousands of copies, any one will do.
-        path: max(same[digest][:_MOST_COPIES], key=partial(_common_ending, path))
+        path: max(paths_by_hash[digest][:_MOST_COPIES], key=partial(_common_ending, path))
         for path, digest in python.items()
-        if digest in same
+        if digest in paths_by_hash
     }
 
 
-def _common_ending(one: str, other: str) -> int:
+def _common_ending(path: str, other: str) -> int:
     """How many parts at the end of two paths are the same."""
-    pairs = zip(reversed(one.split("/")), reversed(other.split("/")), strict=False)
-    return len(list(takewhile(lambda pair: pair[0] == pair[1], pairs)))
+    count = 0
+    for part, other_part in zip(
+        reversed(path.split("/")), reversed(other.split("/")), strict=False
+    ):
+        if part != other_part:
+            break
+        count += 1
+    return count
 
 
 def hash_of(data: bytes) -> str:
