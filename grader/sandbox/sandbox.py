@@ -20,18 +20,13 @@ from grader.machine.resources import kept_underlays
 from grader.machine.ros import RosInstallation
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
+from grader.sandbox.cpu_time import OrphanCpu
 from grader.sandbox.limits import BUILD, SandboxLimits, size_words
+from grader.sandbox.memory import hidden_bytes, memory_bytes
 from grader.sandbox.namespaces import MOUNT_POINTS
 from grader.sandbox.python_tree import discard, is_whole, student_prefix, trees_folder
 from grader.sandbox.seccomp import student_filter
-from grader.sandbox.usage import (
-    OrphanCpu,
-    Usage,
-    folder_usage,
-    hidden_bytes,
-    memory_bytes,
-    open_files,
-)
+from grader.sandbox.usage import Usage, folder_usage, open_files
 
 LAYERS = ("userns", "netns", "seccomp", "rlimits", "watchdog")
 

@@ -20,7 +20,7 @@ from grader.run.host.disturbance import DisturbanceMeter
 from grader.run.host.run_delay import Scheduled, Waits, beyond, scheduled, uncounted
 from grader.run.host.stopwatch import Stopwatch
 from grader.run.process.descendants import Family
-from grader.sandbox.usage import idle_ticks
+from grader.sandbox.cpu_time import idle_ticks
 
 MS = 1_000_000
 

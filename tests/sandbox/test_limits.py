@@ -15,14 +15,8 @@ from pydantic import ValidationError
 
 from grader.assignment.limits import BuildLimitOptions, LimitOptions
 from grader.sandbox.limits import BUILD
-from grader.sandbox.usage import (
-    files_in_flight,
-    folder_usage,
-    hidden_bytes,
-    memory_bytes,
-    open_files,
-    usage_of,
-)
+from grader.sandbox.memory import hidden_bytes, memory_bytes
+from grader.sandbox.usage import files_in_flight, folder_usage, open_files, usage_of
 
 
 def test_an_author_s_limits_reach_the_command_in_front_of_the_program() -> None:

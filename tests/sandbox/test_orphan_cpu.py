@@ -9,7 +9,8 @@ import sys
 
 import pytest
 
-from grader.sandbox.usage import OrphanCpu, Process, Taken, usage_of
+from grader.sandbox.cpu_time import OrphanCpu
+from grader.sandbox.usage import Process, Taken, usage_of
 
 PARENT, CHILD, OTHER = Process(10, 1), Process(11, 2), Process(12, 3)
 # Two at a time, each for 100 ms of CPU time.

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from itertools import takewhile
 
 from grader.recording.model import NS
-from grader.sandbox.usage import IdleCpu, OrphanCpu, Process, Taken, usage_at
+from grader.sandbox.cpu_time import IdleCpu, OrphanCpu
+from grader.sandbox.usage import Process, Taken, usage_at
 
 _TICK_NS = NS // os.sysconf("SC_CLK_TCK")
 # Of a CPU. With a robot in it a cell and the student's process took 0.12 of one together (the

@@ -15,17 +15,11 @@ from pathlib import Path
 
 from grader.recording.event import Breach
 from grader.run.process.descendants import send
+from grader.sandbox.cpu_time import OrphanCpu
 from grader.sandbox.limits import MIB, SandboxLimits, size_words
+from grader.sandbox.memory import hidden_bytes, memory_bytes, own_bytes
 from grader.sandbox.namespaces import STUDENT
-from grader.sandbox.usage import (
-    OrphanCpu,
-    files_in_flight,
-    hidden_bytes,
-    memory_bytes,
-    open_files,
-    own_bytes,
-    usage_of,
-)
+from grader.sandbox.usage import files_in_flight, open_files, usage_of
 
 _POLL_S = 0.1
 _LOOKS_PER_SEARCH = 5

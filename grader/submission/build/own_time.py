@@ -15,7 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.sandbox.usage import IdleCpu, OrphanCpu, Usage, states
+from grader.sandbox.cpu_time import IdleCpu, OrphanCpu
+from grader.sandbox.usage import Usage, states
 
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _THROTTLED = re.compile(r"^throttled_(usec|time) (\d+)$", re.MULTILINE)
