@@ -33,83 +33,119 @@ class _Scope(NamedTuple):
 
 def outline(tree: ast.Module, path: str, module: str) -> SourceFile:
     """Take the facts from a syntax tree."""
-    classes: list[SourceClass] = []
-    functions: list[SourceFunction] = []
-    names: dict[str, str] = {}
-    stars: list[str] = []
-    prints: dict[ast.expr, int] = {}
-    to_file: set[ast.expr] = set()
-    uses: set[str] = set()
-    sets: list[tuple[str, int]] = []
-    calls: list[SourceCall] = []
-    constructs: list[tuple[str, int]] = []
-    fields: dict[str, dict[str, int]] = {}
-    redefined = False
+    facts = _Facts(path, module)
     for node, scope in _walk(tree):
-        if isinstance(node, ast.ClassDef):
-            classes.append(_class(node, scope))
-            redefined |= node.name == "print"
-        elif isinstance(node, _Function):
-            functions.append(_function(node, scope))
-            redefined |= node.name == "print" and not scope.in_class
-        elif isinstance(node, ast.Import):
-            for alias in node.names:
-                # `import a.b` binds a; `import a.b as c` binds c to a.b.
-                first = alias.name.partition(".")[0]
-                names[alias.asname or first] = alias.name if alias.asname else first
-        elif isinstance(node, ast.ImportFrom):
-            origin = _origin(node, module, path)
-            for alias in node.names:
-                if alias.name == "*":
-                    stars.append(origin)
-                    constructs.append(("import *", node.lineno))
-                else:
-                    names[alias.asname or alias.name] = f"{origin}.{alias.name}"
-        elif isinstance(node, ast.Global):
-            constructs.append(("global", node.lineno))
-        elif isinstance(node, ast.Assign):
-            dotted = _dotted(node.value)
-            if dotted and not scope.prefix:
-                targets = (item.id for item in node.targets if isinstance(item, ast.Name))
-                names.update(dict.fromkeys(targets, dotted))
-        elif isinstance(node, ast.Call):
-            to_file.update([] if _is_to_console(node) else [node.func])
-            calls.append(_call(node))
-        elif isinstance(node, ast.Attribute):
-            if isinstance(node.ctx, ast.Load):
-                uses.add(node.attr[:_LONGEST_NAME])
-            elif dotted := _dotted(node):
-                sets.append((dotted, node.lineno))
-                if dotted == f"self.{node.attr}" and scope.owner:
-                    fields.setdefault(scope.owner, {}).setdefault(node.attr, node.lineno)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            # As getattr() takes it.
-            is_name = node.value.isidentifier() and len(node.value) <= _LONGEST_NAME
-            uses.update([node.value] if is_name else [])
-        elif isinstance(node, ast.Name):
-            if scope.in_class and isinstance(node.ctx, ast.Store):
-                fields.setdefault(scope.owner, {}).setdefault(node.id, node.lineno)
-            if node.id == "print":
-                prints[node] = node.lineno
-                redefined |= isinstance(node.ctx, ast.Store)
-    lines = {line for node, line in prints.items() if node not in to_file}
-    return SourceFile(
-        path=path,
-        module=module,
-        documented=bool(ast.get_docstring(tree)),
-        classes=tuple(
-            replace(one, fields=tuple(fields.get(one.name, {}).items())[:_MOST])
-            for one in sorted(classes, key=lambda item: item.line)[:_MOST]
-        ),
-        functions=tuple(sorted(functions, key=lambda item: item.line)[:_MOST]),
-        names=tuple(sorted(names.items())[:_MOST]),
-        stars=tuple(dict.fromkeys(stars)),
-        prints=() if redefined else tuple(sorted(lines)[:_MOST]),
-        uses=tuple(sorted(uses)[:_MOST]),
-        sets=tuple(sorted(sets, key=lambda item: item[1])[:_MOST]),
-        calls=tuple(sorted(calls, key=lambda item: item.line)[:_MOST]),
-        constructs=tuple(sorted(constructs, key=lambda item: item[1])[:_MOST]),
-    )
+        visit = getattr(facts, f"visit_{type(node).__name__}", None)
+        if visit is not None:
+            visit(node, scope)
+    return facts.source_file(documented=bool(ast.get_docstring(tree)))
+
+
+class _Facts:
+    """The facts of one file, collected node by node; as ast.NodeVisitor, but without recursion."""
+
+    def __init__(self, path: str, module: str) -> None:
+        self._path, self._module = path, module
+        self._classes: list[SourceClass] = []
+        self._functions: list[SourceFunction] = []
+        self._names: dict[str, str] = {}
+        self._stars: list[str] = []
+        self._uses: set[str] = set()
+        self._sets: list[tuple[str, int]] = []
+        self._calls: list[SourceCall] = []
+        self._constructs: list[tuple[str, int]] = []
+        self._fields: dict[str, dict[str, int]] = {}
+        self._prints: dict[ast.expr, int] = {}
+        self._calls_to_file: set[ast.expr] = set()
+        self._redefines_print = False
+
+    def visit_ClassDef(self, node: ast.ClassDef, scope: _Scope) -> None:
+        self._classes.append(_class(node, scope))
+        self._redefines_print |= node.name == "print"
+
+    def visit_FunctionDef(self, node: _Function, scope: _Scope) -> None:
+        self._functions.append(_function(node, scope))
+        self._redefines_print |= node.name == "print" and not scope.in_class
+
+    visit_AsyncFunctionDef = visit_FunctionDef
+
+    def visit_Import(self, node: ast.Import, _: _Scope) -> None:
+        for alias in node.names:
+            # `import a.b` binds a; `import a.b as c` binds c to a.b.
+            first = alias.name.partition(".")[0]
+            self._names[alias.asname or first] = alias.name if alias.asname else first
+
+    def visit_ImportFrom(self, node: ast.ImportFrom, _: _Scope) -> None:
+        origin = _origin(node, self._module, self._path)
+        for alias in node.names:
+            if alias.name == "*":
+                self._stars.append(origin)
+                self._constructs.append(("import *", node.lineno))
+            else:
+                self._names[alias.asname or alias.name] = f"{origin}.{alias.name}"
+
+    def visit_Global(self, node: ast.Global, _: _Scope) -> None:
+        self._constructs.append(("global", node.lineno))
+
+    def visit_Assign(self, node: ast.Assign, scope: _Scope) -> None:
+        """An alias of what was imported: ``Node = rclpy.node.Node``."""
+        dotted = _dotted(node.value)
+        if dotted and not scope.prefix:
+            targets = (item.id for item in node.targets if isinstance(item, ast.Name))
+            self._names.update(dict.fromkeys(targets, dotted))
+
+    def visit_Call(self, node: ast.Call, _: _Scope) -> None:
+        if not _is_to_console(node):
+            self._calls_to_file.add(node.func)
+        self._calls.append(_call(node))
+
+    def visit_Attribute(self, node: ast.Attribute, scope: _Scope) -> None:
+        if isinstance(node.ctx, ast.Load):
+            self._uses.add(node.attr[:_LONGEST_NAME])
+            return
+        dotted = _dotted(node)
+        if dotted:
+            self._sets.append((dotted, node.lineno))
+        if dotted == f"self.{node.attr}" and scope.owner:
+            self._add_field(scope.owner, node.attr, node.lineno)
+
+    def visit_Constant(self, node: ast.Constant, _: _Scope) -> None:
+        """A text may be a name for ``getattr()``."""
+        text = node.value
+        if isinstance(text, str) and text.isidentifier() and len(text) <= _LONGEST_NAME:
+            self._uses.add(text)
+
+    def visit_Name(self, node: ast.Name, scope: _Scope) -> None:
+        is_set = isinstance(node.ctx, ast.Store)
+        if scope.in_class and is_set:
+            self._add_field(scope.owner, node.id, node.lineno)
+        if node.id == "print":
+            self._prints[node] = node.lineno
+            self._redefines_print |= is_set
+
+    def _add_field(self, owner: str, name: str, line: int) -> None:
+        self._fields.setdefault(owner, {}).setdefault(name, line)
+
+    def source_file(self, *, documented: bool) -> SourceFile:
+        """All of them, in the order of the file."""
+        prints = {line for node, line in self._prints.items() if node not in self._calls_to_file}
+        return SourceFile(
+            path=self._path,
+            module=self._module,
+            documented=documented,
+            classes=tuple(
+                replace(one, fields=tuple(self._fields.get(one.name, {}).items())[:_MOST])
+                for one in sorted(self._classes, key=lambda item: item.line)[:_MOST]
+            ),
+            functions=tuple(sorted(self._functions, key=lambda item: item.line)[:_MOST]),
+            names=tuple(sorted(self._names.items())[:_MOST]),
+            stars=tuple(dict.fromkeys(self._stars)),
+            prints=() if self._redefines_print else tuple(sorted(prints)[:_MOST]),
+            uses=tuple(sorted(self._uses)[:_MOST]),
+            sets=tuple(sorted(self._sets, key=lambda item: item[1])[:_MOST]),
+            calls=tuple(sorted(self._calls, key=lambda item: item.line)[:_MOST]),
+            constructs=tuple(sorted(self._constructs, key=lambda item: item[1])[:_MOST]),
+        )
 
 
 def _walk(tree: ast.Module) -> Iterator[tuple[ast.AST, _Scope]]:
