@@ -80,8 +80,11 @@ class Kept:
 
     def installed(self) -> list[tuple[Installed, Path]]:
         """Every build for this ROS installation with its install space, by name."""
-        found = ((one, at / INSTALL) for one, at in self._entries() if one.ros == self._ros)
-        return [(one, install) for one, install in found if one.is_used]
+        return [
+            (note, folder / INSTALL)
+            for note, folder in self._entries()
+            if note.ros == self._ros and note.is_used
+        ]
 
     def note(self, key: str, about: Installed) -> None:
         """Keep a build also for what now asks for it."""
@@ -93,13 +96,13 @@ class Kept:
 
     def settle(self, place: str, keys: Collection[str]) -> None:
         """Let one place ask for these builds and no others; what nothing asks for is removed."""
-        for one, at in self._own():
-            if at.name not in keys and place in one.asked_by:
-                rest = tuple(name for name in one.asked_by if name != place)
-                if rest:
-                    self._write(at, replace(one, places=rest))
+        for note, folder in self._removable():
+            if folder.name not in keys and place in note.asked_by:
+                others = tuple(name for name in note.asked_by if name != place)
+                if others:
+                    self._write(folder, replace(note, places=others))
                 else:
-                    shutil.rmtree(at)
+                    shutil.rmtree(folder)
 
     def remove(self, name: str) -> bool:
         """Remove what a name or place asked for, also for installations that are gone.
@@ -107,34 +110,40 @@ class Kept:
         Raises:
             UsageError: Several places have the name, or another place needs it.
         """
-        own = [one for one, _ in self._own()]
-        places = {name for one in own if name in one.asked_by}
-        named = [one for one in own if one.name == name]
-        if not places:
-            places = {place for one in named if not one.snapshot for place in one.asked_by}
+        notes = [note for note, _ in self._removable()]
+        of_this_name = [note for note in notes if note.name == name]
+        if any(name in note.asked_by for note in notes):
+            places = {name}
+        else:
+            # A file or a folder of a course, by its name alone.
+            courses = (note for note in of_this_name if not note.snapshot)
+            places = {place for note in courses for place in note.asked_by}
         if len(places) > 1:
             each = " or ".join(sorted(places))
             raise UsageError(f"several underlays are called {name!r}: remove {each}")
-        if not places and named:
-            by = sorted({place for one in named for place in one.asked_by})
+        if not places and of_this_name:
+            by = sorted({place for note in of_this_name for place in note.asked_by})
             raise UsageError(f"{name!r} is here because of {', '.join(by)}: remove that")
         for place in places:
             self.settle(place, ())
         return bool(places)
 
-    def _own(self) -> list[tuple[Installed, Path]]:
+    def _removable(self) -> list[tuple[Installed, Path]]:
         """Builds for this ROS installation, and for installations that are gone."""
         return [
-            (one, at)
-            for one, at in self._entries()
-            if one.ros == self._ros or not Path(one.ros).exists()
+            (note, folder)
+            for note, folder in self._entries()
+            if note.ros == self._ros or not Path(note.ros).exists()
         ]
 
     def _entries(self) -> list[tuple[Installed, Path]]:
-        found = ((_read(file.parent), file.parent) for file in self._folder.glob(f"*/{_NOTE}"))
-        return sorted(
-            ((one, at) for one, at in found if one is not None), key=lambda entry: entry[0].name
-        )
+        """Every build in the cache with its folder, by name."""
+        entries = []
+        for file in self._folder.glob(f"*/{_NOTE}"):
+            note = _read(file.parent)
+            if note is not None:
+                entries.append((note, file.parent))
+        return sorted(entries, key=lambda entry: entry[0].name)
 
     def _write(self, folder: Path, note: Installed) -> None:
         (folder / _NOTE).write_bytes(_INSTALLED.dump_json(note, indent=1))

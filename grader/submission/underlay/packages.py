@@ -42,13 +42,13 @@ class Packages:
     kept: Kept
     building: Building
 
-    def there(self) -> dict[str, tuple[Installed, Path]]:
+    def built(self) -> dict[str, tuple[Installed, Path]]:
         """What is built of the index as it is pinned, for the installation as it is now."""
         state = digest(self.ros)
         return {
-            one.name: (one, install)
-            for one, install in self.kept.installed()
-            if one.snapshot == SNAPSHOT.version and one.installation == state
+            note.name: (note, install)
+            for note, install in self.kept.installed()
+            if note.snapshot == SNAPSHOT.version and note.installation == state
         }
 
     def chain(self, names: Iterable[str]) -> list[Path] | None:
@@ -56,21 +56,22 @@ class Packages:
 
         What ROS has is left out. None where one is not built.
         """
-        there, order = self.there(), list[str]()
-        complete = True
+        built = self.built()
+        lowest_first: dict[str, Path] = {}
 
         def visit(name: str) -> None:
-            nonlocal complete
-            if name not in there:
-                complete = False
-            elif name not in order:
-                for one in there[name][0].needs:
-                    visit(one)
-                order.append(name)
+            if name not in lowest_first:
+                note, install = built[name]
+                for needed in note.needs:
+                    visit(needed)
+                lowest_first[name] = install
 
-        for name in sorted(set(names) - self.ros.packages):
-            visit(name)
-        return [there[name][1] for name in reversed(order)] if complete else None
+        try:
+            for name in sorted(set(names) - self.ros.packages):
+                visit(name)
+        except KeyError:
+            return None
+        return [*reversed(lowest_first.values())]
 
     def add(self, underlays: Sequence[Underlay], answer_s: float) -> list[str]:
         """Build packages that are not there, with all that they need; names of what was built.
@@ -84,8 +85,8 @@ class Packages:
             UsageError: There is no such package, or versions contradict each other.
             GraderFault: Something cannot be fetched or built, or libraries are missing.
         """
-        wanted = [one for one in underlays if not self._is_there(one)]
-        if not wanted:
+        missing = [underlay for underlay in underlays if not self._is_there(underlay)]
+        if not missing:
             return []
         say = self.building.say
         distribution = fetch_distribution(self.folder, answer_s, say)
@@ -94,25 +95,26 @@ class Packages:
         def get(release: Release) -> Path:
             return fetch(release.name, release.source, self.folder, answer_s, say)
 
-        names = {name for one in wanted for name in one.packages}
+        names = {name for underlay in missing for name in underlay.packages}
         plan = resolve(names, distribution, self.ros, get)
+        notes = [self._note(sources) for sources in plan]
         keys: dict[str, str] = {}
-        notes = [self._note(one) for one in plan]
         for note in notes:
             keys[note.name] = self.key(note, keys)
-        built = [one for one in plan if not self.kept.has(keys[one.release.name])]
-        self._ask_for_libraries(built, distribution)
-        if built:
-            say("to build: " + ", ".join(f"{one.name} {one.version}" for one in releases(built)))
-        asking = {one.place: closure(one.packages, plan) for one in wanted}
-        for source, note in zip(plan, notes, strict=True):
-            if source in built:
-                self._build(source, keys, built)
-            places = tuple(place for place, needed in asking.items() if note.name in needed)
+        todo = [sources for sources in plan if not self.kept.has(keys[sources.release.name])]
+        self._ask_for_libraries(todo, distribution)
+        releases = [sources.release for sources in todo]
+        if releases:
+            say("to build: " + ", ".join(f"{one.name} {one.version}" for one in releases))
+        needed_by = {underlay.place: closure(underlay.packages, plan) for underlay in missing}
+        for sources, note in zip(plan, notes, strict=True):
+            if sources in todo:
+                self._build(sources, keys, todo)
+            places = tuple(place for place, needed in needed_by.items() if note.name in needed)
             self.kept.note(keys[note.name], replace(note, places=places))
-        for place, needed in asking.items():
+        for place, needed in needed_by.items():
             self.kept.settle(place, [keys[name] for name in needed])
-        return [one.name for one in releases(built)]
+        return [release.name for release in releases]
 
     def _is_there(self, underlay: Underlay) -> bool:
         """Whether nothing has to be built; what is built already is kept for this name, too."""
@@ -126,7 +128,7 @@ class Packages:
         if not all(map(self.kept.has, keys)):
             return False
         self.building.say(f"{underlay.name}: is there already")
-        for note, install in self.there().values():
+        for note, install in self.built().values():
             if install in paths:
                 self.kept.note(install.parent.name, replace(note, places=(underlay.place,)))
         self.kept.settle(underlay.place, keys)
@@ -147,8 +149,8 @@ class Packages:
                 "the command again"
             )
         ros = replace(self.ros, underlays=tuple(below))
-        one = replace(self.building, say=tell)
-        one.build(source.folder, ros, self.kept.cache, keys[name])
+        building = replace(self.building, say=tell)
+        building.build(source.folder, ros, self.kept.cache, keys[name])
 
     def _note(self, source: Sources) -> Installed:
         release = source.release
@@ -186,10 +188,10 @@ class Packages:
                 say(f"perhaps not beside {self.ros.python}: {', '.join(doubtful)}")
         missing = _missing_tools(plan, self.ros)
         names = []
-        for one in plan:
-            lacking = _lacking(system, distribution, one.build_keys & build_keys)
+        for sources in plan:
+            lacking = _lacking(system, distribution, sources.build_keys & build_keys)
             if lacking:
-                names.append(one.release.name)
+                names.append(sources.release.name)
                 missing += lacking
         if missing:
             raise GraderFault(
@@ -199,11 +201,6 @@ class Packages:
         later = _lacking(system, distribution, run_keys)
         if later:
             say(f"used when they run, but not here: sudo apt install {' '.join(later)}")
-
-
-def releases(plan: Iterable[Sources]) -> list[Release]:
-    """The releases of a plan."""
-    return [one.release for one in plan]
 
 
 def _missing_tools(plan: Sequence[Sources], ros: RosInstallation) -> list[str]:

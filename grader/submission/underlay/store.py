@@ -87,13 +87,15 @@ class UnderlayStore:
             UsageError: Two of them have the same package.
         """
         ros = self._ros
-        for one in underlays:
-            below = one.required if one.repos else (one,) if one.packages else ()
-            ros = _below(ros, [path for on in below for path in self._chain(on, one)])
-            if one.folder:
-                ros = on_top(ros, [self.folder_prefix(one.folder, ros)])
-            elif one.repos:
-                ros = on_top(ros, self._own_prefix(one))
+        for underlay in underlays:
+            if underlay.packages:
+                ros = _below(ros, self._chain(underlay, underlay))
+            for required in underlay.required:
+                ros = _below(ros, self._chain(required, underlay))
+            if underlay.folder:
+                ros = on_top(ros, [self.folder_prefix(underlay.folder, ros)])
+            elif underlay.repos:
+                ros = on_top(ros, self._own_prefix(underlay))
         return ros
 
     def fetched(self, underlays: Iterable[Underlay]) -> list[Path]:
@@ -107,13 +109,13 @@ class UnderlayStore:
 
     def missing(self, underlays: Iterable[Underlay]) -> list[MissingUnderlay]:
         """Those that have to be added and are not there."""
-        found = []
+        missing = []
         for underlay in underlays:
             try:
                 self.fetched([underlay])
-            except MissingUnderlay as missing:
-                found.append(missing)
-        return found
+            except MissingUnderlay as error:
+                missing.append(error)
+        return missing
 
     def add(self, underlays: Sequence[Underlay], answer_s: float) -> list[str]:
         """Build underlays and what they need, unless it is there; names of what was built.
@@ -148,7 +150,7 @@ class UnderlayStore:
 
     def needed(self, ros: RosInstallation, named: Collection[str]) -> RosInstallation:
         """Add to an installation the packages of ROS 2 that are named, where they are built."""
-        for name in sorted(providers(named) & self.packages.there().keys() - ros.packages):
+        for name in sorted(providers(named) & self.packages.built().keys() - ros.packages):
             # Where one is not whole, the build says what it lacks, and the rest is graded.
             ros = _below(ros, self.packages.chain([name]) or [])
         return ros
@@ -165,13 +167,12 @@ class UnderlayStore:
 
     def installed(self) -> list[tuple[Installed, Path]]:
         """Everything that is built for this ROS installation, with its install space, by name."""
-        own = [found for found in self.kept.installed() if not found[0].snapshot]
-        found = [*own, *self.packages.there().values()]
-        return sorted(found, key=lambda entry: entry[0].name)
+        own = [(note, install) for note, install in self.kept.installed() if not note.snapshot]
+        return sorted([*own, *self.packages.built().values()], key=lambda entry: entry[0].name)
 
     def _add_own(self, underlay: Underlay, answer_s: float) -> list[str]:
         """Build a list or a folder of a course, unless it is there."""
-        if not self._wanted(underlay):
+        if not self._lacking(underlay):
             self._say(f"{underlay.name}: this ROS has its packages, nothing is built")
             return []
         python = underlay.repos.python if underlay.repos else ()
@@ -199,11 +200,11 @@ class UnderlayStore:
 
     def _chain(self, underlay: Underlay, asking: Underlay) -> list[Path]:
         """Install spaces of packages of ROS 2, and of what they need."""
-        found = self.packages.chain(underlay.packages)
-        if found is None:
+        installs = self.packages.chain(underlay.packages)
+        if installs is None:
             # To add what requires it adds it, too.
             raise MissingUnderlay(asking)
-        return found
+        return installs
 
     def _on_required(self, underlay: Underlay) -> RosInstallation:
         below = [path for one in underlay.required for path in self._chain(one, underlay)]
@@ -211,15 +212,15 @@ class UnderlayStore:
 
     def _own_prefix(self, underlay: Underlay) -> list[Path]:
         """The install space of a list of repositories; none if ROS has it all."""
-        if not self._wanted(underlay):
+        if not self._lacking(underlay):
             return []
-        found = self.kept.find(self._key(underlay))
-        if found is None:
+        install = self.kept.find(self._key(underlay))
+        if install is None:
             raise MissingUnderlay(underlay)
-        return [found]
+        return [install]
 
-    def _wanted(self, underlay: Underlay) -> frozenset[str]:
-        """The packages that are built, where they are listed: those that ROS lacks."""
+    def _lacking(self, underlay: Underlay) -> frozenset[str]:
+        """The packages that are built: those that ROS lacks, or ``all`` where none are listed."""
         return underlay.listed - self._ros.packages if underlay.listed else frozenset({"all"})
 
     def _key(self, underlay: Underlay) -> str:
@@ -227,8 +228,8 @@ class UnderlayStore:
             return folder_key(underlay.folder, self._ros)
         assert underlay.repos is not None
         below = [path.parent.name for path in self._on_required(underlay).underlays]
-        wanted = sorted(self._wanted(underlay))
-        return digest(self._ros, underlay.repos.model_dump_json(), wanted, below)
+        lacking = sorted(self._lacking(underlay))
+        return digest(self._ros, underlay.repos.model_dump_json(), lacking, below)
 
     def _fetch(self, underlay: Underlay, staging: Path, answer_s: float) -> None:
         """Put the packages of all repositories side by side."""
@@ -236,9 +237,9 @@ class UnderlayStore:
         places: dict[str, str] = {}
         for name, repository in underlay.repos.repositories.items():
             files = fetch(name, repository, self._folder, answer_s, self._say)
-            there, version = packages_in(files), f"{name} {repository.version}"
-            for package in repository.packages or sorted(there):
-                if package not in there:
+            folders, version = packages_in(files), f"{name} {repository.version}"
+            for package in repository.packages or sorted(folders):
+                if package not in folders:
                     raise UsageError(f"{underlay.given}: {version} has no package {package!r}")
                 other = places.setdefault(package, version)
                 if other != version:
@@ -247,8 +248,8 @@ class UnderlayStore:
                         f"{version}: list in 'packages' of each repository which of its packages "
                         "to build"
                     )
-                if package in self._wanted(underlay) or not underlay.listed:
-                    shutil.copytree(there[package], staging / package, symlinks=True)
+                if package in self._lacking(underlay) or not underlay.listed:
+                    shutil.copytree(folders[package], staging / package, symlinks=True)
 
 
 def on_top(ros: RosInstallation, prefixes: Sequence[Path]) -> RosInstallation:

@@ -53,7 +53,7 @@ def export(packages: Packages, names: Iterable[str], file: Path) -> list[str]:
     Raises:
         UsageError: One is not built here.
     """
-    built = packages.there()
+    built = packages.built()
     chosen = list(names) or sorted(built)
     installs = packages.chain(chosen)
     if not installs:

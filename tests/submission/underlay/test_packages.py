@@ -77,7 +77,7 @@ def test_what_two_names_need_is_built_once_and_stays_until_neither_needs_it(
     assert laid.packages - real_ros.packages == {"base", "arm", "leg"}
     assert len(laid.underlays) == 3
     # Each stands before what it needs, as after sourcing one workspace on top of another.
-    assert [path.parent for path in laid.underlays].index(store.packages.there()["base"][1].parent)
+    assert [path.parent for path in laid.underlays].index(store.packages.built()["base"][1].parent)
     with pytest.raises(UsageError, match="'base' is here because of arm, leg: remove that"):
         store.kept.remove("base")
     assert store.kept.remove("arm")
