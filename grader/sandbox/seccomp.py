@@ -12,7 +12,7 @@ import signal
 import tempfile
 from collections.abc import Sequence
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 _INT = 0xFFFFFFFF
 _AIMED = {"ptrace": 1, "process_vm_readv": 0, "process_vm_writev": 0}
@@ -38,24 +38,34 @@ _ENDING = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTSTP, signal.SIGTTIN, signa
 _RLIMIT_CPU, _F_SETSIG, _SIGNALLED = 0, 10, 128
 # TIOCSPTLCK and TIOCGPTPEER: asm-generic/ioctls.h
 _TERMINAL = (0x40045431, 0x5441)
-_WAYS: tuple[tuple[str, int, tuple[int, ...], int], ...] = (
-    *((name, place, _ENDING, _INT) for name, place in _SIGNALLING.items()),
-    ("pidfd_send_signal", 1, _ENDING, _INT),
-    ("fcntl", 1, (_F_SETSIG,), _INT),
+
+
+class _Way(NamedTuple):
+    """A system call with certain values of one argument, of which the bits of a mask count."""
+
+    call: str
+    argument: int
+    values: tuple[int, ...]
+    mask: int = _INT
+
+
+_WAYS_TO_END = (
+    *(_Way(name, place, _ENDING) for name, place in _SIGNALLING.items()),
+    _Way("pidfd_send_signal", 1, _ENDING),
+    _Way("fcntl", 1, (_F_SETSIG,)),
     # The keys of a terminal stop what runs there. A new one is locked, or its other end opened.
-    ("ioctl", 1, _TERMINAL, _INT),
+    _Way("ioctl", 1, _TERMINAL),
     # At the end of its CPU time the kernel kills a process.
-    ("setrlimit", 0, (_RLIMIT_CPU,), _INT),
-    ("prlimit64", 1, (_RLIMIT_CPU,), _INT),
+    _Way("setrlimit", 0, (_RLIMIT_CPU,)),
+    _Way("prlimit64", 1, (_RLIMIT_CPU,)),
     *(
-        (name, 0, tuple(_SIGNALLED + number for number in _ENDING), 0xFF)
+        _Way(name, 0, tuple(_SIGNALLED + number for number in _ENDING), mask=0xFF)
         for name in ("exit", "exit_group")
     ),
     # Its signal is in memory, where a filter cannot look.
-    ("timer_create", 0, (0,), 0),
+    _Way("timer_create", 0, (0,), mask=0),
 )
-"""Ways to kill or to stop a process within a sandbox, or to pretend that: a call, the index of an
-argument, its values, and the bits of it that count."""
+"""Ways to kill or to stop a process within a sandbox, or to pretend that."""
 LEADER = 2
 """What a sandbox is started with; of a build that is colcon."""
 INIT = 1
@@ -119,10 +129,11 @@ def student_filter(*, one_session: bool = False, guarded: bool = False) -> bytes
         _add(rules, refuse, "clone", seccomp.Arg(0, seccomp.MASKED_EQ, flag, flag))
     # Its flags are in memory, where a filter cannot look; libc then uses clone.
     _add(rules, seccomp.ERRNO(errno.ENOSYS), "clone3")
-    for target in (0, -1, INIT, -INIT, LEADER, -LEADER) if one_session else ():
-        at_leader = seccomp.Arg(0, seccomp.MASKED_EQ, _INT, target & _INT)
-        for name in (*_SIGNALLING, "pidfd_open"):
-            _add(rules, refuse, name, at_leader)
+    if one_session:
+        for target in (0, -1, INIT, -INIT, LEADER, -LEADER):
+            at_leader = seccomp.Arg(0, seccomp.MASKED_EQ, _INT, target & _INT)
+            for name in (*_SIGNALLING, "pidfd_open"):
+                _add(rules, refuse, name, at_leader)
     # The limits of another process, and signals by way of a file that is ready.
     _add(rules, refuse, "prlimit64", seccomp.Arg(0, seccomp.NE, 0))
     for command in (*_OWNERS, _F_SETPIPE_SZ):
@@ -161,10 +172,10 @@ def guard_filter() -> bytes:
         # Signal 0 only asks whether the process is there.
         _add(rules, seccomp.NOTIFY, name, at_init, seccomp.Arg(place, seccomp.NE, 0))
     _add(rules, seccomp.NOTIFY, "pidfd_open", at_init)
-    for name, place, values, mask in _WAYS:
-        for value in values:
-            argument = seccomp.Arg(place, seccomp.MASKED_EQ, mask, value)
-            _add(rules, seccomp.NOTIFY, name, argument)
+    for way in _WAYS_TO_END:
+        for value in way.values:
+            argument = seccomp.Arg(way.argument, seccomp.MASKED_EQ, way.mask, value)
+            _add(rules, seccomp.NOTIFY, way.call, argument)
     return _program(rules)
 
 
@@ -173,7 +184,7 @@ def guarded_calls() -> dict[str, int]:
     """The numbers of the calls that :func:`guard_filter` asks about, and of ``seccomp`` itself."""
     from pyseccomp import resolve_syscall, system_arch
 
-    names = (*_AIMED, *_UNHEARD_OF, *COUNTED, *(name for name, *_ in _WAYS))
+    names = (*_AIMED, *_UNHEARD_OF, *COUNTED, *(way.call for way in _WAYS_TO_END))
     return {
         name: resolve_syscall(system_arch(), name) for name in (*names, "pidfd_open", "seccomp")
     }
@@ -182,7 +193,8 @@ def guarded_calls() -> dict[str, int]:
 def can_end(name: str, arguments: Sequence[int]) -> bool:
     """Whether a call can kill or stop a process of the same sandbox, which is allowed."""
     return any(
-        name == way and arguments[place] & mask in values for way, place, values, mask in _WAYS
+        name == way.call and arguments[way.argument] & way.mask in way.values
+        for way in _WAYS_TO_END
     )
 
 

@@ -59,17 +59,17 @@ def read_included(
     folder = cmake_file.removesuffix("CMakeLists.txt")
     packages: list[Import] = []
     own: list[tuple[str, str]] = []
-    every = (
-        (path, *one)
-        for path, includes in sorted(files.items())
+    includes = (
+        (path, *include)
+        for path, in_file in sorted(files.items())
         if is_built(path)
-        for one in includes
+        for include in in_file
     )
-    for path, header, line, optional in islice(every, _MOST):
-        found = _own_header(header, path, files)
+    for path, header, line, optional in islice(includes, _MOST):
+        own_header = _own_header(header, path, files)
         package = header.partition("/")[0]
-        if found is not None:
-            own.append((folder + path, folder + found))
+        if own_header is not None:
+            own.append((folder + path, folder + own_header))
         elif "/" in header and is_package(package):
             packages.append(Import(package, folder + path, line, optional))
     linked = islice(_linked(commands, is_package), _MOST)
@@ -78,7 +78,7 @@ def read_included(
 
 
 def needed_files(
-    program: str, commands: Iterable[CMakeCommand], folder: str, own: Iterable[tuple[str, str]]
+    program: str, commands: Sequence[CMakeCommand], folder: str, own: Sequence[tuple[str, str]]
 ) -> tuple[set[str], set[int]] | None:
     """Files that a program of a CMakeLists.txt is made of, and lines of the commands about it.
 
@@ -88,27 +88,33 @@ def needed_files(
     Returns:
         None where CMakeLists.txt does not name the program.
     """
-    targets = {one.arguments[0]: one for one in commands if one.name in _PROGRAMS and one.arguments}
-    if program not in targets:
+    programs = {
+        command.arguments[0]
+        for command in commands
+        if command.name in _PROGRAMS and command.arguments
+    }
+    if program not in programs:
         return None
-    about, pending = {program}, [program]
-    while pending:
-        name = pending.pop()
-        linked = {
-            word
-            for one in commands
-            if one.name == "target_link_libraries" and one.arguments[:1] == (name,)
-            for word in one.arguments
-        }
-        pending += sorted((linked & targets.keys()) - about)
-        about |= linked & targets.keys()
+
+    def about(names: Collection[str], *kinds: str) -> list[CMakeCommand]:
+        """The commands of these kinds for targets of these names."""
+        return [
+            command
+            for command in commands
+            if command.name in kinds and not set(names).isdisjoint(command.arguments[:1])
+        ]
+
+    def linked(target: str) -> set[str]:
+        commands_to_link = about({target}, "target_link_libraries")
+        return {word for command in commands_to_link for word in command.arguments} & programs
+
+    targets = _reached({program}, linked)
     files = {
         folder + posixpath.normpath(word)
-        for one in commands
-        if one.name in (*_PROGRAMS, "target_sources") and {*one.arguments[:1]} & about
-        for word in one.arguments[1:]
+        for command in about(targets, *_PROGRAMS, "target_sources")
+        for word in command.arguments[1:]
     }
-    lines = {one.line for one in commands if one.name in _USES and {*one.arguments[:1]} & about}
+    lines = {command.line for command in about(targets, *_USES)}
     return with_own_headers(files, own), lines
 
 
@@ -117,21 +123,27 @@ def with_own_headers(files: Iterable[str], own: Iterable[tuple[str, str]]) -> se
     included: dict[str, set[str]] = {}
     for file, header in own:
         included.setdefault(file, set()).add(header)
-    found, pending = set(files), sorted(files)
+    return _reached(files, lambda file: included.get(file, set()))
+
+
+def _reached(start: Iterable[str], following: Callable[[str], set[str]]) -> set[str]:
+    """Some names, those that follow from them, and so on."""
+    reached = set(start)
+    pending = sorted(reached)
     while pending:
-        more = included.get(pending.pop(), set()) - found
-        found |= more
-        pending += more
-    return found
+        new = following(pending.pop()) - reached
+        reached |= new
+        pending += new
+    return reached
 
 
 def _own_header(header: str, includer: str, files: Collection[str]) -> str | None:
     """The file of the package that a header is: beside the includer, or in any folder."""
     beside = posixpath.normpath(posixpath.join(posixpath.dirname(includer), header))
-    ends = f"/{header}"
-    return next((path for path in (beside, header) if path in files), None) or next(
-        (path for path in files if path.endswith(ends)), None
-    )
+    for path in (beside, header):
+        if path in files:
+            return path
+    return next((path for path in files if path.endswith(f"/{header}")), None)
 
 
 def _linked(
@@ -139,16 +151,19 @@ def _linked(
 ) -> Iterator[tuple[str, int]]:
     """Packages that CMakeLists.txt names for its programs; not those of its tests."""
     conditions: list[bool] = []
-    for one in commands:
-        if one.name == "if":
-            conditions.append("BUILD_TESTING" in one.arguments)
-        elif one.name == "endif":
+    for command in commands:
+        words: tuple[str, ...] = ()
+        if command.name == "if":
+            conditions.append("BUILD_TESTING" in command.arguments)
+        elif command.name == "endif":
             del conditions[-1:]
         elif any(conditions):
             continue
-        elif one.name in _USES or (one.name == "find_package" and "REQUIRED" in one.arguments):
-            words = one.arguments[1:] if one.name in _USES else one.arguments[:1]
-            for name in dict.fromkeys(word.partition("::")[0] for word in words):
-                # Those of ament are build tools, and declared by another tag.
-                if is_package(name) and not name.startswith("ament_cmake"):
-                    yield name, one.line
+        elif command.name in _USES:
+            words = command.arguments[1:]
+        elif command.name == "find_package" and "REQUIRED" in command.arguments:
+            words = command.arguments[:1]
+        for name in dict.fromkeys(word.partition("::")[0] for word in words):
+            # Those of ament are build tools, and declared by another tag.
+            if is_package(name) and not name.startswith("ament_cmake"):
+                yield name, command.line

@@ -14,7 +14,8 @@ from grader.spec.nearest_name import did_you_mean, nearest
 from grader.submission.intake.paths import parents, shown
 from grader.submission.read.setup_py import EntryPoint
 
-_DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+_DEFINITIONS = (*_FUNCTIONS, ast.ClassDef)
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,10 @@ class Modules:
     def find(self, module: str) -> str | None:
         """Path of a module given by its dotted name."""
         path = module.replace(".", "/")
-        return next((p for p in (f"{path}.py", f"{path}/__init__.py") if p in self.trees), None)
+        for file in (f"{path}.py", f"{path}/__init__.py"):
+            if file in self.trees:
+                return file
+        return None
 
     @property
     def top_level(self) -> set[str]:
@@ -53,22 +57,31 @@ def missing_target(
         top = entry.module.partition(".")[0]
         if top in elsewhere and top not in modules.top_level:
             return None
-        wanted = f"{entry.module.replace('.', '/')}.py"
-        known = [other for other in modules.trees if not other.endswith("__init__.py")]
-        match = nearest(wanted, known, cutoff=0.0)
-        has = f"; the package has {shown(match)}" if match else ""
-        return f"there is no module {wanted}{has}"
+        return _no_module(f"{entry.module.replace('.', '/')}.py", modules)
     if modules.installed is not None and path not in modules.installed:
         return _why_not_installed(path, modules)
     if not entry.function:
         return f"names no function; write '{entry.name} = {entry.module}:main'"
-    function, tree = entry.function.partition(".")[0], modules.trees[path]
-    names = defined_names(tree) if tree is not None else None
-    if tree is None or names is None or function in names:
+    tree = modules.trees[path]
+    if tree is None:
         return None
-    there = [node.name for node in tree.body if isinstance(node, _DEFINITIONS[:2])]
-    has = f" It has {', '.join(map(repr, there[:5]))}." if there else ""
-    return f"{shown(path)} has no function {function!r}.{did_you_mean(function, names) or has}"
+    # Of `module:Class.method` the class has to be there.
+    function = entry.function.partition(".")[0]
+    names = defined_names(tree)
+    if names is None or function in names:
+        return None
+    functions = [node.name for node in tree.body if isinstance(node, _FUNCTIONS)]
+    hint = did_you_mean(function, names)
+    if not hint and functions:
+        hint = f" It has {', '.join(map(repr, functions[:5]))}."
+    return f"{shown(path)} has no function {function!r}.{hint}"
+
+
+def _no_module(path: str, modules: Modules) -> str:
+    others = [other for other in modules.trees if not other.endswith("__init__.py")]
+    match = nearest(path, others, cutoff=0.0)
+    hint = f"; the package has {shown(match)}" if match else ""
+    return f"there is no module {path}{hint}"
 
 
 def _why_not_installed(path: str, modules: Modules) -> str:
@@ -92,7 +105,10 @@ def defined_names(tree: ast.Module) -> set[str] | None:
         elif isinstance(node, (ast.Import, ast.ImportFrom)):
             names.update(alias.asname or alias.name.partition(".")[0] for alias in node.names)
         elif isinstance(node, ast.Name):
-            (names if isinstance(node.ctx, ast.Store) else used).add(node.id)
+            if isinstance(node.ctx, ast.Store):
+                names.add(node.id)
+            else:
+                used.add(node.id)
     in_doubt = names & {"*", "__getattr__"} or used & {"globals", "exec", "setattr"}
     return None if in_doubt else names
 
