@@ -93,16 +93,15 @@ def read_bags(
     """
     paths = {file.path for file in located.files}
     folders = {path.rpartition("/")[0] or "." for path in paths if path.endswith(_STORAGE)}
-    given = json.dumps(None if types is None else sorted(types))
-    found = []
+    kept_types = json.dumps(None if types is None else sorted(types))
+    bags = []
     for folder in sorted(folders, key=os.fsencode)[:_MOST_BAGS]:
         problem = _why_unended(folder, located.files)
-        found.append(
-            ReadBag(BagRecord(shown(folder), problem))
-            if problem
-            else _read(located.root, folder, given, (ros, sandbox))
-        )
-    return tuple(found)
+        if problem is None:
+            bags.append(_read(located.root, folder, kept_types, ros, sandbox))
+        else:
+            bags.append(ReadBag(BagRecord(shown(folder), problem)))
+    return tuple(bags)
 
 
 def _why_unended(folder: str, files: Sequence[SubmissionFile]) -> str | None:
@@ -117,26 +116,34 @@ def _why_unended(folder: str, files: Sequence[SubmissionFile]) -> str | None:
 
 
 def _read(
-    root: Path, folder: str, given: str, where: tuple[RosInstallation, Sandbox | None]
+    root: Path, folder: str, kept_types: str, ros: RosInstallation, sandbox: Sandbox | None
 ) -> ReadBag:
     path, kills = shown(folder), oom_kills()
-    outcome, data = _READER.run(root, (str(root / folder), str(_CPU_S)), *where, given)
+    arguments = (str(root / folder), str(_CPU_S))
+    outcome, data = _READER.run(root, arguments, ros, sandbox, kept_types)
     problem = _why_not_read(outcome, path, kills)
     if problem is not None:
         return ReadBag(BagRecord(path, problem))
     try:
-        found = _CONTENTS.validate_python(json.loads(outcome.output))
+        contents = _CONTENTS.validate_python(json.loads(outcome.output))
     except (ValueError, TypeError):
         return ReadBag(BagRecord(path, "it cannot be read"))
-    topics = tuple(BagTopic(shown(one.name), shown(one.type), one.messages) for one in found.topics)
-    digest = hashlib.sha256(data).hexdigest() if data else ""
-    problem, distro = found.problem and shown(found.problem), shown(found.distro)
-    record = BagRecord(path, problem, found.duration_s, topics, distro, found.lost, digest)
-    channels = tuple(
-        BagChannel(shown(one.name), shown(one.type), one.hash, one.publishers)
-        for one in found.topics
+    topics = contents.topics
+    record = BagRecord(
+        path,
+        shown(contents.problem) if contents.problem else contents.problem,
+        contents.duration_s,
+        tuple(BagTopic(shown(one.name), shown(one.type), one.messages) for one in topics),
+        shown(contents.distro),
+        contents.lost,
+        hashlib.sha256(data).hexdigest() if data else "",
     )
-    return ReadBag(record, None if problem else KeptBag(channels, found.has_published, data))
+    if record.problem:
+        return ReadBag(record)
+    channels = tuple(
+        BagChannel(shown(one.name), shown(one.type), one.hash, one.publishers) for one in topics
+    )
+    return ReadBag(record, KeptBag(channels, contents.has_published, data))
 
 
 def _why_not_read(outcome: Outcome, path: str, kills: int | None) -> str | None:

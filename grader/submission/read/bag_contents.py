@@ -74,11 +74,9 @@ def _messages(reader: Any) -> Iterator[tuple[tuple[str, str], int, int, bytes]]:
     for file in reader.storage.storages:
         with Path(file.path).open("rb") as stream:
             for schema, channel, one in make_reader(stream, validate_crcs=True).iter_messages():
-                data = (
-                    ZstdDecompressor().decompressobj().decompress(one.data)
-                    if is_packed
-                    else one.data
-                )
+                data = one.data
+                if is_packed:
+                    data = ZstdDecompressor().decompressobj().decompress(data)
                 if schema is None:
                     raise ValueError(f"{channel.topic} has no type")
                 # Before Jazzy nothing was known of when it was published.
@@ -119,24 +117,18 @@ def _profile(qos: Any) -> dict[str, object]:
 
     def duration_s(time: Any) -> float | None:
         # rmw has the largest number for no limit, and zero for none given.
-        return (
-            time.sec + time.nsec / 1e9
-            if time.sec + time.nsec > 0 and time.sec < _ENDLESS_S - 1
-            else None
-        )
+        is_limit = time.sec + time.nsec > 0 and time.sec < _ENDLESS_S - 1
+        return time.sec + time.nsec / 1e9 if is_limit else None
 
-    names = {
-        name: value if value in known else "unknown"
-        for name, known in (
-            ("reliability", ("reliable", "best_effort")),
-            ("durability", ("volatile", "transient_local")),
-            ("history", ("keep_last", "keep_all")),
-            ("liveliness", ("automatic", "manual_by_topic")),
-        )
-        for value in [getattr(qos, name).name.lower()]
-    }
+    def policy(name: str, *known: str) -> str:
+        value = str(getattr(qos, name).name.lower())
+        return value if value in known else "unknown"
+
     return {
-        **names,
+        "reliability": policy("reliability", "reliable", "best_effort"),
+        "durability": policy("durability", "volatile", "transient_local"),
+        "history": policy("history", "keep_last", "keep_all"),
+        "liveliness": policy("liveliness", "automatic", "manual_by_topic"),
         "deadline_s": duration_s(qos.deadline),
         "lifespan_s": duration_s(qos.lifespan),
         "liveliness_lease_s": duration_s(qos.liveliness_lease_duration),

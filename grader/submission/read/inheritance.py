@@ -6,7 +6,7 @@ What names stand for is found out from the facts of the source, never by an impo
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from grader.recording.submission import CPP, SourceClass, SourceFile, SourceFunction
@@ -72,54 +72,52 @@ class Family:
 
     def own_ancestors(self, item: FoundClass) -> list[FoundClass]:
         """The classes that it inherits and that were handed in, nearest first."""
-        found = map(self._class, self._ancestors(item))
-        return [one for one in found if one is not None and one.found is not item.found]
+        ancestors = map(self._class, self._ancestors(item))
+        return [one for one in ancestors if one is not None and one.found is not item.found]
 
     def heirs(self, item: FoundClass) -> list[FoundClass]:
         """The classes that inherit it."""
-        found = item.found
         return [
-            one
-            for one in self.classes
-            if any(ancestor.found is found for ancestor in self.own_ancestors(one))
+            heir
+            for heir in self.classes
+            if any(ancestor.found is item.found for ancestor in self.own_ancestors(heir))
         ]
 
     def inherited(self, item: FoundClass, method: str) -> list[SourceFunction]:
         """What its own base classes declare by the name of a method, nearest first."""
         return [
-            one
+            declared
             for ancestor in self.own_ancestors(item)
-            for one in methods(ancestor)
-            if one.short == method
+            for declared in methods(ancestor)
+            if declared.short == method
         ]
 
     def is_abstract(self, item: FoundClass) -> bool:
         """Whether no object can be made of it, as a method of it is declared and not defined."""
-        line = [item, *self.own_ancestors(item)]
-        nearest: dict[tuple[str, int | None], bool] = {}
-        for one in line:
-            for method in methods(one):
-                nearest.setdefault((method.short, method.parameters), method.pure)
-        if _is_cpp(item):
-            return any(nearest.values())
+        lineage = [item, *self.own_ancestors(item)]
+        is_pure: dict[tuple[str, int | None], bool] = {}
+        for each in lineage:
+            for method in methods(each):
+                # The nearest declaration of a method counts.
+                is_pure.setdefault((method.short, method.parameters), method.pure)
+        if _is_cpp(item) or not any(is_pure.values()):
+            return any(is_pure.values())
         # In Python, abstractmethod() does nothing without the metaclass.
-        metaclasses = (_named(one.found.metaclass, one.file)[0] for one in line)
-        return any(nearest.values()) and not _ABSTRACT.isdisjoint(
-            (*self._ancestors(item), *metaclasses)
-        )
+        metaclasses = (_meanings(each.found.metaclass, each.file)[0] for each in lineage)
+        return not _ABSTRACT.isdisjoint((*self._ancestors(item), *metaclasses))
 
     def _ancestors(self, item: FoundClass) -> dict[str, None]:
         """Names of everything that a class inherits, with their modules or namespaces, in order."""
-        known = self._ancestors_of.get(id(item.found))
-        if known is None:
-            known = dict.fromkeys(self._bases_cpp(item) if _is_cpp(item) else _bases(item))
-            pending = list(known)
+        ancestors = self._ancestors_of.get(id(item.found))
+        if ancestors is None:
+            ancestors = dict.fromkeys(self._bases_cpp(item) if _is_cpp(item) else _bases(item))
+            pending = list(ancestors)
             for name in pending:
-                more = [one for one in self._beyond(name) if one not in known]
-                known.update(dict.fromkeys(more))
-                pending += more
-            self._ancestors_of[id(item.found)] = known
-        return known
+                new = [base for base in self._beyond(name) if base not in ancestors]
+                ancestors.update(dict.fromkeys(new))
+                pending += new
+            self._ancestors_of[id(item.found)] = ancestors
+        return ancestors
 
     def _beyond(self, name: str) -> list[str]:
         """What a class inherits, or what its name stands for in its module."""
@@ -130,7 +128,7 @@ class Family:
             return []
         own = self._class(name)
         # What is no class there the module has from elsewhere, such as in __init__.py.
-        return _bases(own) if own else _named(rest, module)
+        return _bases(own) if own else _meanings(rest, module)
 
     def _class(self, name: str) -> FoundClass | None:
         """The class of a full name, if it was handed in."""
@@ -151,29 +149,31 @@ class Family:
 
     def _bases_cpp(self, item: FoundClass) -> list[str]:
         """What the base classes of a class in C++ are, with their namespaces."""
-        found = []
-        for base in item.found.bases:
-            for scope in (*_scopes(item.found.name), *(f"{name}::" for name in item.file.stars)):
-                own = self._cpp.get(f"{scope}{base}")
-                if own is not None and own.found is not item.found:
-                    found.append(own.found.name)
-                    break
-            else:
-                found.append(self._meant(base, item))
-        return list(dict.fromkeys(found))
+        bases = [
+            self._class_around(base, item) or self._meant(base, item) for base in item.found.bases
+        ]
+        return list(dict.fromkeys(bases))
+
+    def _class_around(self, base: str, item: FoundClass) -> str | None:
+        """The class of a name in the namespaces around a class, or that it uses; or None."""
+        for scope in (*_scopes(item.found.name), *(f"{name}::" for name in item.file.stars)):
+            own = self._cpp.get(f"{scope}{base}")
+            if own is not None and own.found is not item.found:
+                return own.found.name
+        return None
 
     def _meant(self, base: str, item: FoundClass) -> str:
         """What a name stands for that no class around has."""
-        names = {**self._names_cpp, **dict(item.file.names)}
-        seen: set[str] = set()
-        while (head := base.partition("::")[0]) in names and head not in seen:
-            seen.add(head)
-            base = names[head] + base[len(head) :]
+        base, _ = _without_aliases(base, {**self._names_cpp, **dict(item.file.names)}, "::")
         # Of what `using namespace` of another file may bring, the one of that name.
         last = base.rpartition("::")[2]
-        like = [name for name in self._cpp if name.rpartition("::")[2] == last]
-        if base not in self._cpp and len(like) == 1 and like[0].endswith(f"::{base}"):
-            return like[0]
+        of_that_name = [name for name in self._cpp if name.rpartition("::")[2] == last]
+        if (
+            base not in self._cpp
+            and len(of_that_name) == 1
+            and of_that_name[0].endswith(f"::{base}")
+        ):
+            return of_that_name[0]
         if base == "Node" and "rclcpp" in item.file.stars:
             return "rclcpp::Node"
         return base
@@ -183,10 +183,10 @@ def methods(item: FoundClass) -> Iterator[SourceFunction]:
     """The methods that a class declares itself."""
     file, found = item
     separator = "::" if _is_cpp(item) else "."
-    for one in file.functions:
-        inside = not found.end or found.line <= one.line <= found.end
-        if inside and one.name == f"{found.name}{separator}{one.short}":
-            yield one
+    for function in file.functions:
+        is_inside = not found.end or found.line <= function.line <= found.end
+        if is_inside and function.name == f"{found.name}{separator}{function.short}":
+            yield function
 
 
 def _is_cpp(item: FoundClass) -> bool:
@@ -205,20 +205,33 @@ def _bases(item: FoundClass) -> list[str]:
     file, inheriting = item
     names = {one.name for one in file.classes if one is not inheriting}
     scope = inheriting.name.rpartition(".")[0]
-    found: list[str] = []
+    bases: list[str] = []
     for base in inheriting.bases:
         # A class beside it in the same function or class, or else one of the file.
-        own = next((name for name in (f"{scope}.{base}", base) if name in names), None)
-        found += [f"{file.module}.{own}"] if own else _named(base, file)
-    return found
+        if f"{scope}.{base}" in names:
+            bases.append(f"{file.module}.{scope}.{base}")
+        elif base in names:
+            bases.append(f"{file.module}.{base}")
+        else:
+            bases += _meanings(base, file)
+    return bases
 
 
-def _named(dotted: str, file: SourceFile) -> list[str]:
+def _meanings(dotted: str, file: SourceFile) -> list[str]:
     """What a name in a file may stand for; the name itself if the file says nothing of it."""
-    names, seen, found = dict(file.names), set[str](), dotted
-    # An alias of an alias, as in `Base = N` after `from rclpy.node import Node as N`.
-    while (head := found.partition(".")[0]) in names and head not in seen:
-        seen.add(head)
-        found = names[head] + found[len(head) :]
-    stars = [f"{module}.{dotted}" for module in file.stars]
-    return [found] if seen or not stars else stars
+    full, is_alias = _without_aliases(dotted, dict(file.names), ".")
+    if is_alias or not file.stars:
+        return [full]
+    return [f"{module}.{dotted}" for module in file.stars]
+
+
+def _without_aliases(name: str, names: Mapping[str, str], separator: str) -> tuple[str, bool]:
+    """A name with what its first part stands for, and whether that stood for something else.
+
+    An alias may be of another one: `Base = N` after `from rclpy.node import Node as N`.
+    """
+    replaced: set[str] = set()
+    while (head := name.partition(separator)[0]) in names and head not in replaced:
+        replaced.add(head)
+        name = names[head] + name[len(head) :]
+    return name, bool(replaced)

@@ -66,17 +66,18 @@ def resolve(
         UsageError: There is no such package, or versions contradict each other.
         GraderFault: Sources cannot be fetched.
     """
-    found: dict[str, Sources] = {}
-    ahead = [distribution.release(name) for name in sorted(set(names) - ros.packages)]
+    needed: dict[str, Sources] = {}
+    unread = [distribution.release(name) for name in sorted(set(names) - ros.packages)]
     with ThreadPoolExecutor(_AT_ONCE) as pool:
-        while ahead:
-            for release, folder in zip(ahead, pool.map(get, ahead), strict=True):
-                found[release.name] = _read(release, folder, distribution, ros)
-            missing = set().union(*(one.needs for one in found.values())) - found.keys()
-            ahead = [distribution.releases[name] for name in sorted(missing)]
+        while unread:
+            for release, folder in zip(unread, pool.map(get, unread), strict=True):
+                needed[release.name] = _read(release, folder, distribution, ros)
+            names_of_needs = {name for sources in needed.values() for name in sources.needs}
+            missing = sorted(names_of_needs - needed.keys())
+            unread = [distribution.releases[name] for name in missing]
+    needs = {name: sources.needs for name, sources in needed.items()}
     try:
-        order = TopologicalSorter({name: one.needs for name, one in found.items()}).static_order()
-        return [found[name] for name in order]
+        return [needed[name] for name in TopologicalSorter(needs).static_order()]
     except CycleError as error:
         circle = " needs ".join(reversed(error.args[1]))
         raise UsageError(f"these packages cannot be built, because {circle}") from error
@@ -84,14 +85,15 @@ def resolve(
 
 def closure(names: Collection[str], plan: Collection[Sources]) -> frozenset[str]:
     """Those packages of a plan that some packages need, with themselves."""
-    needs = {one.release.name: one.needs for one in plan}
-    ahead, found = [name for name in names if name in needs], set()
-    while ahead:
-        name = ahead.pop()
-        if name not in found:
-            found.add(name)
-            ahead += needs[name]
-    return frozenset(found)
+    needs = {sources.release.name: sources.needs for sources in plan}
+    pending = [name for name in names if name in needs]
+    needed = set()
+    while pending:
+        name = pending.pop()
+        if name not in needed:
+            needed.add(name)
+            pending += needs[name]
+    return frozenset(needed)
 
 
 def _read(
@@ -108,21 +110,25 @@ def _read(
             f"{release.source.url}: {release.source.version} holds the package {package.name!r}, "
             f"where the index names {release.name!r}"
         )
-    builds, runs = _applying(package)
-    for one in (*builds, *runs):
-        _check_version(release, one, distribution, ros)
-    build_names, run_names = ({one.name for one in some} for some in (builds, runs))
-    needs = (build_names | run_names) & distribution.releases.keys() - ros.packages
-    keys = distribution.keys.keys()
-    for name in sorted(build_names - distribution.releases.keys() - ros.packages - keys):
+    for_build, for_run = _applying(package)
+    for dependency in (*for_build, *for_run):
+        _check_version(release, dependency, distribution, ros)
+    build_names = {dependency.name for dependency in for_build} - ros.packages
+    run_names = {dependency.name for dependency in for_run} - ros.packages
+    packages = distribution.releases.keys()
+    keys = distribution.keys.keys() - packages
+    unknown = sorted(build_names - packages - keys)
+    if unknown:
         raise GraderFault(
-            f"{release.name} {release.version} needs {name!r}, which is neither a package nor a "
-            "rosdep key of the index"
+            f"{release.name} {release.version} needs {unknown[0]!r}, which is neither a package "
+            "nor a rosdep key of the index"
         )
-    of_system = keys - distribution.releases.keys() - ros.packages
-    build_keys, run_keys = build_names & of_system, run_names & of_system
     return Sources(
-        release, folder, frozenset(needs), frozenset(build_keys), frozenset(run_keys - build_keys)
+        release,
+        folder,
+        needs=frozenset((build_names | run_names) & packages),
+        build_keys=frozenset(build_names & keys),
+        run_keys=frozenset(run_names & keys - build_names),
     )
 
 
