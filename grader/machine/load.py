@@ -54,16 +54,15 @@ class Load:
         sizes = dict(re.findall(r"^(\w+): +(\d+) kB$", _MEMINFO.read_text(), re.MULTILINE))
         shares = [int(sizes["MemAvailable"]) / int(sizes["MemTotal"])]
         for group in _groups():
-            for limit, used, spare in _GROUP_FILES:
+            for limit_file, use_file, cache_line in _GROUP_FILES:
                 # Most groups have no limit, and a group of v1 has no file of v2.
                 with contextlib.suppress(OSError, ValueError, IndexError):
-                    most = int((group / limit).read_text())
-                    cached = re.findall(
-                        rf"^{spare} (\d+)$", (group / "memory.stat").read_text(), re.M
-                    )
-                    taken = int((group / used).read_text()) - int(cached[0])
-                    if most < 1024 * int(sizes["MemTotal"]):
-                        shares.append(1.0 - taken / most)
+                    limit = int((group / limit_file).read_text())
+                    statistics = (group / "memory.stat").read_text()
+                    cached = re.findall(rf"^{cache_line} (\d+)$", statistics, re.MULTILINE)
+                    used = int((group / use_file).read_text()) - int(cached[0])
+                    if limit < 1024 * int(sizes["MemTotal"]):
+                        shares.append(1.0 - used / limit)
         return min(shares)
 
 

@@ -48,21 +48,22 @@ class RosInstallation:
     @property
     def notice(self) -> str:
         """What to say of sourced workspaces, or nothing if there are none."""
-        places = ", ".join(map(str, self.left_out))
-        return places and (
-            f"left out: {places} (sourced, but no part of ROS). If submissions need it, name its "
-            "folder src under `underlays` in assignment.yaml"
+        if not self.left_out:
+            return ""
+        return (
+            f"left out: {', '.join(map(str, self.left_out))} (sourced, but no part of ROS). If "
+            "submissions need it, name its folder src under `underlays` in assignment.yaml"
         )
 
     @cached_property
     def packages(self) -> frozenset[str]:
         """Names of all packages in the ament index."""
-        found: set[str] = set()
+        names: set[str] = set()
         for prefix in (*self.underlays, *self.prefixes):
             index = prefix / _INDEX
             if index.is_dir():
-                found.update(entry.name for entry in index.iterdir())
-        return frozenset(found)
+                names.update(entry.name for entry in index.iterdir())
+        return frozenset(names)
 
     @cached_property
     def python_modules(self) -> frozenset[str]:
@@ -165,31 +166,35 @@ def find(
         GraderFault: Another distribution is sourced, or there is none at all.
     """
     if is_sourced(environ):
-        distro = environ["ROS_DISTRO"]
-        if distro != DISTRO:
-            raise GraderFault(
-                f"ROS 2 {distro} is sourced, but rosgrade grades with {DISTRO}: open a shell "
-                f"without it, or source /opt/ros/{DISTRO}/setup.bash"
-            )
-        sourced = [Path(path) for path in environ["AMENT_PREFIX_PATH"].split(os.pathsep) if path]
-        prefixes = _distribution(sourced)
-        if not prefixes:
-            raise GraderFault(f"ROS 2 {distro} is sourced, but has no rclpy: {_APT}")
-        names = ("PYTHONPATH", "LD_LIBRARY_PATH")
-        inherited = ((name, _below(prefixes, environ.get(name, ""))) for name in names)
-        others = (path for path in sourced if path not in prefixes)
-        return RosInstallation(
-            source="sourced",
-            python=executable,
-            prefixes=prefixes,
-            inherited=tuple((name, paths) for name, paths in inherited if paths),
-            left_out=tuple(dict.fromkeys(map(_install_space, others))),
-        )
+        return _sourced(environ, executable)
     if (prefix / _INDEX / "rclpy").exists():
         return RosInstallation(source="wheels", python=executable, prefixes=(prefix,))
     raise GraderFault(
         "no ROS 2 found: source /opt/ros/jazzy/setup.bash, or install the wheels with "
         "pip install 'rosgrade[ros]' (make setup does it)"
+    )
+
+
+def _sourced(environ: Mapping[str, str], python: Path) -> RosInstallation:
+    distro = environ["ROS_DISTRO"]
+    if distro != DISTRO:
+        raise GraderFault(
+            f"ROS 2 {distro} is sourced, but rosgrade grades with {DISTRO}: open a shell "
+            f"without it, or source /opt/ros/{DISTRO}/setup.bash"
+        )
+    sourced = [Path(path) for path in environ["AMENT_PREFIX_PATH"].split(os.pathsep) if path]
+    prefixes = _distribution(sourced)
+    if not prefixes:
+        raise GraderFault(f"ROS 2 {distro} is sourced, but has no rclpy: {_APT}")
+    names = ("PYTHONPATH", "LD_LIBRARY_PATH")
+    inherited = ((name, _below(prefixes, environ.get(name, ""))) for name in names)
+    others = (path for path in sourced if path not in prefixes)
+    return RosInstallation(
+        source="sourced",
+        python=python,
+        prefixes=prefixes,
+        inherited=tuple((name, paths) for name, paths in inherited if paths),
+        left_out=tuple(dict.fromkeys(map(_install_space, others))),
     )
 
 

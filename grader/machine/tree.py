@@ -75,11 +75,16 @@ def cut_deep(folder: Path) -> bool:
 
 def _grant(path: bytes, mode: int) -> None:
     """Give the owner the permission to read a file or folder, and to remove its content."""
-    wanted = stat.S_IRWXU if stat.S_ISDIR(mode) else stat.S_IRUSR if stat.S_ISREG(mode) else 0
-    if mode & wanted != wanted:
+    if stat.S_ISDIR(mode):
+        needed = stat.S_IRWXU
+    elif stat.S_ISREG(mode):
+        needed = stat.S_IRUSR
+    else:
+        return
+    if mode & needed != needed:
         # What belongs to another user stays as it is.
         with contextlib.suppress(OSError):
-            os.chmod(path, stat.S_IMODE(mode) | wanted)  # noqa: PTH101  bytes
+            os.chmod(path, stat.S_IMODE(mode) | needed)  # noqa: PTH101  bytes
 
 
 def _remove_deep(path: Path) -> None:

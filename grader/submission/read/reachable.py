@@ -18,18 +18,13 @@ def only_for(package: PackageRecord, executable: str) -> PackageRecord:
     commands, folder = read_commands(package.cmake or ""), package.file("")
     compiled = needed_files(executable, commands, folder, package.own_headers)
     if compiled is not None:
-        parts, lines = compiled
-        cmake = package.file("CMakeLists.txt")
-        kept = (one for one in package.ros_imports if one.file in parts)
-        named = (one for one in package.ros_imports if one.file == cmake and one.line in lines)
-        sources = tuple(one for one in package.sources if one.path in parts)
-        return replace(package, ros_imports=(*kept, *named), sources=sources)
-    target = dict(package.entry_points).get(executable)
+        return _compiled(package, *compiled)
+    target = dict(package.entry_points).get(executable, "")
     files = {source.module: source for source in package.sources}
-    if target is None or target.partition(":")[0] not in files:
+    pending = [target.partition(":")[0]]
+    if not target or pending[0] not in files:
         return package
     needed: set[str] = set()
-    pending = [target.partition(":")[0]]
     while pending:
         module = pending.pop()
         if module not in needed:
@@ -44,19 +39,27 @@ def only_for(package: PackageRecord, executable: str) -> PackageRecord:
     )
 
 
+def _compiled(package: PackageRecord, files: set[str], lines: set[int]) -> PackageRecord:
+    """The package with some files of C++, and some lines of its CMakeLists.txt."""
+    cmake = package.file("CMakeLists.txt")
+    included = (one for one in package.ros_imports if one.file in files)
+    linked = (one for one in package.ros_imports if one.file == cmake and one.line in lines)
+    sources = tuple(one for one in package.sources if one.path in files)
+    return replace(package, ros_imports=(*included, *linked), sources=sources)
+
+
 def _imported(source: SourceFile, files: Mapping[str, SourceFile]) -> list[str]:
     """Modules of the package that a module needs: imported ones, and the packages around them."""
     names = {*source.stars, *(dotted for _, dotted in source.names)}
     # `import bot.driver` is known as `bot`: any module of it may be meant.
     whole = {name for name in names if "." not in name}
-    found = {module for module in files if module.partition(".")[0] in whole}
-    found |= {module for module in files for name in names if _is_of(name, module)}
-    parents = {
-        ".".join(parts[:count])
-        for parts in (module.split(".") for module in (*found, source.module))
-        for count in range(1, len(parts))
-    }
-    return sorted(found | (parents & files.keys()))
+    imported = {module for module in files if module.partition(".")[0] in whole}
+    imported |= {module for module in files for name in names if _is_of(name, module)}
+    packages = set()
+    for module in (*imported, source.module):
+        parts = module.split(".")
+        packages |= {".".join(parts[:count]) for count in range(1, len(parts))}
+    return sorted(imported | (packages & files.keys()))
 
 
 def _is_of(name: str, module: str) -> bool:

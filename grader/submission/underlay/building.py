@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from grader.errors import GraderFault, SubmissionError, UsageError
 from grader.machine.ros import RosInstallation
+from grader.recording.submission import BuildRecord
 from grader.sandbox.limits import BUILD
 from grader.submission.build.build import Builder, once_more
 from grader.submission.build.build_cache import BuildCache, CachedBuild
@@ -76,15 +77,8 @@ class Building:
                 }
                 if not places:
                     raise UsageError(f"{folder}: there is no package in it (no {MANIFEST})")
-                begun = iter(range(1, len(places) + 1))
-
-                def progress(what: str) -> None:
-                    if what.startswith("building "):
-                        what += f" ({next(begun, '')} of {len(places)}, once on this machine)"
-                    self.say(what)
-
-                roots = [located.root / place for place in places.values()]
-                only_python = not any((root / "CMakeLists.txt").exists() for root in roots)
+                cmake_files = (located.root / place / "CMakeLists.txt" for place in places.values())
+                only_python = not any(file.exists() for file in cmake_files)
                 if not only_python:
                     check_toolchain(ros.environment({})["PATH"])
                 setting = BuildSetting(
@@ -92,7 +86,7 @@ class Building:
                     limits=_LIMITS,
                     sandbox=self.sandbox,
                     stop=self.stop,
-                    on_progress=progress,
+                    on_progress=self._counting(len(places)),
                 )
                 return Builder(setting, cache, is_second).build(
                     located,
@@ -103,16 +97,30 @@ class Building:
                 )
 
         built = once_more(attempt)
-        record = built.build
-        if built.install is not None and record.succeeded:
+        if built.install is not None and built.build.succeeded:
             return built.install
         # What it lacked may be there the next time.
         cache.discard(key)
+        raise self._fault(built.build, folder)
+
+    def _counting(self, total: int) -> Callable[[str], None]:
+        """Says how far a build of so many packages is."""
+        numbers = iter(range(1, total + 1))
+
+        def say(what: str) -> None:
+            if what.startswith("building "):
+                what += f" ({next(numbers, '')} of {total}, once on this machine)"
+            self.say(what)
+
+        return say
+
+    def _fault(self, record: BuildRecord, folder: Path) -> GraderFault:
+        what = ", ".join(record.failed_packages) or folder.name
+        if self.name:
+            what += f" of {self.name}"
         lacks = f" (not installed here: {', '.join(record.lacking)})" if record.lacking else ""
-        of = f" of {self.name}" if self.name else ""
-        raise GraderFault(
-            f"{', '.join(record.failed_packages) or folder.name}{of} could not be built{lacks}: "
-            f"{record.culprit or record.log[-2000:]}"
+        return GraderFault(
+            f"{what} could not be built{lacks}: {record.culprit or record.log[-2000:]}"
         )
 
 
@@ -125,7 +133,7 @@ def digest(ros: RosInstallation, *parts: object) -> str:
         str(ros.python),
         [str(prefix) for prefix in ros.prefixes],
         *versions(ros),
-        [at.stat().st_mtime_ns for at in index if at.is_dir()],
+        [folder.stat().st_mtime_ns for folder in index if folder.is_dir()],
     ]
     whole = [_RECIPE, installation, *parts]
     return hashlib.sha256(json.dumps(whole).encode()).hexdigest()
@@ -134,7 +142,7 @@ def digest(ros: RosInstallation, *parts: object) -> str:
 def versions(ros: RosInstallation) -> tuple[list[str], list[str]]:
     """The wheels of a ROS installation without its underlays, and the Python that they are for."""
     sites = replace(ros, underlays=()).site_packages
-    wheels = sorted(at.name for site in sites for at in site.glob("ros_*.dist-info"))
+    wheels = sorted(wheel.name for site in sites for wheel in site.glob("ros_*.dist-info"))
     return wheels, sorted({site.parent.name for site in sites})
 
 
@@ -151,14 +159,17 @@ def folder_key(folder: Path, ros: RosInstallation, names: Collection[str] | None
 
 def packages_in(folder: Path) -> dict[str, Path]:
     """The packages below a folder: name -> place."""
-    found: dict[str, Path] = {}
-    for place in find_packages(at.relative_to(folder).as_posix() for at in folder.rglob("*")):
+    packages: dict[str, Path] = {}
+    paths = (path.relative_to(folder).as_posix() for path in folder.rglob("*"))
+    for place in find_packages(paths):
         manifest = folder / place / MANIFEST
         name = read_manifest(manifest.read_bytes(), MANIFEST, {}).name or manifest.parent.name
-        if name in found:
-            raise UsageError(f"{folder}: two packages are called {name!r}: {found[name]}, {place}")
-        found[name] = folder / place
-    return found
+        if name in packages:
+            raise UsageError(
+                f"{folder}: two packages are called {name!r}: {packages[name]}, {place}"
+            )
+        packages[name] = folder / place
+    return packages
 
 
 def indexed(prefix: Path) -> set[str]:
