@@ -33,7 +33,7 @@ class PacketMonitor:
     """
 
     def __init__(self) -> None:
-        self._count = 0
+        self._malformed = 0
         self._newest: dict[str, int] = {}
         self.heartbeats: dict[str, tuple[int, int]] = {}
         self._socket = socket.socket(socket.AF_PACKET, socket.SOCK_DGRAM, 0)
@@ -53,28 +53,29 @@ class PacketMonitor:
                 packet = self._socket.recv(_KEPT_BYTES)
             except BlockingIOError:
                 break
-            header = (packet[0] & 0x0F) * 4
-            port = int.from_bytes(packet[header + 2 : header + 4], "big")
+            header_bytes = (packet[0] & 0x0F) * 4
+            port = int.from_bytes(packet[header_bytes + 2 : header_bytes + 4], "big")
             is_first = not int.from_bytes(packet[6:8], "big") & _FRAGMENT_OFFSET
             is_udp = packet[9] == socket.IPPROTO_UDP
             if not (is_first and is_udp and _FIRST_PORT <= port <= _LAST_PORT):
                 continue
-            data = packet[header + _UDP_HEADER_BYTES :]
+            data = packet[header_bytes + _UDP_HEADER_BYTES :]
             # After the name the major version; every vendor's id so far begins with 1.
             if len(data) >= _RTPS_HEADER_BYTES and data[:5] == b"RTPS\2" and data[6] == 1:
                 self._note_heartbeats(data)
-            else:
-                self._count += port in ports
-        return self._count
+            elif port in ports:
+                self._malformed += 1
+        return self._malformed
 
     def _note_heartbeats(self, data: bytes) -> None:
         # A student's process may send anything, and as much as it likes.
         for writer, first, last in islice(heartbeats(data), _MOST_HEARTBEATS):
             if writer in self.heartbeats or len(self.heartbeats) < _MOST_WRITERS:
-                kept, number = self.heartbeats.get(writer, (0, 0))
-                number += self._newest.get(writer) != last
+                most_kept, changes = self.heartbeats.get(writer, (0, 0))
+                if self._newest.get(writer) != last:
+                    changes += 1
                 self._newest[writer] = last
-                self.heartbeats[writer] = max(kept, last - first + 1), number
+                self.heartbeats[writer] = max(most_kept, last - first + 1), changes
 
 
 def bound_ports() -> frozenset[int]:

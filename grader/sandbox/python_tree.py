@@ -92,16 +92,16 @@ def check_installed(libraries: Collection[str]) -> None:
 def not_installed(libraries: Collection[str], who: str = "the assignment allows") -> list[str]:
     """Say of each library that is not there what it is, and how it gets there."""
     installed = set(_installed()) if libraries else set()
-    found = []
+    problems = []
     for name in libraries:
         if installed.isdisjoint((_normal(name), _RENAMED.get(_normal(name)))):
             near = did_you_mean(name, installed)
-            found.append(
+            problems.append(
                 f"{who} the library {name!r}, which is not installed here.{near} "
                 f"{'Otherwise install it' if near else 'To install it'}: "
                 f"{sys.executable} -m pip install {name}"
             )
-    return found
+    return problems
 
 
 def unlisted(
@@ -116,13 +116,13 @@ def unlisted(
     if not foreign:
         return ()
     installed, allowed = _installed(), _closure({_normal(name) for name in libraries})
-    found = []
+    not_allowed = []
     for module, names in metadata.packages_distributions().items():
         owners = {_normal(name) for name in names}
         is_there = any(_is_in(installed[owner], within) for owner in owners)
         if module in foreign and allowed.keys().isdisjoint(owners) and is_there:
-            found.append(module)
-    return tuple(sorted(found))
+            not_allowed.append(module)
+    return tuple(sorted(not_allowed))
 
 
 def prune(folder: Path) -> None:
@@ -151,19 +151,20 @@ def _is_in(distribution: metadata.Distribution, folder: Path) -> bool:
 
 
 def _closure(libraries: Collection[str]) -> dict[str, metadata.Distribution]:
+    """ROS, what an assignment allows beside it, and all that they require."""
     installed = _installed()
-    queue = [name for name in installed if _ROOTS.fullmatch(name) or name in libraries]
-    found: dict[str, metadata.Distribution] = {}
-    while queue:
-        name = queue.pop()
-        if name in found or name not in installed:
+    pending = [name for name in installed if _ROOTS.fullmatch(name) or name in libraries]
+    required: dict[str, metadata.Distribution] = {}
+    while pending:
+        name = pending.pop()
+        if name in required or name not in installed:
             continue
-        found[name] = installed[name]
-        for requirement in found[name].requires or ():
+        required[name] = installed[name]
+        for requirement in required[name].requires or ():
             match = _NAME.match(requirement)
             if match and "extra ==" not in requirement:
-                queue.append(_normal(match.group()))
-    return found
+                pending.append(_normal(match.group()))
+    return required
 
 
 def _make(target: Path, prefix: Path, distributions: Iterable[metadata.Distribution]) -> None:

@@ -95,11 +95,13 @@ class Sandbox:
 
     def underlays(self) -> list[Bind]:
         """The underlays that are kept on this machine, as cells see them."""
-        found = kept_underlays(self.cache)
         # A sandbox runs as another user, where rosgrade runs as root; built with a umask such as
         # 077, an underlay is copied for it.
-        shown = [path for path in found if path.stat().st_mode & 0o555 == 0o555]
-        return [Bind(path, _UNDERLAYS / path.parent.name) for path in shown]
+        return [
+            Bind(path, _UNDERLAYS / path.parent.name)
+            for path in kept_underlays(self.cache)
+            if path.stat().st_mode & 0o555 == 0o555
+        ]
 
     def watched(self) -> Callable[[], None]:
         """A function that raises :class:`GraderFault` if the students' Python was damaged."""
@@ -213,7 +215,9 @@ class BuildRoom:
         size, files = folder_usage(self.folders, limits.disk_bytes, limits.files)
         if size > limits.disk_bytes:
             return f"it wrote more than {size_words(limits.disk_bytes)}"
-        return f"it made more than {limits.files} files" if files > limits.files else None
+        if files > limits.files:
+            return f"it made more than {limits.files} files"
+        return None
 
 
 def hide(binds: Sequence[Bind]) -> list[str]:
@@ -259,17 +263,17 @@ def _in_environment() -> bool:
 
 def _libraries_beside() -> list[Path]:
     base = Path(sys.base_prefix).resolve()
+    if not _in_environment() or base == _USR:
+        return []
     own = [Path(path).resolve() for path in sys.path]
-    found = base.glob(_SITE)
-    return [path for path in found if _in_environment() and base != _USR and path not in own]
+    return [path for path in base.glob(_SITE) if path not in own]
 
 
 def _python_and_ros(ros: RosInstallation) -> list[Path]:
     """The folders of the interpreter, of its environment and of ROS, none within another."""
     base = Path(sys.base_prefix).resolve()
-    wanted = [base, Path(sys.prefix), *ros.prefixes]
-    found: list[Path] = []
-    for path in wanted:
-        if path.is_dir() and not any(path.is_relative_to(other) for other in (_USR, *found)):
-            found.append(path)
-    return found
+    folders: list[Path] = []
+    for path in (base, Path(sys.prefix), *ros.prefixes):
+        if path.is_dir() and not any(path.is_relative_to(other) for other in (_USR, *folders)):
+            folders.append(path)
+    return folders

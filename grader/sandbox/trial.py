@@ -37,13 +37,13 @@ def choose(choice: Choice, cache: Path) -> tuple[Sandbox | None, str]:
     """The sandbox to use or None, and a line for the user where there is something to say."""
     if choice is Choice.NONE:
         return None, ""
-    found = try_sandbox()
-    if not found.problem:
+    trial = try_sandbox()
+    if not trial.problem:
         return Sandbox(cache), ""
     if choice is Choice.BWRAP:
-        raise GraderFault(f"no sandbox: {found.problem}; {found.remedy}")
+        raise GraderFault(f"no sandbox: {trial.problem}; {trial.remedy}")
     return None, (
-        f"no sandbox ({found.problem}): the submission runs with your rights; "
+        f"no sandbox ({trial.problem}): the submission runs with your rights; "
         "`rosgrade doctor` says what to do"
     )
 

@@ -173,17 +173,17 @@ class Colcon:
         return shlex.join(["-O0", "-g1", *places])
 
     def _command(self) -> list[str]:
-        folders = [str(self.root / folder) for folder in self.folders.values()]
-        command = _colcon(self.setting.ros, self.environment["PATH"])
-        command += ["--log-base", os.devnull, "build"]
-        command += ["--merge-install", "--continue-on-error"]
-        # Unlike the sequential executor it goes on where a setup.py raises before a build begins.
-        command += ["--executor", "parallel", "--parallel-workers", "1"]
-        command += ["--build-base", str(self.scratch / "build")]
-        command += ["--install-base", str(self.install)]
-        command += ["--event-handlers", "console_direct+", "console_cohesion-", "console_stderr-"]
-        command += ["parallel_status-"]
-        command += ["--base-paths", *folders]
+        command = [
+            *_colcon(self.setting.ros, self.environment["PATH"]),
+            *("--log-base", os.devnull, "build", "--merge-install", "--continue-on-error"),
+            # Unlike the sequential one it goes on where a setup.py raises before a build begins.
+            *("--executor", "parallel", "--parallel-workers", "1"),
+            *("--build-base", str(self.scratch / "build")),
+            *("--install-base", str(self.install)),
+            *("--event-handlers", "console_direct+", "console_cohesion-", "console_stderr-"),
+            "parallel_status-",
+            *("--base-paths", *(str(self.root / folder) for folder in self.folders.values())),
+        ]
         if not self.only_python:
             # Linters and test frameworks are not there to be found on a small installation.
             command += ["--cmake-args", "-DBUILD_TESTING=OFF"]

@@ -40,9 +40,9 @@ _MOST_PLACES = 20
 
 def find_ruff() -> Path | None:
     """The program: of this Python environment, or else on the path."""
-    own = Path(sysconfig.get_path("scripts")) / "ruff"
-    found = str(own) if own.is_file() else shutil.which("ruff")
-    return Path(found) if found else None
+    beside = Path(sysconfig.get_path("scripts")) / "ruff"
+    program = str(beside) if beside.is_file() else shutil.which("ruff")
+    return Path(program) if program else None
 
 
 @cache
@@ -66,14 +66,16 @@ def lint(root: Path, files: Collection[str], ruff: Path | None = None) -> Lint:
     ruff = ruff or find_ruff()
     if ruff is None:
         return Lint("ruff is not installed: `pip install ruff`")
-    problem, found = _check(ruff, root, files, _PYTHON)
-    seen: Counter[str] = Counter()
+    problem, findings = _check(ruff, root, files, _PYTHON)
+    if problem:
+        return Lint(problem, ())
+    places: Counter[str] = Counter()
     kept = []
-    for finding in sorted(found, key=lambda item: (item.file, item.line, item.code)):
-        seen[finding.code] += 1
-        if not _is_syntax_error(finding) and seen[finding.code] <= _MOST_PLACES:
+    for finding in sorted(findings, key=lambda item: (item.file, item.line, item.code)):
+        places[finding.code] += 1
+        if not _is_syntax_error(finding) and places[finding.code] <= _MOST_PLACES:
             kept.append(finding)
-    return Lint(problem, () if problem else tuple(kept))
+    return Lint(None, tuple(kept))
 
 
 def newer_syntax(
@@ -83,15 +85,17 @@ def newer_syntax(
     ruff = find_ruff()
     if python >= _PYTHON or ruff is None:
         return ()
-    problem, found = _check(ruff, root, files, python)
+    problem, findings = _check(ruff, root, files, python)
+    if problem:
+        return ()
     errors: dict[str, list[LintFinding]] = {}
-    for item in found if problem is None else ():
-        if _is_syntax_error(item):
-            errors.setdefault(item.file, []).append(item)
+    for finding in findings:
+        if _is_syntax_error(finding):
+            errors.setdefault(finding.file, []).append(finding)
     return tuple(
-        SourceError(file, items[0].line, items[0].message)
-        for file, items in sorted(errors.items())
-        if all(map(_is_jazzy_syntax, items))
+        SourceError(file, in_file[0].line, in_file[0].message)
+        for file, in_file in sorted(errors.items())
+        if all(map(_is_jazzy_syntax, in_file))
     )
 
 
@@ -109,9 +113,9 @@ def _check(
     ruff: Path, root: Path, files: Collection[str], python: tuple[int, int]
 ) -> tuple[str | None, list[LintFinding]]:
     """Run ruff with all rules; why that was not possible, or None, and what it finds."""
-    found: list[LintFinding] = []
+    findings: list[LintFinding] = []
     if not files:
-        return None, found
+        return None, findings
     options = (
         "--isolated --no-cache --no-fix --exit-zero --ignore-noqa --no-respect-gitignore --quiet "
         f"--select ALL --line-length {LINE_LENGTH} --target-version py{python[0]}{python[1]} "
@@ -124,22 +128,22 @@ def _check(
             Command(arguments, root, {"PATH": os.defpath}),
             wall_s=_WALL_S,
             output=OutputLimits(head=0, tail=2000),
-            on_line=lambda line: found.extend(_findings(line, root)),
+            on_line=lambda line: findings.extend(_findings(line, root)),
         )
     except GraderFault as fault:
-        return f"ruff could not be run: {fault}", found
+        return f"ruff could not be run: {fault}", findings
     if outcome.ended_by_us:
-        return f"ruff was ended: too much {outcome.ended_by_us}", found
-    return "ruff failed" if outcome.status else None, found
+        return f"ruff was ended: too much {outcome.ended_by_us}", findings
+    return "ruff failed" if outcome.status else None, findings
 
 
 def _findings(line: str, root: Path) -> Iterator[LintFinding]:
     """The findings in a line of ruff's output; none in other output."""
     try:
-        found = json.loads(line)
-        code, message = str(found["code"]), str(found["message"])
-        file = os.path.relpath(found["filename"], root)
-        number = int(found["location"]["row"])
+        said = json.loads(line)
+        code, message = str(said["code"]), str(said["message"])
+        file = os.path.relpath(said["filename"], root)
+        row = int(said["location"]["row"])
     except (ValueError, KeyError, TypeError):
         return
-    yield LintFinding(code, shown(file), number, shown(message.partition("\n")[0]))
+    yield LintFinding(code, shown(file), row, shown(message.partition("\n")[0]))

@@ -86,9 +86,10 @@ class Underlay:
     @property
     def listed(self) -> frozenset[str]:
         """Its packages, where all of them are listed."""
-        parts = [one.packages for one in self.repos.repositories.values()] if self.repos else [()]
-        listed = frozenset(name for part in parts for name in part) if all(parts) else frozenset()
-        return frozenset(self.packages) | listed
+        if self.repos is None:
+            return frozenset(self.packages)
+        lists = [repository.packages for repository in self.repos.repositories.values()]
+        return frozenset[str]().union(*lists) if all(lists) else frozenset()
 
     @property
     def required(self) -> tuple[Underlay, ...]:

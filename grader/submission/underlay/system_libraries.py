@@ -39,8 +39,8 @@ class System:
             rule = rule.get("apt")
         if isinstance(rule, dict):
             rule = rule.get("packages")
-        found = rule.split() if isinstance(rule, str) else rule
-        return tuple(map(str, found)) if isinstance(found, list) else ()
+        names = rule.split() if isinstance(rule, str) else rule
+        return tuple(map(str, names)) if isinstance(names, list) else ()
 
     def lacking(self, rules: Iterable[Mapping[str, Any]]) -> list[str]:
         """The packages for some rosdep keys that are not installed, as far as that is known."""
@@ -70,12 +70,12 @@ def _installed() -> frozenset[str] | None:
         return None
     command = [dpkg, "--show", f"--showformat={_LISTED}"]
     listed = subprocess.run(command, capture_output=True, text=True, check=False).stdout
-    found = set[str]()
+    packages = set[str]()
     for line in listed.splitlines():
         status, _, names = line.partition("\t")
         if status == "installed":
-            found.update(re.split(r"[ :]", name.strip())[0] for name in names.split(","))
-    return frozenset(found - {""})
+            packages.update(re.split(r"[ :]", name.strip())[0] for name in names.split(","))
+    return frozenset(packages - {""})
 
 
 def is_of_python(key: str) -> bool:
