@@ -28,15 +28,16 @@ def find_imports(tree: ast.Module, file: str) -> list[Import]:
         Absolute imports, also ``importlib.import_module("literal")``, by line. Relative imports
         stay within the package and are left out.
     """
-    found = {
+    imports = {
         Import(name.partition(".")[0], file, line, optional)
         for name, line, optional in _walk(tree)
         if name
     }
-    return sorted(found, key=lambda item: (item.line, item.module, item.optional))
+    return sorted(imports, key=lambda item: (item.line, item.module, item.optional))
 
 
 def _walk(tree: ast.Module) -> Iterator[tuple[str, int, bool]]:
+    """Name and line of each import, and whether the code runs without it; some have no name."""
     # A stack instead of recursion: how deep the tree is, is up to the student.
     pending: list[tuple[ast.AST, bool]] = [(tree, False)]
     while pending:

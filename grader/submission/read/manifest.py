@@ -82,9 +82,6 @@ class _Refused(Exception):
 def read_manifest(data: bytes, file: str, environment: Mapping[str, str]) -> Manifest:
     """Read a package.xml; conditions of its entries (REP-149) are judged in ``environment``."""
     document = _parse(data)
-    names = [name for name in document.texts("name") if _NAME.fullmatch(name)]
-    build_types = document.texts("export/build_type")
-    default = None if document.error else _DEFAULT_BUILD_TYPE
     dependencies: list[Dependency] = []
     misplaced: list[Dependency] = []
     for element in document.elements:
@@ -94,12 +91,16 @@ def read_manifest(data: bytes, file: str, environment: Mapping[str, str]) -> Man
             dependencies.append(entry)
         elif tag != element.tag and tag in (*DEPENDENCY_KINDS, "member_of_group"):
             misplaced.append(entry)
+    names = [name for name in document.texts("name") if _NAME.fullmatch(name)]
+    build_types = document.texts("export/build_type")
+    if not build_types and not document.error:
+        build_types = [_DEFAULT_BUILD_TYPE]
     error = document.error or _violation(data, document)
     if error is None and len(dependencies) > _MAX_DEPENDENCIES:
         error = (None, f"names more than {_MAX_DEPENDENCIES} dependencies")
     return Manifest(
         name=names[0] if names else None,
-        build_type=build_types[0] if build_types else default,
+        build_type=build_types[0] if build_types else None,
         error=SourceError(file, *error) if error else None,
         dependencies=tuple(dependencies[:_MAX_DEPENDENCIES]),
         misplaced=tuple(misplaced[:_MAX_DEPENDENCIES]),
@@ -115,21 +116,27 @@ def read_manifest(data: bytes, file: str, environment: Mapping[str, str]) -> Man
 
 
 def _parse(data: bytes) -> _Document:
+    if not data.strip():
+        return _Document(error=(None, EMPTY))
+    if len(data) > _MAX_BYTES:
+        return _Document(error=(None, f"larger than {_MAX_BYTES // 1024} KiB; not read"))
     document = _Document()
-    path: list[tuple[str, int]] = []
+    open_elements: list[tuple[str, int]] = []
     parser = expat.ParserCreate()
     parser.buffer_text = True
 
-    def place() -> str:
-        return "/".join(tag for tag, _ in path[1:4])
+    def tag_here() -> str:
+        return "/".join(tag for tag, _ in open_elements[1:4])
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        path.append((tag, parser.CurrentLineNumber))
-        if len(path) == 2 or (len(path) == 3 and path[1][0] == "export"):
-            document.elements.append(_Element(place(), parser.CurrentLineNumber, attributes))
+        open_elements.append((tag, parser.CurrentLineNumber))
+        depth = len(open_elements)
+        if depth == 2 or (depth == 3 and open_elements[1][0] == "export"):
+            element = _Element(tag_here(), parser.CurrentLineNumber, attributes)
+            document.elements.append(element)
 
     def text(characters: str) -> None:
-        if document.elements and document.elements[-1].tag == place():
+        if document.elements and document.elements[-1].tag == tag_here():
             document.elements[-1].text += characters
 
     def refuse_doctype(*_: object) -> None:
@@ -137,21 +144,15 @@ def _parse(data: bytes) -> _Document:
         raise _Refused("a document type declaration (<!DOCTYPE ...>) is refused")
 
     parser.StartElementHandler = start
-    parser.EndElementHandler = lambda _: path.pop()
+    parser.EndElementHandler = lambda _: open_elements.pop()
     parser.CharacterDataHandler = text
     parser.StartDoctypeDeclHandler = refuse_doctype
-    if not data.strip():
-        document.error = (None, EMPTY)
-        return document
-    if len(data) > _MAX_BYTES:
-        document.error = (None, f"larger than {_MAX_BYTES // 1024} KiB; not read")
-        return document
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
-        if error.code in _UNCLOSED and path:
+        if error.code in _UNCLOSED and open_elements:
             # The place to correct is where the element begins, not where expat noticed.
-            tag, line = path[-1]
+            tag, line = open_elements[-1]
             document.error = (line, f"invalid XML: <{tag}> is not closed")
         else:
             reason = expat.ErrorString(error.code)
@@ -184,12 +185,14 @@ def _violation(data: bytes, document: _Document) -> tuple[int | None, str] | Non
 def _line_of(message: str, document: _Document) -> int | None:
     """Find the element that a message of catkin_pkg quotes: what stands in it, or its tag."""
     quoted = _UNKNOWN_TAG.findall(message) or _QUOTED.findall(message)
-    for is_tag in (False, True):
-        for value in quoted:
-            for element in document.elements:
-                inside = (element.text.strip(), *element.attributes.values())
-                if value in ([element.tag] if is_tag else inside):
-                    return element.line
+    for value in quoted:
+        for element in document.elements:
+            if value == element.text.strip() or value in element.attributes.values():
+                return element.line
+    for value in quoted:
+        for element in document.elements:
+            if value == element.tag:
+                return element.line
     return None
 
 

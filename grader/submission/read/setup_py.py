@@ -7,8 +7,9 @@ and ``+``. What needs running stays unknown, until the build shows it.
 from __future__ import annotations
 
 import ast
+import contextlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Union
 
@@ -76,32 +77,32 @@ def read_setup(
     tree = source.parse(setup_py or b"", file, allowance)
     keywords: Mapping[str, _Value] = {}
     if not isinstance(tree, SourceError):
-        try:
+        # A value may be nested too deeply; then nothing of the call is known.
+        with contextlib.suppress(RecursionError):
             keywords = _setup_keywords(tree)
-        except RecursionError:
-            keywords = {}
-    groups = keywords.get("entry_points")
-    scripts = groups.get(_GROUP) if isinstance(groups, dict) else None
-    # setuptools takes lines of a text as well, leaves out empty ones and comments.
-    texts = scripts if isinstance(scripts, list) else [scripts]
-    lines = [
-        (line.strip(), text.line)
-        for text in texts
-        if isinstance(text, _Text)
-        for line in text.splitlines()
-        if line.strip() and not line.strip().startswith("#")
-    ]
-    entries = [parse_entry_point(line, file, number) for line, number in lines]
+    entries: list[EntryPoint] = []
+    refused: list[SourceError] = []
+    for text, line in _console_scripts(keywords.get("entry_points")):
+        entry = parse_entry_point(text, file, line)
+        if entry is None:
+            refused.append(SourceError(file, line, _refusal(text)))
+        else:
+            entries.append(entry)
     name = keywords.get("name")
-    return Setup(
-        str(name) if isinstance(name, _Text) else None,
-        tuple(entry for entry in entries if entry is not None),
-        tuple(
-            SourceError(file, number, _refusal(line))
-            for (line, number), entry in zip(lines, entries, strict=True)
-            if entry is None
-        ),
-    )
+    return Setup(str(name) if isinstance(name, _Text) else None, tuple(entries), tuple(refused))
+
+
+def _console_scripts(entry_points: _Value) -> Iterator[tuple[str, int]]:
+    """The entries of console_scripts as they are written, each with its line.
+
+    setuptools takes lines of a text as well, and leaves out empty ones and comments.
+    """
+    scripts = entry_points.get(_GROUP) if isinstance(entry_points, dict) else None
+    for text in scripts if isinstance(scripts, list) else [scripts]:
+        if isinstance(text, _Text):
+            for line in map(str.strip, text.splitlines()):
+                if line and not line.startswith("#"):
+                    yield line, text.line
 
 
 def _refusal(text: str) -> str:
@@ -123,7 +124,9 @@ def parse_entry_point(text: str, file: str, line: int | None = None) -> EntryPoi
 def parse_installed(text: str, file: str) -> list[EntryPoint]:
     """Parse the ``entry_points.txt`` of an installed distribution."""
     section = _INSTALLED.search(text)
-    entries = (parse_entry_point(line, file) for line in section[1].split("\n")) if section else ()
+    if section is None:
+        return []
+    entries = (parse_entry_point(line, file) for line in section[1].split("\n"))
     return [entry for entry in entries if entry is not None]
 
 
@@ -154,7 +157,8 @@ def _value(node: ast.expr, names: Mapping[str, _Value]) -> _Value:
     if isinstance(node, ast.List | ast.Tuple):
         return [_value(item, names) for item in node.elts]
     if isinstance(node, ast.Dict):
-        keys = [key and _value(key, names) for key in node.keys]
+        # `**others` has no key.
+        keys = [None if key is None else _value(key, names) for key in node.keys]
         return {
             key: _value(item, names)
             for key, item in zip(keys, node.values, strict=True)
