@@ -101,10 +101,12 @@ def prepare(path: Path | str, how: Preparation) -> Prepared:
         with how.place(is_second), opened(source) as located:
             if how.source_folder is not None:
                 keep_source(located.root, how.source_folder)
-            bags: Sequence[ReadBag] = ()
+            # Before the build, which may change the private copy.
+            bags = None
             if how.with_bags:
                 bags = read_bags(located, how.ros, how.sandbox, how.bag_types)
-            return _with_bags(_prepare(located, how, store, is_second), bags)
+            prepared = _prepare(located, how, store, is_second)
+            return prepared if bags is None else _with_bags(prepared, bags)
 
     try:
         return once_more(attempt)

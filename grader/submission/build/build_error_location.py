@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from grader.recording.submission import SourceError
@@ -27,7 +27,9 @@ _REQUIRED = re.compile(r"([^\s:]+):(\d+):\d+: +(?:recursively )?required (?:from
 _REQUESTED = re.compile(r"([^\s:]+):(\d+):\d+: note: in instantiation of")
 _INCLUDED = re.compile(r"(?:In file included | +)from ([^\s:]+):(\d+)")
 _COMPILING = re.compile(r"Building CX{0,2} object CMakeFiles/\S+?\.dir/(\S+)\.o$", re.MULTILINE)
-_MOST_AROUND = 200
+# How far from an error its parts are looked for: a message of a compiler with templates, one of
+# CMake with what a program of it printed, and the list of callers below that.
+_MOST_AROUND, _LONGEST_BLOCK, _CALLERS_WITHIN = 200, 400, 40
 _MANIFEST = re.compile(r"(?:\S*InvalidPackage: )?Error\(s\) in package '([^']+)':")
 _SETUPTOOLS = re.compile(r"error: (.+)")
 _NO_SETUP_PY = re.compile(r".*can't open file '[^']*setup\.py'")
@@ -75,11 +77,10 @@ def find_build_error(log: str, failed: Collection[str], sources: Sources) -> Sou
         if started:
             package = started[1]
         elif package in failed or not package:
-            found = _Place(lines, number, package, sources).error()
-            if found is not None:
-                return SourceError(
-                    shown(found.file), found.line, shown(found.message)[:_MAX_MESSAGE]
-                )
+            error = _Place(lines, number, package, sources).error()
+            if error is not None:
+                message = shown(error.message)[:_MAX_MESSAGE]
+                return SourceError(shown(error.file), error.line, message)
     return None
 
 
@@ -108,8 +109,10 @@ def _last_words(log: str) -> str:
     """The first line of a package's log that tells of an error, or its last line."""
     own = _ENDED.split(log)[0].splitlines()
     lines = [line.strip() for line in own if line.strip() and not _AROUND.match(line)]
-    errors = [line for line in lines if _ERROR.search(line)]
-    return [*errors[:1], *lines[-1:], "there is no error message"][0][:_MAX_MESSAGE]
+    if not lines:
+        return "there is no error message"
+    errors = (line for line in lines if _ERROR.search(line))
+    return next(errors, lines[-1])[:_MAX_MESSAGE]
 
 
 @dataclass(frozen=True)
@@ -173,16 +176,21 @@ class _Place:
                 break
             after.append(line)
         for pattern, around in ((_REQUIRED, before), (_REQUESTED, after), (_INCLUDED, before)):
-            places = (self._at(m[1], int(m[2]), message) for m in map(pattern.match, around) if m)
-            found = next((place for place in places if place is not None), None)
-            if found is not None:
-                return found
+            matches = [match for match in map(pattern.match, around) if match is not None]
+            error = self._first_of([(match[1], match[2]) for match in matches], message)
+            if error is not None:
+                return error
         return None
+
+    def _first_of(self, places: Iterable[tuple[str, str]], message: str) -> SourceError | None:
+        """The message at the first of some paths and lines that is in a file of the student's."""
+        errors = (self._at(path, int(line), message) for path, line in places)
+        return next((error for error in errors if error is not None), None)
 
     def _block(self) -> list[str]:
         """The following lines that are indented, and the first that is not."""
         block = []
-        for line in self.lines[self.number + 1 : self.number + 400]:
+        for line in self.lines[self.number + 1 : self.number + _LONGEST_BLOCK]:
             block.append(line)
             if line and not line[0].isspace():
                 break
@@ -191,13 +199,13 @@ class _Place:
     def _traceback(self) -> SourceError | None:
         block = self._block()
         message = block[-1] if block else ""
-        found, in_setup = None, False
+        deepest, in_setup = None, False
         for line in block:
             if frame := _FRAME.match(line):
                 path = self.setup_py if in_setup and frame[1] == "<string>" else frame[1]
                 in_setup = in_setup or _RUN_SETUP in line
-                found = self._at(path, int(frame[2]), message) or found
-        return found
+                deepest = self._at(path, int(frame[2]), message) or deepest
+        return deepest
 
     def _plain_cmake(self, message: str) -> SourceError | None:
         if _NO_CMAKELISTS not in message:
@@ -221,13 +229,12 @@ class _Place:
                 return quoted
         if match[1] == "cmake_install.cmake":
             return self._at("CMakeLists.txt", None, message)
-        places = [(match[1], match[2]), *self._callers()]
-        found = (self._at(path, int(line), message) for path, line in places)
-        return next((error for error in found if error is not None), None)
+        return self._first_of([(match[1], match[2]), *self._callers()], message)
 
     def _callers(self) -> Iterator[tuple[str, str]]:
         """The callers of the command of CMake that failed, the innermost first."""
-        for number in range(self.number + 1, min(self.number + 40, len(self.lines))):
+        end = min(self.number + _CALLERS_WITHIN, len(self.lines))
+        for number in range(self.number + 1, end):
             if self.lines[number].startswith("Call Stack"):
                 callers = map(_CMAKE_CALLER.match, replace(self, number=number)._block())
                 yield from ((caller[1], caller[2]) for caller in callers if caller)

@@ -86,9 +86,9 @@ def list_files(
     try:
         for path, entry in _walk(root, ".", False, limits.depth):
             if entry is None:
-                found = built(path)
-                if leftovers is not None and found is not None:
-                    leftovers.add(found)
+                leftover = built(path)
+                if leftovers is not None and leftover is not None:
+                    leftovers.add(leftover)
             elif entry.is_symlink():
                 links[path] = _end(root, path)
             elif entry.is_file(follow_symlinks=False):
@@ -106,12 +106,12 @@ def list_files(
                 )
     except OSError as error:
         raise unreadable(str(error.filename), error) from error
-    there = {path for file in files for path in (file.path, *parents(file.path))}
+    paths = {path for file in files for path in (file.path, *parents(file.path))}
     for path in links:
         end = path
         for _ in range(_MOST_HOPS):
             end = links.get(end, end)
-        if end in there:
+        if end in paths:
             link = os.path.relpath(end, path.rpartition("/")[0] or ".")
             files.append(SubmissionFile(path, 0, link=link))
     return sorted(files, key=lambda file: os.fsencode(file.path))
@@ -121,17 +121,19 @@ def _walk(
     root: Path, folder: str, in_package: bool, depth: int
 ) -> Iterator[tuple[str, os.DirEntry[str] | None]]:
     """Paths with their entries; what a tool left behind has none."""
-    with os.scandir(root / folder) as found:
-        entries = sorted(found, key=lambda entry: entry.name)
+    with os.scandir(root / folder) as unsorted:
+        entries = sorted(unsorted, key=lambda entry: entry.name)
     if depth < 0:
         raise SubmissionError(f"{shown(folder)}: folders are nested too deep")
     in_package = in_package or any(entry.name == MANIFEST for entry in entries)
     for entry in entries:
         path = join(folder, entry.name)
         if not entry.is_dir(follow_symlinks=False):
-            linked_leftover = entry.is_symlink() and entry.name in COLCON_FOLDERS
-            left = is_left_out(entry.name) or entry.name.endswith(".pyc") or linked_leftover
-            yield path, None if left else entry
+            is_linked_leftover = entry.is_symlink() and entry.name in COLCON_FOLDERS
+            if is_left_out(entry.name) or entry.name.endswith(".pyc") or is_linked_leftover:
+                yield path, None
+            else:
+                yield path, entry
             continue
         marks = {mark for mark in MARKS if os.path.lexists(root / path / mark)}
         if is_leftover(entry.name, marks, in_package):
@@ -147,13 +149,13 @@ def _end(root: Path, path: str) -> str:
     if target.startswith("/"):
         # An absolute link into the folder itself is as good as a relative one.
         ends = [os.path.relpath(target, base) for base in (root.absolute(), root.resolve())]
-    end = next((one for one in ends if one.split("/")[0] != ".."), None)
-    if end is None:
-        raise SubmissionError(
-            f"{shown(path)}: the link to {shown(target)!r} leads out of the submission; put a copy "
-            "of its target there instead"
-        )
-    return end
+    for end in ends:
+        if end.split("/")[0] != "..":
+            return end
+    raise SubmissionError(
+        f"{shown(path)}: the link to {shown(target)!r} leads out of the submission; put a copy "
+        "of its target there instead"
+    )
 
 
 def wrapper_of(files: Sequence[SubmissionFile]) -> str:
@@ -186,10 +188,11 @@ def find_packages(paths: Iterable[str]) -> list[str]:
             folders.add(folder or ".")
         elif name in _IGNORE_MARKERS:
             ignored.add(folder or ".")
-    found: list[str] = []
-    for folder in sorted(folders, key=lambda folder: (folder != ".", folder.count("/"))):
+    packages: set[str] = set()
+    outer_first = sorted(folders, key=lambda folder: (folder != ".", folder.count("/")))
+    for folder in outer_first:
         above = {folder, *parents(folder), "."}
         hidden = any(part.startswith(".") and part != "." for part in folder.split("/"))
-        if not hidden and ignored.isdisjoint(above) and set(found).isdisjoint(above):
-            found.append(folder)
-    return sorted(found, key=os.fsencode)
+        if not hidden and ignored.isdisjoint(above) and packages.isdisjoint(above):
+            packages.add(folder)
+    return sorted(packages, key=os.fsencode)

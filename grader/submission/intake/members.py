@@ -94,13 +94,13 @@ def admit(
     for count, member in enumerate(members, start=1):
         try:
             path = safe_path(member.name, limits)
-            kept = bool(path) and not is_left_out(path)
-            if count > limits.members_with_tools or (kept and len(entries) >= limits.members):
+            is_work = bool(path) and not is_left_out(path)
+            if count > limits.members_with_tools or (is_work and len(entries) >= limits.members):
                 raise Refused(f"the archive holds more than {limits.members} members")
-            if not kept:
-                found = built(path)
-                if leftovers is not None and found is not None:
-                    leftovers.add(found)
+            if not is_work:
+                leftover = built(path)
+                if leftovers is not None and leftover is not None:
+                    leftovers.add(leftover)
                 continue
             if member.kind is Kind.SPECIAL:
                 raise Refused("a device, pipe or other special file is refused")
@@ -150,8 +150,9 @@ def _check_size(total: int, archive_bytes: int, limits: ArchiveLimits) -> None:
 
 
 def _check_place(path: str, kind: Kind, kinds: dict[str, Kind]) -> None:
-    known = kinds.get(path)
-    if known is not None and not (known is kind is Kind.FOLDER):
+    earlier = kinds.get(path)
+    is_folder_again = earlier is Kind.FOLDER and kind is Kind.FOLDER
+    if earlier is not None and not is_folder_again:
         raise Refused("the archive holds this path twice")
     for folder in parents(path):
         if kinds.setdefault(folder, Kind.FOLDER) is not Kind.FOLDER:
