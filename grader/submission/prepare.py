@@ -202,7 +202,7 @@ def _read(located: Located, how: Preparation) -> tuple[list[Package], Submission
     """The packages of a submission, and its record as far as there is one without a build."""
     allowance = Allowance()
     outlines = read_cpp(located, how.ros, how.sandbox)
-    answers, answers_problem = read_answers(located.root, located.files)
+    answers = read_answers(located.root, located.files)
     packages = [
         read_package(located, folder, how.ros, allowance, outlines)
         for folder in located.packages[:_MAX_PACKAGES]
@@ -215,8 +215,8 @@ def _read(located: Located, how: Preparation) -> tuple[list[Package], Submission
         leftovers=located.leftovers,
         files=tuple(shown(file.path) for file in located.files[:_MOST_PATHS]),
         headings=read_headings(located.root, located.files),
-        answers=answers,
-        answers_problem=answers_problem,
+        answers=answers.names,
+        answers_problem=answers.problem,
         parameter_files=read_parameter_files(located.root, located.files),
     )
     return packages, record
