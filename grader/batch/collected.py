@@ -6,6 +6,7 @@ import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from grader.batch.ledger import Entry
 from grader.batch.roster import Student
@@ -32,6 +33,16 @@ class Collected(Entry):
     item: Path = Path()
     names: tuple[str, ...] = ()
     columns: Mapping[str, str] = field(default_factory=dict, compare=False)
+
+    @property
+    def submission(self) -> object:
+        """Where it lies, by which it is known before its hash is."""
+        return self.path or self.sha256
+
+    @property
+    def handed_in_fields(self) -> dict[str, Any]:
+        """See :class:`Entry`; and where it lies."""
+        return {**super().handed_in_fields, "path": self.path}
 
     def of(self, student: Student) -> Collected:
         """The row with what a roster says of its student."""

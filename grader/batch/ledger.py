@@ -9,11 +9,11 @@ from __future__ import annotations
 import fcntl
 import json
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from grader.errors import RosgradeError, UsageError, machine_fault
 from grader.grading.files import RESULT_FILE
@@ -27,6 +27,8 @@ BATCH_FILE = "batch.json"
 SUBMISSIONS = "submissions"
 _PARTIAL = ".partial"
 _LOCK = ".lock"
+_BETWEEN = "; "
+"""Between the problems of a row in one text."""
 _E = TypeVar("_E", bound="Entry")
 _REPLACED = "#replaced"
 """Suffix of a result's folder while another one replaces it; no key has such a folder."""
@@ -79,9 +81,31 @@ class Entry:
         """Key of the row that was graded for all who handed in the same."""
         return self.same_as or self.key
 
+    @property
+    def submission(self) -> object:
+        """What tells whether two rows have the same submission; empty where there is none."""
+        return self.sha256
+
+    @property
+    def handed_in_fields(self) -> dict[str, Any]:
+        """The fields about what was handed in, by name: a group has them in common."""
+        return {
+            "sha256": self.sha256,
+            "source": self.source,
+            "fault": self.fault,
+            "late": self.late,
+            "handed_in": self.handed_in,
+            "handed_in_from": self.handed_in_from,
+        }
+
     def with_problem(self: _E, *problems: str) -> _E:
         """The row with more problems."""
-        return replace(self, problem="; ".join(filter(None, (self.problem, *problems))))
+        return replace(self, problem=_BETWEEN.join(filter(None, (self.problem, *problems))))
+
+    def without_problem(self: _E, is_meant: Callable[[str], bool]) -> _E:
+        """The row without those of its problems that are meant."""
+        problems = self.problem.split(_BETWEEN)
+        return replace(self, problem=_BETWEEN.join(one for one in problems if not is_meant(one)))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from grader.course.load import written
+from grader.course.load import comparable_name
 from grader.errors import UsageError
 from grader.submission.intake.paths import shown
 
@@ -43,23 +43,23 @@ class Student:
 
     @property
     def logins(self) -> frozenset[str]:
-        """What identifies the student, as :func:`written`: number, login, address.
+        """What identifies the student, as :func:`comparable_name`: number, login, address.
 
         Without a login the part of the address before the @ stands for it.
         """
         local = self.email.partition("@")[0]
-        return frozenset(map(written, (self.id, self.login or local, self.email))) - {""}
+        return frozenset(map(comparable_name, (self.id, self.login or local, self.email))) - {""}
 
     @property
     def names(self) -> frozenset[str]:
-        """Each way to write the whole name, as :func:`written`: ``ana lopez``, ``lopez_ana``."""
+        """Each :func:`comparable_name` of the whole name: ``ana lopez``, ``lopez_ana``."""
         forms = {self.name}
         for form in name_forms(self.name):
             words = form.replace(",", " ").split()
             forms |= {between.join(words) for between in (" ", "_", "-", ".", "")}
             # Canvas' way.
             forms.add(_letters(form))
-        return frozenset(map(written, forms)) - {""}
+        return frozenset(map(comparable_name, forms)) - {""}
 
     @property
     def resembling(self) -> frozenset[str]:
@@ -150,7 +150,7 @@ def _collect(
         if not student.key:
             problems.append(f"row {number}: has no name")
             continue
-        known = students.setdefault(written(student.key), student)
+        known = students.setdefault(comparable_name(student.key), student)
         if known is not student:
             problems.append(f"row {number}: {student.key} is in row {known.row} already")
     return Roster(tuple(students.values()), tuple(problems))

@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 
 from grader.batch.collected import NOTHING, Collected, stem_of
 from grader.batch.roster import Roster, Student, name_forms, resemblance
-from grader.course.load import written
+from grader.course.load import comparable_name
 from grader.findings.words import listing
 from grader.submission.intake.paths import shown
 
@@ -57,7 +57,7 @@ class _Names:
                 student.key
                 for form in name_forms(name)
                 for student in self._alike.get(resemblance(form), ())
-                if written(form) in student.logins or written(form) in student.names
+                if comparable_name(form) in student.logins or comparable_name(form) in student.names
             }
             keys = keys & found or keys | found
         return keys or self._login_behind(self._prefix, stem_of(entry.item))
@@ -73,7 +73,7 @@ class _Names:
         """The student whose login stands behind the prefix of a repository's name."""
         login = stem.removeprefix(prefix)
         alike = self._alike.get(resemblance(login), ()) if login != stem else ()
-        return {student.key for student in alike if written(login) in student.logins}
+        return {student.key for student in alike if comparable_name(login) in student.logins}
 
 
 def matched(entries: list[Collected], roster: Roster) -> list[Collected]:

@@ -17,7 +17,7 @@ from grader.assignment.load import load_assignment
 from grader.batch import executor as executors
 from grader.batch.batch import Batch, Done
 from grader.batch.collected import Collected
-from grader.batch.groups import strangers
+from grader.batch.groups import unknown_students
 from grader.batch.intake import collect, collect_roster
 from grader.batch.ledger import Ledger, TakenFrom
 from grader.batch.roster import read_roster
@@ -166,7 +166,7 @@ def _rows(
         rows = collect(submissions, staging, names, progress.note, out, rules)
     for problem in names.problems if names is not None else ():
         progress.note(f"{listed}: {problem}")
-    for stranger in strangers(rows, rules) if rules is not None else ():
+    for stranger in unknown_students(rows, rules) if rules is not None else ():
         progress.note(stranger)
     for row in rows:
         if row.path is not None:

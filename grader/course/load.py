@@ -52,7 +52,10 @@ class Course:
         one = self.spec.assignments[assignment]
         due = due_of_all = self.instant(one.due)
         for each in self.spec.extensions:
-            if (each.assignment, written(each.student)) == (assignment, written(student)):
+            if (each.assignment, comparable_name(each.student)) == (
+                assignment,
+                comparable_name(student),
+            ):
                 if each.due:
                     due = self.instant(each.due)
                 elif each.tokens and self.spec.tokens:
@@ -88,7 +91,7 @@ class Course:
         return instant(text, self.spec.time_zone)
 
 
-def written(text: str) -> str:
+def comparable_name(text: str) -> str:
     """A name as it is compared: case, spaces around it and an accent's encoding do not matter."""
     return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
 
@@ -137,7 +140,7 @@ def _groups(source: Source, spec: CourseFile) -> Mistakes:
     for at, members in enumerate(spec.groups):
         for number, member in enumerate(members):
             place: Place = ("groups", at, number)
-            first = seen.setdefault(written(member), place)
+            first = seen.setdefault(comparable_name(member), place)
             if first != place:
                 yield place, f"{member!r} is in a group already (line {source.line(first)})"
 
@@ -153,11 +156,11 @@ def _extensions(source: Source, spec: CourseFile) -> Mistakes:
             yield ("extensions", at, "assignment"), text
         if [one.due, one.days, one.tokens].count(None) != 2:
             yield ("extensions", at), "give either `due`, `days` or `tokens`"
-        used[written(one.student)] += one.tokens or 0
-        if one.tokens and used[written(one.student)] > most:
-            text = f"{one.student} uses {used[written(one.student)]} of {most} late tokens"
+        used[comparable_name(one.student)] += one.tokens or 0
+        if one.tokens and used[comparable_name(one.student)] > most:
+            text = f"{one.student} uses {used[comparable_name(one.student)]} of {most} late tokens"
             yield ("extensions", at, "tokens"), text
-        first = seen.setdefault((written(one.student), one.assignment), at)
+        first = seen.setdefault((comparable_name(one.student), one.assignment), at)
         if first != at:
             line = source.line(("extensions", first))
             text = f"{one.student} has an extension for {one.assignment} already (line {line})"

@@ -17,7 +17,7 @@ import pytest
 
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.batch import Batch, Done
-from grader.batch.groups import regroup, strangers
+from grader.batch.groups import regroup, unknown_students
 from grader.batch.intake import collect
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.roster import parse_roster
@@ -376,7 +376,7 @@ def test_students_that_only_the_rules_know_are_named(course: Class) -> None:
     course.hand_in("ana", "bot")
     rules = course_of(course.out, course.folder / "course.yaml", "lesson")
     assert rules is not None
-    (line,) = strangers(collect(course.handed, course.folder), rules)
+    (line,) = unknown_students(collect(course.handed, course.folder), rules)
     assert line.endswith("an extension names 'anna', not in this class. Did you mean 'ana'?")
 
 
