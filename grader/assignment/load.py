@@ -15,8 +15,8 @@ from grader.assignment.binding import BoundCheck, bind
 from grader.assignment.contract.expand import expanded, expanded_with
 from grader.assignment.group import ungrouped
 from grader.assignment.interfaces import Interfaces, field_problems, interface_problems
+from grader.assignment.lesson_checks import lesson_checks
 from grader.assignment.model import NOTHING_WITHHELD, Assignment, Scenario, Withheld
-from grader.assignment.own_check import lesson_checks
 from grader.assignment.repeat import with_runs
 from grader.assignment.variable import Values, read_variables
 from grader.checks.catalogue import CATALOGUE

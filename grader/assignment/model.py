@@ -409,13 +409,13 @@ class Scenario(Model):
     def transform_topics(self) -> dict[str, Durability]:
         """The robot's topics of transforms, if the scenario names them; with their durability."""
         tf = self.topics.tf
-        named = self.simulated and "tf" in self.topics.model_fields_set and tf.enabled
+        named = self.simulated_robots and "tf" in self.topics.model_fields_set and tf.enabled
         return {tf.topic: tf.durability, tf.static_topic: "transient_local"} if named else {}
 
     @property
     def camera_topics(self) -> set[str]:
         """The topics of the robots' cameras; only what `record` names is recorded of them."""
-        cameras = (robot.camera for robot in self.simulated.values())
+        cameras = (robot.camera for robot in self.simulated_robots.values())
         return {topic for camera in cameras if camera is not None for topic in camera.topics}
 
     @property
@@ -425,7 +425,7 @@ class Scenario(Model):
         return SimulatorOptions(**own)
 
     @property
-    def simulated(self) -> dict[str, SimulatorOptions]:
+    def simulated_robots(self) -> dict[str, SimulatorOptions]:
         """The robots in its world by their names, which is empty for the only one."""
         if self.simulator is not None:
             return {"": self.simulator.options}
@@ -435,7 +435,7 @@ class Scenario(Model):
     @property
     def has_robot(self) -> bool:
         """Whether a robot's motion is known: a simulated one's, or by the odometry in a bag."""
-        return bool(self.simulated) or (self.bag is not None and self.odometry.enabled)
+        return bool(self.simulated_robots) or (self.bag is not None and self.odometry.enabled)
 
     @property
     def recorded_types(self) -> dict[str, str]:
@@ -445,7 +445,7 @@ class Scenario(Model):
         if self.bag is not None and self.has_robot:
             found.setdefault(self.topics.command.topic, self.topics.command.type)
             found[self.topics.odometry.topic] = ODOMETRY
-        for robot in self.simulated.values():
+        for robot in self.simulated_robots.values():
             found.setdefault(robot.topics.command.topic, robot.topics.command.type)
             if robot.odometry.enabled:
                 found[robot.topics.odometry.topic] = ODOMETRY

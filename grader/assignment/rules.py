@@ -105,7 +105,7 @@ def _scenario(assignment: Assignment, scenario: Scenario) -> Iterator[tuple[Plac
         if not topics and getattr(until, key) is not None:
             yield ("until", key), "no topic is recorded: 'record' is missing"
     own = scenario.simulator
-    if scenario.bag is None and (own is not None or not scenario.simulated):
+    if scenario.bag is None and (own is not None or not scenario.simulated_robots):
         lacks = "needs a 'world', which is missing"
         lacks = "is not in a world with turtles" if scenario.turtles else lacks
         lacks = "is not that of your 'simulator'" if own is not None else lacks
@@ -416,7 +416,7 @@ def _(need: needs.SentOrOwn, user: _User) -> Iterator[_Lack]:
     topic, own = user.value(need.topic), user.value(need.own)
     for scenario in user.scenarios:
         given = {one.subject for one in _doing(needs.Act.PUBLISH, scenario)}
-        commands = {one.topics.command.topic for one in scenario.simulated.values()}
+        commands = {one.topics.command.topic for one in scenario.simulated_robots.values()}
         commands |= {*turtle_commands(scenario.turtles)}
         given |= {*scenario.model_copy(update={"record": ()}).recorded_types} - commands
         recorded = {*scenario.recorded_types} - given
@@ -438,7 +438,7 @@ def _(need: needs.OwnTransform, user: _User) -> Iterator[_Lack]:
         if any(edge in one.frames for one in scenario.stimuli):
             text = f"a stimulus of the scenario {scenario.id!r} publishes this transform itself"
             yield ("with", need.child), text
-        if any(edge in robot.transforms for robot in scenario.simulated.values()):
+        if any(edge in robot.transforms for robot in scenario.simulated_robots.values()):
             text = (
                 f"the robot of the scenario {scenario.id!r} publishes this transform itself: write "
                 "'topics: {tf: {enabled: false}}' there"
@@ -463,7 +463,9 @@ def _(need: needs.Stimulated, user: _User) -> Iterator[_Lack]:
             yield key, f"{does}." + nearest_or_all(wanted, [one.subject for one in able])
         elif need.having and not any(one.differs_in(having) for one in mine):
             yield key, f"{does} with {having!r}: add '{need.having}'"
-        yield from _impatient(user, scenario, need.within, [one for one in mine if one.has(fields)])
+        yield from _impatient(
+            user, scenario, need.within, [one for one in mine if one.sends(fields)]
+        )
 
 
 @_lacks.register
@@ -472,7 +474,7 @@ def _(need: needs.ParameterSet, user: _User) -> Iterator[_Lack]:
     node, name, wanted = map(user.value, (need.node, need.name, need.value))
     for scenario in user.scenarios:
         mine = [one for one in _doing(needs.Act.SET_PARAMETERS, scenario) if one.subject == node]
-        tried = [given[name] for one in mine for given in one.given if name in given]
+        tried = [given[name] for one in mine for given in one.sent_fields if name in given]
         drawn = any(isinstance(value, str) for value in tried)
         if mine and not drawn and not any(same_value(wanted, value) for value in tried):
             listed = ", ".join(map(repr, tried)) or "nothing"

@@ -9,7 +9,7 @@ from pathlib import Path
 from grader.assignment.interfaces import Interfaces
 from grader.assignment.model import Assignment, Scenario
 from grader.assignment.random_values import draw_values, fill_in, world_values
-from grader.assignment.stimuli.stimulus_model import Making
+from grader.assignment.stimuli.stimulus_model import Preparation
 from grader.errors import AssignmentError, Problem, UsageError
 from grader.spec.document import Place
 from grader.spec.source import Source, read_source
@@ -55,20 +55,20 @@ def problems(source: Source, assignment: Assignment, known: Interfaces) -> Itera
         place: Place = ("scenarios", index)
         values = draw_values(scenario, 0)
         launched = [f"{one.package or default}/{one.program}" for one in scenario.launch]
-        making = Making(source.file.parent, known.find, 0, values, launched)
+        preparation = Preparation(source.file.parent, known.find, 0, values, launched)
         yield from _parameters(source, place, scenario, values)
         if scenario.world is not None:
             yield from _world(source, (*place, "world"), scenario.world, scenario)
         if scenario.simulator is not None and scenario.simulator.map is not None:
             inside = (*place, "simulator", "map")
             yield from _world(source, inside, scenario.simulator.map, scenario)
-        for inside, text in _stimuli(scenario, making):
+        for inside, text in _stimuli(scenario, preparation):
             yield source.problem((*place, *inside), text)
 
 
-def _stimuli(scenario: Scenario, making: Making) -> Iterator[tuple[Place, str]]:
+def _stimuli(scenario: Scenario, preparation: Preparation) -> Iterator[tuple[Place, str]]:
     for number, item in enumerate(scenario.stimuli):
-        for inside, text in item.mistakes(making, scenario):
+        for inside, text in item.mistakes(preparation, scenario):
             yield ("stimuli", number, *inside), text
         after = getattr(item, "after", None)
         if after is not None and after >= scenario.timeout:
@@ -98,7 +98,7 @@ def _world(source: Source, place: Place, file: str, scenario: Scenario) -> Itera
             values = draw_values(scenario, seed)
             world = _scenario_world(written, world_values(scenario, values))
             if scenario.simulator is None:
-                starting(world, scenario.simulated)
+                starting(world, scenario.simulated_robots)
     except (AssignmentError, UsageError) as error:
         drawn = ", ".join(f"{name} = {value:g}" for name, value in values.items())
         yield source.problem(place, f"{error}{f' (with {drawn})' if drawn else ''}")

@@ -19,7 +19,7 @@ from pydantic import BaseModel
 
 from grader.assignment import bag, limits, model, mutant, true_motion, variable
 from grader.assignment.contract import model as contract
-from grader.assignment.own_check import FOLDER, lesson_checks
+from grader.assignment.lesson_checks import FOLDER, lesson_checks
 from grader.assignment.stimuli.stimulus import stimulus_models
 from grader.authoring.starter import rendered
 from grader.checks import window
@@ -70,7 +70,7 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
     "stimuli": {
         heading: found
         for one in stimulus_models()
-        for heading, found in {one.heading or one.key: one, **one.inner}.items()
+        for heading, found in {one.heading or one.key: one, **one.nested_models}.items()
     },
     "robot": {
         "robot": description.RobotOptions,

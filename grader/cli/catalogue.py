@@ -12,9 +12,9 @@ from rich.markdown import Markdown
 from rich.table import Table
 
 from grader.assignment.contract.expand import plain
+from grader.assignment.lesson_checks import all_checks
 from grader.assignment.lint_warnings import lint_warnings
 from grader.assignment.load import load_assignment
-from grader.assignment.own_check import all_checks
 from grader.assignment.schema import assignment_schema, mutants_schema
 from grader.authoring.documentation import check_markdown, explanations_markdown
 from grader.authoring.mutants.standard import every_mutant

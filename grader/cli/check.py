@@ -13,6 +13,7 @@ import typer
 
 from grader.cli import NOT_GRADED, options
 from grader.cli.formats import CheckFormats
+from grader.cli.option_group import with_option_groups
 from grader.cli.screen.console import open_page, output_console, say
 from grader.cli.screen.progress import Progress, syntax_errors
 from grader.machine import ros
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from grader.recording.submission import SubmissionRecord
 
 
-@options.expanded
+@with_option_groups
 def check(
     assignment: options.AssignmentName,
     submission: Annotated[

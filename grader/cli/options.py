@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
-from functools import wraps
-from inspect import Parameter, Signature, signature
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -31,35 +28,41 @@ _MANIFESTS = ("package.xml", "*/package.xml", "*/*/package.xml", "*/*/*/package.
 
 def assignment_argument(name: str) -> str:
     """See that the first argument is not something else than an assignment."""
-    own = sorted(file.parent.name for file in resources.assignments().glob("*/assignment.yaml"))
-    seen = "" if name in own or Path(name).suffix in (".yaml", ".yml") else looks_like(Path(name))
-    if seen:
-        raise UsageError(f"{name} is {seen}; the first argument is an assignment, such as {own[0]}")
+    own_ids = sorted(file.parent.name for file in resources.assignments().glob("*/assignment.yaml"))
+    path = Path(name)
+    if name in own_ids or path.suffix in (".yaml", ".yml"):
+        return name
+    other = other_than_assignment(path)
+    if other is not None:
+        advice = f"the first argument is an assignment, such as {next(iter(own_ids), 'hello')}"
+        raise UsageError(f"{name} is {other}; {advice}")
     return name
 
 
 def recording_argument(path: Path) -> Path:
     """See that the first argument is not something else than a recording."""
-    seen = looks_like(path)
-    if seen and path.suffix != ".mcap":
+    other = other_than_assignment(path)
+    if other is not None and path.suffix != ".mcap":
         raise UsageError(
-            f"{path} is {seen}; the first argument is a recording, such as recordings/run.mcap"
+            f"{path} is {other}; the first argument is a recording, such as recordings/run.mcap"
         )
     return path
 
 
-def looks_like(path: Path) -> str:
-    """What there is at a path, in words; empty for an assignment, and where nothing is."""
+def other_than_assignment(path: Path) -> str | None:
+    """What lies at a path instead of an assignment, in words; None if nothing else lies there."""
+    if path.suffix == ".mcap" and path.is_file():
+        return "a recording"
     if path.is_file():
-        kind = "a recording" if path.suffix == ".mcap" else "a file"
-        return "an archive" if path.suffix in _ARCHIVES else kind
+        return "an archive" if path.suffix in _ARCHIVES else "a file"
     if not path.is_dir() or (path / "assignment.yaml").is_file():
-        return ""
+        return None
     if any((path / name).is_file() for name in ("result.json", "batch.json")):
         return "a folder with results"
-    manifest = next((file for form in _MANIFESTS for file in sorted(path.glob(form))), None)
-    if manifest is not None:
-        return f"a folder with the package {manifest.resolve().parent.name}, such as a submission"
+    for pattern in _MANIFESTS:
+        for manifest in sorted(path.glob(pattern)):
+            package = manifest.resolve().parent.name
+            return f"a folder with the package {package}, such as a submission"
     return "a folder without an assignment.yaml"
 
 
@@ -85,7 +88,7 @@ Seed = Annotated[
     int | None,
     typer.Option(metavar="N", help="Seed of random values; by default made from the submission."),
 ]
-Chosen = Annotated[
+SetValues = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
@@ -113,14 +116,18 @@ SandboxChoice = Annotated[
 
 
 def file_option(*names: str, text: str) -> Any:
-    """An option with a file to write; for `-`, standard output, messages go to standard error."""
+    """An option with a file to write; `-` stands for standard output."""
+    return typer.Option(*names, metavar="FILE", help=text, callback=_leaving_standard_output)
 
-    def read(file: Path | None) -> Path | None:
-        if file == STANDARD_OUTPUT:
-            sys.stdout = sys.stderr
-        return file
 
-    return typer.Option(*names, metavar="FILE", help=text, callback=read)
+def _leaving_standard_output(file: Path | None) -> Path | None:
+    """Leave standard output to the file that goes there; messages go to standard error then.
+
+    Here and not in each command, so that none can print a message into the file before.
+    """
+    if file == STANDARD_OUTPUT:
+        sys.stdout = sys.stderr
+    return file
 
 
 @dataclass(frozen=True)
@@ -138,7 +145,7 @@ class Part:
         ),
     ] = None
     seed: Seed = None
-    chosen: Chosen = None
+    set_values: SetValues = None
     hidden: Annotated[
         bool,
         typer.Option("--hidden", help="Also run and show hidden checks: for instructors."),
@@ -148,47 +155,25 @@ class Part:
         """This part of an assignment."""
         from grader.assignment.selection import select, visible_part
 
-        whole = chosen_names(assignment, self.chosen)
-        shown = whole if self.hidden else visible_part(whole)
-        return select(shown, tuple(self.only or ()), tuple(self.scenario or ()))
-
-
-def expanded(command: Callable[..., None]) -> Callable[..., None]:
-    """Let a parameter of a command that is a dataclass stand for an option for each field."""
-
-    @wraps(command)
-    def wrapped(**given: Any) -> None:
-        for name, kind in kinds.items():
-            given[name] = kind(**{one.name: given.pop(one.name) for one in fields(kind)})
-        command(**given)
-
-    hints = get_type_hints(command, include_extras=True)
-    kinds: dict[str, Any] = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
-    defaults: dict[str, Any] = {}
-    for name, parameter in signature(command).parameters.items():
-        if name in kinds:
-            hints |= get_type_hints(kinds[name], include_extras=True)
-            defaults |= {one.name: one.default for one in fields(kinds[name])}
-        else:
-            defaults[name] = parameter.default
-    parameters = [
-        Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=hints[name])
-        for name, default in defaults.items()
-    ]
-    wrapped.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
-    wrapped.__annotations__ = {name: hints[name] for name in defaults}
-    return wrapped
+        loaded = load_with_values(assignment, self.set_values)
+        if not self.hidden:
+            loaded = visible_part(loaded)
+        return select(loaded, tuple(self.only or ()), tuple(self.scenario or ()))
 
 
 def exit_code(grade: Grade) -> int:
     """What a command that graded one submission ends with."""
-    return NOT_GRADED if not grade.graded else 0 if grade.full_points else POINTS_LOST
+    if not grade.graded:
+        return NOT_GRADED
+    return 0 if grade.full_points else POINTS_LOST
 
 
-def report_folder(chosen: Path | None, assignment: str) -> Path:
-    """Where a report is written: each assignment has its own folder."""
+def report_folder(folder: Path | None, assignment: str) -> Path:
+    """Where a report is written; by default each assignment has its own folder."""
+    if folder is not None:
+        return folder
     place = Path(assignment).resolve()
-    return chosen or Path("rosgrade-report", (place.parent if place.is_file() else place).name)
+    return Path("rosgrade-report", (place.parent if place.is_file() else place).name)
 
 
 def assignment_places(name: str) -> tuple[Path, Path]:
@@ -196,16 +181,17 @@ def assignment_places(name: str) -> tuple[Path, Path]:
     return Path(name), resources.assignments() / name
 
 
-def chosen_names(assignment: str, chosen: list[str] | None) -> LoadedAssignment:
-    """The assignment with the values that were chosen for its variables."""
+def load_with_values(assignment: str, set_values: list[str] | None) -> LoadedAssignment:
+    """The assignment with the values that ``--set NAME=VALUE`` gives its variables."""
     from grader.assignment.load import load_assignment
 
     loaded = load_assignment(assignment)
-    given = {name: value for name, _, value in (text.partition("=") for text in chosen or ())}
-    if not given.keys() <= loaded.values.keys() or not all(given.values()):
+    pairs = [text.partition("=") for text in set_values or ()]
+    values = {name: value for name, _, value in pairs}
+    if not values.keys() <= loaded.values.keys() or not all(values.values()):
         names = ", ".join(loaded.values) or "none"
         raise UsageError(f"--set: expected NAME=VALUE for a variable of the assignment ({names})")
-    return replace(loaded, given=given)
+    return replace(loaded, given=values)
 
 
 def chosen_sandbox(choice: Choice, progress: Progress) -> Sandbox | None:

@@ -10,7 +10,8 @@ import typer
 from grader.batch.groups import regroup
 from grader.batch.ledger import Ledger
 from grader.cli.formats import Formats
-from grader.cli.options import UsedAssignment, expanded
+from grader.cli.option_group import with_option_groups
+from grader.cli.options import UsedAssignment
 from grader.cli.screen.console import print_warning, say
 from grader.errors import UsageError
 from grader.gradebook.adjusting import ClassAdjustments, course_of
@@ -21,7 +22,7 @@ from grader.grading.graded import RECORDINGS_FOLDER
 from grader.report.files import refuse_inputs
 
 
-@expanded
+@with_option_groups
 def report(
     out: Annotated[Path, typer.Argument(help="A report folder, or the folder of a class.")],
     assignment: UsedAssignment = None,

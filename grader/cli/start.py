@@ -11,7 +11,7 @@ import typer
 from grader.assignment.selection import with_values
 from grader.authoring.scaffold import write_assignment
 from grader.authoring.starter import write_starter
-from grader.cli.options import AssignmentName, Chosen, chosen_names
+from grader.cli.options import AssignmentName, SetValues, load_with_values
 from grader.cli.screen.console import print_warning, say
 from grader.errors import GraderFault
 from grader.grading.prerequisites import remedy_for_cpp
@@ -26,7 +26,7 @@ def start(
             metavar="DIR", help="Folder for the package, such as the src of your workspace."
         ),
     ] = Path(),
-    chosen: Chosen = None,
+    set_values: SetValues = None,
     cpp: Annotated[bool, typer.Option("--cpp", help="A package in C++ (ament_cmake).")] = False,
 ) -> None:
     """Create a package to start from: it builds and runs.
@@ -40,7 +40,7 @@ def start(
             remedy = str(fault)
         if remedy:
             print_warning(f"before C++ can be built here: {remedy}")
-    loaded = chosen_names(assignment, chosen)
+    loaded = load_with_values(assignment, set_values)
     loaded = with_values(loaded, {**loaded.values, **loaded.given})
     for name, variable in loaded.assignment.variables.items():
         if name not in loaded.given and not variable.is_of_runs:

@@ -15,6 +15,7 @@ from rich.console import Console
 
 from grader.assignment.load import LoadedAssignment
 from grader.cli import options
+from grader.cli.option_group import with_option_groups
 from grader.cli.screen.console import open_page, output_console, print_error, say
 from grader.cli.screen.progress import Progress, syntax_errors
 from grader.errors import RosgradeError
@@ -43,7 +44,7 @@ from grader.submission.intake.locate import check_path
 from grader.submission.kept_source import SOURCE_FOLDER, read_kept_source
 
 
-@options.expanded
+@with_option_groups
 def watch(
     assignment: options.AssignmentName,
     submission: Annotated[

@@ -140,7 +140,7 @@ def _topics(scenario: Scenario) -> tuple[Topic, ...]:
         )
         for asked in scenario.record
     }
-    robots = scenario.simulated.values()
+    robots = scenario.simulated_robots.values()
     commands = {robot.topics.command.topic: robot.topics.command.type for robot in robots}
     for name, type in {**turtle_commands(scenario.turtles), **commands}.items():
         topics.setdefault(name, Topic(name, type, "reliable", "volatile", _DEPTH))
@@ -212,17 +212,17 @@ def _stimuli(
 ) -> tuple[StimulusModel, ...]:
     from grader.assignment.stimuli.kinds.request import AskDeclared
     from grader.assignment.stimuli.message import StimulusError
-    from grader.assignment.stimuli.stimulus_model import Making
+    from grader.assignment.stimuli.stimulus_model import Preparation
 
     find = definition_finder(Path(prefix) for prefix in prefixes)
-    making = Making(folder, find, seed, drawn, [command.name for command in commands])
+    preparation = Preparation(folder, find, seed, drawn, [command.name for command in commands])
     stimuli: list[StimulusModel] = []
     for stimulus in scenario.stimuli:
         what = f"the stimulus {stimulus.key!r}"
         if stimulus.exchanged:
             what += f" on {stimulus.exchanged[0]}"
         try:
-            stimuli.append(stimulus.prepared(making))
+            stimuli.append(stimulus.prepared(preparation))
         except StimulusError as error:
             raise GraderFault(f"{what}: {error}") from error
         except KeyError as error:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.assignment.own_check import all_checks, load_own_check
+from grader.assignment.lesson_checks import all_checks
+from grader.assignment.own_check import load_own_check
 from grader.authoring import documentation
 from grader.checks.check import Check
 from grader.dev import docs

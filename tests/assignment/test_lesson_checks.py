@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from grader.assignment.lesson_checks import all_checks
 from grader.assignment.load import load_assignment
-from grader.assignment.own_check import all_checks
 from grader.errors import AssignmentError
 from tests.assignment.lessons import HEAD
 

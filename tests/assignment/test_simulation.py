@@ -335,7 +335,7 @@ def test_a_world_with_turtles_has_their_topics_and_no_robot(tmp_path: Path) -> N
         "/turtle1/cmd_vel": "geometry_msgs/msg/Twist",
         "/bob/cmd_vel": "geometry_msgs/msg/Twist",
     }
-    assert scenario.simulated == {}
+    assert scenario.simulated_robots == {}
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from mcap_ros2.writer import Writer
 from grader.assignment.stimuli.kinds.publish import Publish
 from grader.assignment.stimuli.kinds.request import CallService, SetParameters
 from grader.assignment.stimuli.kinds.serve import ServeAction
-from grader.assignment.stimuli.stimulus_model import Making
+from grader.assignment.stimuli.stimulus_model import Preparation
 
 HEAD = """\
 rosgrade: 1
@@ -58,7 +58,7 @@ def folder(tmp_path: Path) -> Path:
     return found
 
 
-MAKING = Making(Path(), DEFINITIONS.__getitem__, 0, {"speed": 1.5}, [])
+MAKING = Preparation(Path(), DEFINITIONS.__getitem__, 0, {"speed": 1.5}, [])
 Found = Callable[[str], list[str]]
 
 
@@ -171,8 +171,8 @@ def read(folder: Path, **keys: object) -> list[tuple[dict[str, object], float]]:
     model = Publish.model_validate(
         {"publish": "/goal", "type": "geometry_msgs/msg/Vector3", **keys}
     )
-    making = Making(folder, DEFINITIONS.__getitem__, 7, {"goal": 1.5}, [])
-    return list(model.prepared(making).due)
+    preparation = Preparation(folder, DEFINITIONS.__getitem__, 7, {"goal": 1.5}, [])
+    return list(model.prepared(preparation).due)
 
 
 def test_a_csv_file_has_a_message_in_each_row(folder: Path) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from grader.assignment.own_check import all_checks
+from grader.assignment.lesson_checks import all_checks
 from grader.findings.finding import Finding, Status
 from grader.recording.event import Disturbance
 from grader.recording.model import (

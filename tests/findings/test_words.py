@@ -271,7 +271,7 @@ for name in {modules}:
     found = importlib.import_module(name)
     for one in pkgutil.walk_packages(found.__path__, name + "."):
         importlib.import_module(one.name)
-from grader.assignment.own_check import lesson_checks
+from grader.assignment.lesson_checks import lesson_checks
 for folder in {lessons}:
     lesson_checks(Path(folder).parent)
 """

@@ -7,7 +7,7 @@ import re
 import pytest
 from typer.testing import CliRunner
 
-from grader.assignment.own_check import all_checks
+from grader.assignment.lesson_checks import all_checks
 from grader.checks.check import NoParameters, Subject, check
 from grader.cli.app import app
 from grader.diagnosis.explanation import explanations

@@ -16,8 +16,8 @@ _NS = 1e-9
 
 
 @dataclass(frozen=True)
-class Given:
-    """A message of the stimulus with its origin.
+class UnreadMessage:
+    """A message as the author wrote it, not read yet, with its origin.
 
     Attributes:
         place: In the YAML, below the stimulus.
@@ -31,7 +31,7 @@ class Given:
     time_s: float | None = None
 
 
-def from_function(name: str, folder: Path, seed: int) -> Iterator[Given]:
+def from_function(name: str, folder: Path, seed: int) -> Iterator[UnreadMessage]:
     """Call the author's function ``file.py:function``."""
     # A cell, which never calls one, imports this module too.
     from grader.assignment.own_check import load_function, naming_place
@@ -40,14 +40,15 @@ def from_function(name: str, folder: Path, seed: int) -> Iterator[Given]:
     try:
         function = load_function(name, folder)
         with naming_place(folder):
-            found = function(seed)
+            messages = function(seed)
     except ValueError as error:
         raise StimulusError(str(error), place) from error
-    if not isinstance(found, list | tuple) or not all(isinstance(item, Mapping) for item in found):
+    is_list = isinstance(messages, list | tuple)
+    if not is_list or not all(isinstance(message, Mapping) for message in messages):
         text = f"{name} must return a list of messages, each a dict of its fields"
         raise StimulusError(text, place)
-    for number, item in enumerate(found):
-        yield Given(_plain(item), place, f"{name}: message {number}")
+    for number, message in enumerate(messages):
+        yield UnreadMessage(_plain(message), place, f"{name}: message {number}")
 
 
 def _plain(value: Any) -> Any:
@@ -59,7 +60,7 @@ def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def from_file(name: str, folder: Path, topic: str, interface: str) -> Iterator[Given]:
+def from_file(name: str, folder: Path, topic: str, interface: str) -> Iterator[UnreadMessage]:
     """Read a CSV or MCAP file beside the assignment."""
     file = folder / name
     if not file.resolve().is_relative_to(folder.resolve()):
@@ -74,7 +75,7 @@ def from_file(name: str, folder: Path, topic: str, interface: str) -> Iterator[G
         raise StimulusError(text, ("from",)) from error
 
 
-def _from_csv(file: Path) -> Iterator[Given]:
+def _from_csv(file: Path) -> Iterator[UnreadMessage]:
     try:
         with file.open(encoding="utf-8-sig", newline="") as stream:
             reader = csv.DictReader(stream, strict=True)
@@ -85,12 +86,12 @@ def _from_csv(file: Path) -> Iterator[Given]:
                     raise StimulusError(text, ("from",))
                 # An empty cell leaves its field out, so that rows may have arrays of any length.
                 value = {name.strip(): cell.strip() for name, cell in row.items() if cell}
-                yield Given(value, ("from",), label)
+                yield UnreadMessage(value, ("from",), label)
     except (csv.Error, UnicodeDecodeError) as error:
         raise StimulusError(f"{file.name} is not a CSV file: {error}", ("from",)) from error
 
 
-def _from_mcap(file: Path, topic: str, interface: str) -> Iterator[Given]:
+def _from_mcap(file: Path, topic: str, interface: str) -> Iterator[UnreadMessage]:
     from grader.recording.mcap_reader import read_topic
 
     try:
@@ -106,4 +107,4 @@ def _from_mcap(file: Path, topic: str, interface: str) -> Iterator[Given]:
             text = f"{file.name} has {topic} as {message.type}, not {interface}"
             raise StimulusError(text, ("from",))
         time_s = (message.received_ns - messages[0].received_ns) * _NS
-        yield Given(message.value, ("from",), f"{file.name}: message {number}", time_s)
+        yield UnreadMessage(message.value, ("from",), f"{file.name}: message {number}", time_s)

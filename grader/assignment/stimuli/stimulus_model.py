@@ -25,8 +25,8 @@ class ScenarioOfStimuli(Protocol):
         """All stimuli, itself among them."""
 
     @property
-    def simulated(self) -> Mapping[str, Any]:
-        """The simulated robots by their names, which is empty for the only one."""
+    def simulated_robots(self) -> Mapping[str, Any]:
+        """The simulated robots by name; where there is only one, its name is empty."""
 
     @property
     def recorded_types(self) -> Mapping[str, str]:
@@ -34,13 +34,13 @@ class ScenarioOfStimuli(Protocol):
 
 
 @dataclass(frozen=True)
-class Making:
-    """The data of an assignment from which the stimuli of a scenario are prepared.
+class Preparation:
+    """What the stimuli of a scenario are prepared from, before a cell plays them.
 
     Attributes:
         folder: Of the assignment.
         find: Finds the definitions of messages.
-        drawn: Values of the scenario by name.
+        drawn: Values of the scenario by name, which ``$name`` stands for.
         processes: What is launched, each as ``package/executable``.
     """
 
@@ -56,7 +56,8 @@ class Making:
         fitting = [process for process in self.processes if f"/{process}".endswith(ending)]
         if len(fitting) == 1:
             return fitting[0]
-        advice = nearest_or_all(executable, [one.partition("/")[2] for one in self.processes])
+        executables = [process.partition("/")[2] for process in self.processes]
+        advice = nearest_or_all(executable, executables)
         text = f"the scenario launches {executable!r} {len(fitting)} times, not once.{advice}"
         raise StimulusError(text, (key,))
 
@@ -66,14 +67,19 @@ Models = dict[str, type[Model]]
 
 
 class StimulusModel(Model):
-    """Base of the models of stimuli, which lie in ``kinds/`` and are marked with :func:`kind`."""
+    """Base of the models of stimuli, which lie in ``kinds/`` and are marked with :func:`kind`.
+
+    A model has a field that is called like its key and holds what it acts on, such as the topic in
+    ``publish: /cmd_vel``. If it exchanges messages, their type is in a field ``type``; if it waits
+    for answers, a field ``within`` says how long.
+    """
 
     key: ClassVar[str]
     """The key of the YAML that names the kind."""
     heading: ClassVar[str] = ""
     """Its heading in the documentation; by default the key."""
-    inner: ClassVar[Models] = {}
-    """What stands below one of its keys."""
+    nested_models: ClassVar[Models] = {}
+    """The models of what stands below one of its keys."""
     provides: ClassVar[tuple[Act, ...]] = ()
     """What it does to its subject, for the checks that need it."""
 
@@ -99,8 +105,8 @@ class StimulusModel(Model):
         return None if interface is None else (getattr(self, self.key), interface)
 
     @property
-    def given(self) -> Sequence[Mapping[str, Any]]:
-        """Fields of the requests or goals that it sends, or the parameters that it sets."""
+    def sent_fields(self) -> Sequence[Mapping[str, Any]]:
+        """Fields of each request or goal that it sends, or the parameters that it sets."""
         return ()
 
     @property
@@ -113,15 +119,18 @@ class StimulusModel(Model):
         """How long it waits for an answer."""
         return float(getattr(self, "within", math.inf))
 
-    def has(self, fields: Mapping[str, Any]) -> bool:
-        """Whether something that it sends has these fields, as both are written."""
-        return any(all(one.get(key) == it for key, it in fields.items()) for one in self.given)
+    def sends(self, fields: Mapping[str, Any]) -> bool:
+        """Whether one of its requests has all these fields, as both are written in the YAML."""
+        return any(
+            all(request.get(name) == value for name, value in fields.items())
+            for request in self.sent_fields
+        )
 
     def differs_in(self, key: str) -> bool:
         """Whether it has a key with another value than the default."""
         return bool(getattr(self, key) != type(self).model_fields[key].default)
 
-    def prepared(self, making: Making) -> StimulusModel:
+    def prepared(self, preparation: Preparation) -> StimulusModel:
         """What a cell plays: this stimulus with its values read, drawn and found.
 
         Raises:
@@ -130,10 +139,12 @@ class StimulusModel(Model):
         """
         return self
 
-    def mistakes(self, making: Making, scenario: ScenarioOfStimuli) -> Iterator[tuple[Place, str]]:
+    def mistakes(
+        self, preparation: Preparation, scenario: ScenarioOfStimuli
+    ) -> Iterator[tuple[Place, str]]:
         """Mistakes that show without a run; by default, that it cannot be prepared."""
         try:
-            self.prepared(making)
+            self.prepared(preparation)
         except StimulusError as error:
             yield error.place, str(error)
         except KeyError:

@@ -83,7 +83,7 @@ class SettingParameters(Requesting):
         if names:
             yield self._send("describe_parameters", {"names": names})
             yield self._send("get_parameters", {"names": names})
-        values: Mapping[str, Any] = next(iter(self._order.given), {})
+        values: Mapping[str, Any] = next(iter(self._order.sent_fields), {})
         if not values:
             return
         wanted = [{"name": name, "value": parameter_value(one)} for name, one in values.items()]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pydantic import Field
 
 from grader.assignment.stimuli.stimulus_model import (
-    Making,
+    Preparation,
     ScenarioOfStimuli,
     StimulusModel,
     kind,
@@ -42,7 +42,9 @@ class Join(StimulusModel):
         """Its own name: several may be on one topic."""
         return self.name
 
-    def mistakes(self, making: Making, scenario: ScenarioOfStimuli) -> Iterator[tuple[Place, str]]:
+    def mistakes(
+        self, preparation: Preparation, scenario: ScenarioOfStimuli
+    ) -> Iterator[tuple[Place, str]]:
         """Its name is used already, or the probe itself publishes on its topic."""
         alike = [one for one in scenario.stimuli if isinstance(one, Join) and one.name == self.name]
         if alike[0] is not self:

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.assignment.stimuli.stimulus_model import Making, StimulusModel, kind
+from grader.assignment.stimuli.stimulus_model import Preparation, StimulusModel, kind
 from grader.spec.name import PackageName
 from grader.spec.quantity import DurationOrZero
 
@@ -24,9 +24,9 @@ class Kill(StimulusModel):
     after: DurationOrZero = Field(description="When, counted from the first match.")
     signal: Signal = Field("SIGINT", description="The signal: SIGINT is Ctrl-C.")
 
-    def prepared(self, making: Making) -> Kill:
+    def prepared(self, preparation: Preparation) -> Kill:
         """The same with the name of the process, ``package/executable``."""
-        process = making.process(self.key, self.kill, self.package)
+        process = preparation.process(self.key, self.kill, self.package)
         return self.model_copy(update={"kill": process})
 
 
@@ -40,7 +40,7 @@ class Restart(StimulusModel):
     package: PackageName | None = Field(None, description="Its package, if several have it.")
     after: DurationOrZero = Field(description="When, counted from the first match.")
 
-    def prepared(self, making: Making) -> Restart:
+    def prepared(self, preparation: Preparation) -> Restart:
         """The same with the name of the process, ``package/executable``."""
-        process = making.process(self.key, self.restart, self.package)
+        process = preparation.process(self.key, self.restart, self.package)
         return self.model_copy(update={"restart": process})

@@ -10,12 +10,12 @@ from pydantic import Field, model_validator
 from grader.assignment.stimuli.message import StimulusError, read_message
 from grader.assignment.stimuli.stimulus_messages import (
     MCAP_SUFFIX,
-    Given,
+    UnreadMessage,
     from_file,
     from_function,
 )
 from grader.assignment.stimuli.stimulus_model import (
-    Making,
+    Preparation,
     ScenarioOfStimuli,
     StimulusModel,
     kind,
@@ -93,16 +93,16 @@ class Publish(StimulusModel):
 
     @model_validator(mode="after")
     def _consistent(self) -> Publish:
-        given = {
+        is_given = {
             "message": self.message is not None,
             "messages": bool(self.messages),
             "from": self.from_ is not None,
             "python": self.python is not None,
         }
-        names = [name for name, there in given.items() if there]
-        if len(names) != 1:
-            lack = f"not {' and '.join(names)}" if names else "but none is given"
-            raise ValueError(f"give the messages by one of {', '.join(given)}, {lack}")
+        given_keys = [key for key, given in is_given.items() if given]
+        if len(given_keys) != 1:
+            lack = f"not {' and '.join(given_keys)}" if given_keys else "but none is given"
+            raise ValueError(f"give the messages by one of {', '.join(is_given)}, {lack}")
         if self.count is not None and self._is_of_a_bag and self.every is None:
             raise ValueError(
                 "messages with times of their own are published once: leave out 'count'"
@@ -139,59 +139,79 @@ class Publish(StimulusModel):
     @property
     def frames(self) -> frozenset[tuple[str, str]]:
         """Parent and child of each transform in the messages that stand in the YAML."""
-        messages = [*self.messages, *([] if self.message is None else [self.message])]
-        lists = (message.get("transforms") for message in messages)
-        sent = [one for each in lists if isinstance(each, list) for one in each]
-        fields = [dict(each_field(one)) for one in sent if isinstance(one, dict)]
-        found = ((one.get("header.frame_id"), one.get("child_frame_id")) for one in fields)
-        return frozenset((str(parent), str(child)) for parent, child in found if parent and child)
+        messages = list(self.messages)
+        if self.message is not None:
+            messages.append(self.message)
+        frames = set()
+        for message in messages:
+            transforms = message.get("transforms")
+            if not isinstance(transforms, list):
+                continue
+            for transform in transforms:
+                fields = dict(each_field(transform)) if isinstance(transform, dict) else {}
+                parent, child = fields.get("header.frame_id"), fields.get("child_frame_id")
+                if parent and child:
+                    frames.add((str(parent), str(child)))
+        return frozenset(frames)
 
     @property
     def due(self) -> tuple[Due, ...]:
         """What a cell publishes; a message that is repeated without end is there once."""
         return self._due
 
-    def prepared(self, making: Making) -> Publish:
+    def prepared(self, preparation: Preparation) -> Publish:
         """The same with its messages read."""
-        return self if self._due else self.sending(self._read(making))
+        return self if self._due else self.sending(self._read(preparation))
 
     def sending(self, due: Iterable[Due]) -> Publish:
         """The same with these messages."""
-        found = self.model_copy()
-        found._due = tuple(due)
-        return found
+        copy = self.model_copy()
+        copy._due = tuple(due)
+        return copy
 
-    def _read(self, making: Making) -> Iterator[Due]:
-        once, rounds = list(self._given(making)), self.count or 1
+    def _read(self, preparation: Preparation) -> Iterator[Due]:
+        one_round, rounds = list(self._unread(preparation)), self.count or 1
         key = "from" if self.from_ is not None else "python"
-        if not once:
+        if not one_round:
             raise StimulusError(f"{self.from_ or self.python} has no message", (key,))
-        if len(once) * rounds > MOST_MESSAGES:
-            text = f"{len(once) * rounds} messages: at most {MOST_MESSAGES} are published"
+        if len(one_round) * rounds > MOST_MESSAGES:
+            text = f"{len(one_round) * rounds} messages: at most {MOST_MESSAGES} are published"
             raise StimulusError(text, (key,))
-        given = once * rounds
-        if self.before_launch > len(given):
-            raise StimulusError(f"there are only {len(given)} messages", ("before_launch",))
-        for number, one in enumerate(given):
-            try:
-                value = read_message(one.value, self.type, making.find, making.drawn, one.place)
-            except StimulusError as error:
-                if one.label:
-                    raise StimulusError(f"{one.label}: {error}", one.place) from None
-                raise
-            is_paced = self.every is not None or one.time_s is None
-            yield value, number * (self.every or 0.0) if is_paced else one.time_s or 0.0
+        messages = one_round * rounds
+        if self.before_launch > len(messages):
+            raise StimulusError(f"there are only {len(messages)} messages", ("before_launch",))
+        for number, unread in enumerate(messages):
+            yield self._value(unread, preparation), self._time_s(number, unread)
 
-    def _given(self, making: Making) -> Iterable[Given]:
+    def _value(self, unread: UnreadMessage, preparation: Preparation) -> dict[str, Any]:
+        try:
+            find, drawn = preparation.find, preparation.drawn
+            return read_message(unread.value, self.type, find, drawn, unread.place)
+        except StimulusError as error:
+            if unread.label:
+                raise StimulusError(f"{unread.label}: {error}", unread.place) from None
+            raise
+
+    def _time_s(self, number: int, unread: UnreadMessage) -> float:
+        """When a message is due; ``every`` replaces the times of a file."""
+        if self.every is not None:
+            return number * self.every
+        return 0.0 if unread.time_s is None else unread.time_s
+
+    def _unread(self, preparation: Preparation) -> Iterable[UnreadMessage]:
         if self.message is not None:
-            return [Given(self.message, ("message",))]
+            return [UnreadMessage(self.message, ("message",))]
         if self.from_ is not None:
-            return from_file(self.from_, making.folder, self.publish, self.type)
+            return from_file(self.from_, preparation.folder, self.publish, self.type)
         if self.python is not None:
-            return from_function(self.python, making.folder, making.seed)
-        return [Given(value, ("messages", index)) for index, value in enumerate(self.messages)]
+            return from_function(self.python, preparation.folder, preparation.seed)
+        return [
+            UnreadMessage(value, ("messages", index)) for index, value in enumerate(self.messages)
+        ]
 
-    def mistakes(self, making: Making, scenario: ScenarioOfStimuli) -> Iterator[tuple[Place, str]]:
+    def mistakes(
+        self, preparation: Preparation, scenario: ScenarioOfStimuli
+    ) -> Iterator[tuple[Place, str]]:
         """Its topic or its messages do not fit."""
         recorded = scenario.recorded_types
         # Transforms of the author's and of the student's are told apart by their frames.
@@ -202,4 +222,4 @@ class Publish(StimulusModel):
             listed = f" It records: {', '.join(recorded) or 'nothing'}."
             advice = did_you_mean(self.answer, recorded) or listed
             yield ("answer",), f"the scenario does not record {self.answer!r}.{advice}"
-        yield from super().mistakes(making, scenario)
+        yield from super().mistakes(preparation, scenario)

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from grader.assignment.random_values import fill_in
 from grader.assignment.stimuli.message import StimulusError, part_of, read_message
-from grader.assignment.stimuli.stimulus_model import Making, StimulusModel, kind
+from grader.assignment.stimuli.stimulus_model import Preparation, StimulusModel, kind
 from grader.checks.need import Act
 from grader.errors import UsageError
 from grader.spec.document import Place
@@ -114,25 +114,27 @@ class CallService(StimulusModel):
         return self
 
     @property
-    def given(self) -> tuple[dict[str, Any], ...]:
+    def sent_fields(self) -> tuple[dict[str, Any], ...]:
         """The fields of every request, in order."""
         return self.requests or ((self.request or {},) * (self.count or 1))
 
     @property
     def asked(self) -> tuple[Request, ...]:
         """Every request, in order."""
-        return tuple(Request(self.call, self.type, one, self.every) for one in self.given)
+        return tuple(Request(self.call, self.type, one, self.every) for one in self.sent_fields)
 
     @property
     def in_turn(self) -> bool:
         """Whether later requests wait for all of its answers; one at its own pace runs beside."""
         return self.every is None
 
-    def prepared(self, making: Making) -> CallService:
+    def prepared(self, preparation: Preparation) -> CallService:
         """The same with its requests read."""
         requests = tuple(
-            _fields(value, self, making, ("requests", index) if self.requests else ("request",))
-            for index, value in enumerate(self.given)
+            _fields(
+                value, self, preparation, ("requests", index) if self.requests else ("request",)
+            )
+            for index, value in enumerate(self.sent_fields)
         )
         return self.model_copy(update={"requests": requests})
 
@@ -227,13 +229,13 @@ class SetParameters(StimulusModel):
         return self.node
 
     @property
-    def given(self) -> Sequence[Mapping[str, Any]]:
+    def sent_fields(self) -> Sequence[Mapping[str, Any]]:
         """The values by name."""
         return (self.set_parameters,)
 
-    def prepared(self, making: Making) -> SetParameters:
+    def prepared(self, preparation: Preparation) -> SetParameters:
         """The same with its values read."""
-        drawn = dict(making.drawn)
+        drawn = dict(preparation.drawn)
         values = {name: _value(name, it, drawn) for name, it in self.set_parameters.items()}
         return self.model_copy(update={"set_parameters": values})
 
@@ -282,21 +284,21 @@ class SendGoal(StimulusModel):
     within: Duration = Field(10.0, description="How long to wait for its result.")
 
     @property
-    def given(self) -> Sequence[Mapping[str, Any]]:
+    def sent_fields(self) -> Sequence[Mapping[str, Any]]:
         """The goal."""
         return (self.goal,)
 
-    def prepared(self, making: Making) -> SendGoal:
+    def prepared(self, preparation: Preparation) -> SendGoal:
         """The same with its goal read."""
-        return self.model_copy(update={"goal": _fields(self.goal, self, making, ("goal",))})
+        return self.model_copy(update={"goal": _fields(self.goal, self, preparation, ("goal",))})
 
 
 def _fields(
-    value: Mapping[str, Any], item: CallService | SendGoal, making: Making, place: Place
+    value: Mapping[str, Any], item: CallService | SendGoal, preparation: Preparation, place: Place
 ) -> dict[str, Any]:
     folder = "srv" if isinstance(item, CallService) else "action"
     if f"/{folder}/" not in item.type:
         text = f"expected an interface in {folder}, such as package/{folder}/Name"
         raise StimulusError(text, ("type",))
-    find = part_of(making.find, item.type, 0)
-    return read_message(value, item.type, find, making.drawn, place)
+    find = part_of(preparation.find, item.type, 0)
+    return read_message(value, item.type, find, preparation.drawn, place)

@@ -10,8 +10,8 @@ from pydantic import Field
 
 from grader.assignment.stimuli.message import StimulusError, part_of, read_message
 from grader.assignment.stimuli.stimulus_model import (
-    Making,
     Models,
+    Preparation,
     ScenarioOfStimuli,
     StimulusModel,
     kind,
@@ -143,19 +143,19 @@ class Serve(StimulusModel):
         """Whether its type is a service; the first kind, and else an action."""
         return cls.folder == "action" or "/srv/" in str(value.get("type"))
 
-    def prepared(self, making: Making) -> Serve:
+    def prepared(self, preparation: Preparation) -> Serve:
         """The same with its answers read, or the usual one."""
         if f"/{self.folder}/" not in self.type:
             raise StimulusError("expected an interface in srv or action", ("type",))
         answers = enumerate(self.answers or (self.usual,))
-        read = tuple(self._read(one, number, making) for number, one in answers)
+        read = tuple(self._read(one, number, preparation) for number, one in answers)
         return self.model_copy(update={"answers": read})
 
-    def _read(self, answer: Answer, number: int, making: Making) -> Answer:
+    def _read(self, answer: Answer, number: int, preparation: Preparation) -> Answer:
         def read(value: Mapping[str, Any], part: int, *place: str | int) -> dict[str, Any]:
-            find = part_of(making.find, self.type, part)
+            find = part_of(preparation.find, self.type, part)
             inside = ("answers", number, *place)
-            return read_message(value, self.type, find, making.drawn, inside)
+            return read_message(value, self.type, find, preparation.drawn, inside)
 
         if isinstance(answer, GoalAnswer) and answer.drive is not None:
             to = answer.drive.to
@@ -174,20 +174,22 @@ class Serve(StimulusModel):
                 found[key] = read(value, part, key)
         return answer.model_copy(update=found)
 
-    def mistakes(self, making: Making, scenario: ScenarioOfStimuli) -> Iterator[tuple[Place, str]]:
+    def mistakes(
+        self, preparation: Preparation, scenario: ScenarioOfStimuli
+    ) -> Iterator[tuple[Place, str]]:
         """It stands twice, or drives a robot that is not there, or its answers do not fit."""
         alike = [one for one in scenario.stimuli if isinstance(one, Serve)]
         if next(one for one in alike if one.serve == self.serve) is not self:
             yield ("serve",), f"{self.serve!r} stands twice: give one server several 'answers'"
         for number, answer in enumerate(self.answers):
             drive = getattr(answer, "drive", None)
-            if drive is not None and drive.robot not in scenario.simulated:
+            if drive is not None and drive.robot not in scenario.simulated_robots:
                 text = "there is a simulated robot only in a 'world', which is missing"
-                if scenario.simulated:
+                if scenario.simulated_robots:
                     text = f"there is no robot {drive.robot!r}"
-                    text += nearest_or_all(drive.robot, scenario.simulated, "The robots are")
+                    text += nearest_or_all(drive.robot, scenario.simulated_robots, "The robots are")
                 yield ("answers", number, "drive"), text
-        yield from super().mistakes(making, scenario)
+        yield from super().mistakes(preparation, scenario)
 
 
 @kind
@@ -201,7 +203,7 @@ class ServeService(Serve):
     """
 
     heading = "serve a service"
-    inner: ClassVar[Models] = {"answers of a service": ServiceAnswer}
+    nested_models: ClassVar[Models] = {"answers of a service": ServiceAnswer}
     folder = "srv"
     usual = ServiceAnswer()
 
@@ -221,7 +223,7 @@ class ServeAction(Serve):
     """
 
     heading = "serve an action"
-    inner: ClassVar[Models] = {
+    nested_models: ClassVar[Models] = {
         "answers of an action": GoalAnswer,
         "answers of an action: drive": DriveTo,
     }
