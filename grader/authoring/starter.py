@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grader.assignment.contract.standard import ANY, module_of
+from grader.assignment.contract.spot import ANY, module_of
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Assignment, CheckSpec, Package, Visibility
 from grader.diagnosis.not_generated import InterfaceName

@@ -5,19 +5,22 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 from grader.assignment.contract.model import Contract
-from grader.assignment.contract.standard import Fact, Spot, spots
+from grader.assignment.contract.spot import Fact, Spot
+from grader.assignment.contract.standard import spots
 from grader.findings.words import Words
 from grader.spec.document import Place
 from grader.spec.nearest_name import nearest_or_all
 
 _STEP = 0.05
 """Points of which all shares but one are multiples."""
+_ROUNDING = 1e-9
+"""A share that is a step short by the rounding of floats is that step."""
 _OTHER = "a standard check keeps it: write another check among 'checks'"
 _KEPT = {
     **dict.fromkeys(("id", "uses", "python"), _OTHER),
@@ -52,135 +55,147 @@ class Derivation:
             for fact in facts
             if (asked := fact.asked(spot)) is not None
         ]
-        written = {name for spot, _, _ in said for name in _own_ids(spot).values()}
+        authors_ids = {name for spot, _, _ in said for name in _own_ids(spot).values()}
         times = Counter(fact.name for spot, fact, _ in said if fact.name not in _own_ids(spot))
         self.every = tuple(
-            Derived(_id(spot, fact, times[fact.name] > 1, written), fact, spot, asked)
+            Derived(_id(spot, fact, times[fact.name] > 1, authors_ids), fact, spot, asked)
             for spot, fact, asked in said
         )
 
     @cached_property
     def kept(self) -> tuple[Derived, ...]:
         """Those that are judged, in the order of the contract."""
-        return tuple(one for one in self.every if one.id in self.points)
+        return tuple(check for check in self.every if check.id in self.points)
 
     @cached_property
     def points(self) -> Mapping[str, float]:
         """The points of those that are judged, by id."""
-        given = self.contract.points
-        return given if isinstance(given, dict) else _shared(given, self.every)
+        points = self.contract.points
+        return points if isinstance(points, dict) else _shared(points, self.every)
 
-    def entry(self, one: Derived) -> dict[str, Any]:
+    def entry(self, check: Derived) -> dict[str, Any]:
         """A check as an author would write it."""
-        words = one.spot.words
-        asked = dict(one.asked)
-        opened = next((other for other in self._before(one) if other.asked.get("remap")), None)
-        if opened is not None and opened not in self.kept and one.fact.uses == "topic.type":
-            asked["remap"] = True
+        words = check.spot.words
+        asked = {**check.asked, **self._taken_over(check)}
+        is_of_run = bool(check.spot.executable) and check.fact.uses != "package.executable"
         entry: dict[str, Any] = {
-            "id": one.id,
-            "title": one.fact.title.format(**words),
-            "uses": one.fact.uses,
+            "id": check.id,
+            "title": check.fact.title.format(**words),
+            "uses": check.fact.uses,
             "with": asked,
-            "scenarios": list(one.spot.program.scenarios) if self._is_of_a_run(one) else [],
-            "points": self.points[one.id],
-            "requires": list(dict.fromkeys(found.id for found in self._required(one))),
-            "hint": _filled(one.fact.hint, words),
+            "scenarios": list(check.spot.program.scenarios) if is_of_run else [],
+            "points": self.points[check.id],
+            "requires": list(dict.fromkeys(required.id for required in self._required(check))),
+            "hint": _filled(check.fact.hint, words),
         }
-        other = self.contract.checks.get(one.id, {})
-        if isinstance(other.get("with"), dict):
-            changed = {**asked, **other["with"]}
-            other = {**other, "with": {key: one for key, one in changed.items() if one is not None}}
-        return {name: value for name, value in {**entry, **other}.items() if value not in ([], {})}
+        changes = self.contract.checks.get(check.id, {})
+        entry |= changes
+        if isinstance(changes.get("with"), dict):
+            parameters = {**asked, **changes["with"]}
+            entry["with"] = {key: value for key, value in parameters.items() if value is not None}
+        return {key: value for key, value in entry.items() if value not in ([], {})}
+
+    def _taken_over(self, check: Derived) -> dict[str, Any]:
+        """A topic's check that is not judged leaves it to that of its type to take a near name."""
+        openers = (before for before in self._before(check) if before.asked.get("remap"))
+        opener = next(openers, None)
+        if check.fact.uses != "topic.type" or opener is None or opener in self.kept:
+            return {}
+        return {"remap": True}
 
     def problems(self) -> Iterator[tuple[Place, str]]:
         """What contradicts itself."""
-        ids = Counter(one.id for one in self.every)
-        for one in self.every:
-            if ids[one.id] > 1:
+        ids = Counter(check.id for check in self.every)
+        for check in self.every:
+            if ids[check.id] > 1:
+                fact = check.fact.name
                 yield (
-                    one.place,
-                    f"two checks of the contract would have the id {one.id!r}: give one of their "
-                    f"parts 'ids', such as 'ids: {{{one.fact.name}: my_{one.fact.name}}}'",
+                    check.place,
+                    f"two checks of the contract would have the id {check.id!r}: give one of their "
+                    f"parts 'ids', such as 'ids: {{{fact}: my_{fact}}}'",
                 )
-            elif "{" in one.spot.name and one.id.startswith(_in_ids(one.spot.name)):
+            elif "{" in check.spot.name and check.id.startswith(_in_ids(check.spot.name)):
                 text = "its name is chosen by students, so its ids need one: write 'ids: my_part'"
-                yield one.place, text
-        for key, named, known, verb in (
-            ("points", self.points, ids, "has"),
-            ("checks", self.contract.checks, self.points, "judges"),
-        ):
-            for name in named:
-                if name not in known:
-                    advice = nearest_or_all(name, sorted(known), "Its checks are")
-                    yield ("contract", key, name), f"the contract {verb} no check {name!r}.{advice}"
-        for name, changed in self.contract.checks.items():
-            for wrong, where in _KEPT.items():
-                if wrong in changed:
-                    yield ("contract", "checks", name, wrong), where
+                yield check.place, text
+        yield from self._unknown("points", self.points, ids, "has")
+        yield from self._unknown("checks", self.contract.checks, self.points, "judges")
+        for name, changes in self.contract.checks.items():
+            for key, advice in _KEPT.items():
+                if key in changes:
+                    yield ("contract", "checks", name, key), advice
         for spot, _ in spots(self.contract):
             yield from self._unknown_ids(spot)
 
+    def _unknown(
+        self, key: str, names: Collection[str], known: Collection[str], verb: str
+    ) -> Iterator[tuple[Place, str]]:
+        for name in names:
+            if name not in known:
+                advice = nearest_or_all(name, sorted(known), "Its checks are")
+                yield ("contract", key, name), f"the contract {verb} no check {name!r}.{advice}"
+
     def _unknown_ids(self, spot: Spot) -> Iterator[tuple[Place, str]]:
-        known = {one.fact.name for one in self.every if one.place == spot.place}
+        known = {check.fact.name for check in self.every if check.place == spot.place}
         for name in _own_ids(spot):
             if name not in known:
                 advice = nearest_or_all(name, sorted(known), "It has")
                 yield (*spot.place, "ids", name), f"nothing here makes a check {name!r}.{advice}"
 
-    def _is_of_a_run(self, one: Derived) -> bool:
-        return bool(one.spot.executable) and one.fact.uses != "package.executable"
-
-    def _required(self, one: Derived) -> Iterator[Derived]:
-        for other in self._before(one):
-            if other in self.kept:
-                yield other
+    def _required(self, check: Derived) -> Iterator[Derived]:
+        """What a check requires; in place of what is not judged, what that requires."""
+        for before in self._before(check):
+            if before in self.kept:
+                yield before
             else:
-                yield from self._required(other)
+                yield from self._required(before)
 
-    def _before(self, one: Derived) -> Iterator[Derived]:
-        """What a check requires, judged or not; for a fact not stated, what that requires."""
-        for name in one.fact.requires:
-            yield from self._nearest(name, one.spot)
+    def _before(self, check: Derived) -> Iterator[Derived]:
+        """What a check requires, judged or not."""
+        for name in check.fact.requires:
+            yield from self._nearest(name, check.spot)
 
-    def _nearest(self, name: str, spot: Spot) -> Iterable[Derived]:
-        here = [other for other in self.every if other.fact.name == name]
-        inside = [one for one in here if one.spot.place[: len(spot.place)] == spot.place]
-        for level in (spot, *spot.around):
-            same = [other for other in here if other.spot.place == level.place]
-            if same or (level is spot and inside):
-                return same or inside
+    def _nearest(self, name: str, spot: Spot) -> list[Derived]:
+        """The checks of a fact that is required at a part: of the nearest part that has some.
+
+        That is the part itself, else what lies in it, else the parts around it. Where the contract
+        does not say the fact, what that fact requires stands for it.
+        """
+        of_fact = [check for check in self.every if check.fact.name == name]
+        at_part = [check for check in of_fact if check.place == spot.place]
+        inside = [check for check in of_fact if check.place[: len(spot.place)] == spot.place]
+        if at_part or inside:
+            return at_part or inside
+        for outer in spot.around:
+            at_outer = [check for check in of_fact if check.place == outer.place]
+            if at_outer:
+                return at_outer
         if name == "generated":
-            needed = spot.of_package.depends
-            return [other for other in here if other.spot.package in needed]
-        facts = [
-            fact for level, every in spots(self.contract) for fact in every if _near(level, spot)
-        ]
-        unsaid = next((fact for fact in facts if fact.name == name), None)
-        return (
-            []
-            if unsaid is None
-            else [found for step in unsaid.requires for found in self._nearest(step, spot)]
-        )
+            # Interfaces lie in other packages, on which this one depends.
+            packages = spot.of_package.depends
+            return [check for check in of_fact if check.spot.package in packages]
+        near = (facts for other, facts in spots(self.contract) if _is_near(other, spot))
+        unsaid = next((fact for facts in near for fact in facts if fact.name == name), None)
+        steps = unsaid.requires if unsaid is not None else ()
+        return [check for step in steps for check in self._nearest(step, spot)]
 
 
-def _near(level: Spot, spot: Spot) -> bool:
-    """Whether a part is another one's own, lies around it, or lies in it."""
-    shorter = min(len(level.place), len(spot.place))
-    return level.place[:shorter] == spot.place[:shorter]
+def _is_near(other: Spot, spot: Spot) -> bool:
+    """Whether a part is the other one, lies around it, or lies in it."""
+    shorter = min(len(other.place), len(spot.place))
+    return other.place[:shorter] == spot.place[:shorter]
 
 
-def _id(spot: Spot, fact: Fact, several: bool, written: Collection[str]) -> str:
+def _id(spot: Spot, fact: Fact, has_several: bool, authors_ids: Collection[str]) -> str:
     """The id of a check: the author's, or the fact with a name before it where several have it."""
     own = _own_ids(spot)
     if fact.name in own:
         return own[fact.name]
-    prefixes = [level.part.ids for level in (spot, *spot.around) if isinstance(level.part.ids, str)]
-    prefix = next(filter(None, prefixes), "")
-    if not prefix and several:
+    ids = [part.part.ids for part in (spot, *spot.around)]
+    prefix = next((prefix for prefix in ids if isinstance(prefix, str) and prefix), "")
+    if not prefix and has_several:
         prefix = _in_ids(spot.name)
-    made = f"{prefix}_{fact.name}" if prefix else fact.name
-    return f"{made}_{fact.name}" if made in written else made
+    id_ = f"{prefix}_{fact.name}" if prefix else fact.name
+    return f"{id_}_{fact.name}" if id_ in authors_ids else id_
 
 
 def _in_ids(name: str) -> str:
@@ -188,14 +203,14 @@ def _in_ids(name: str) -> str:
     return re.sub(r"\W+", "_", name.rpartition("/")[2]).lower()
 
 
-def _shared(total: float, every: Collection[Derived]) -> dict[str, float]:
+def _shared(total: float, checks: Collection[Derived]) -> dict[str, float]:
     """Points for all, by weight, in steps of 0.05; the heaviest gets what is left over."""
-    weights = sum(one.fact.weight for one in every)
-    shares: dict[str, float] = {
-        one.id: math.floor(total * one.fact.weight / weights / _STEP + 1e-9) * _STEP
-        for one in every
-    }
-    heaviest = max(every, key=lambda one: one.fact.weight)
+    weights = sum(check.fact.weight for check in checks)
+    shares = {}
+    for check in checks:
+        share = total * check.fact.weight / weights
+        shares[check.id] = math.floor(share / _STEP + _ROUNDING) * _STEP
+    heaviest = max(checks, key=lambda check: check.fact.weight)
     shares[heaviest.id] += total - math.fsum(shares.values())
     return {name: round(points, 6) for name, points in shares.items()}
 

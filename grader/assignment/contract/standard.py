@@ -1,21 +1,18 @@
 """The standard checks: what a contract says of a part of the ROS graph, and how it is judged.
 
-Each :class:`Fact` is one line of what a contract can say. A new one is an entry here and a field of
-the model.
+Each :class:`~grader.assignment.contract.spot.Fact` is one line of what a contract can say. A new
+one is an entry here and a field of the model.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any, TypeVar
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 from grader.assignment.contract.model import (
     Connection,
     Contract,
-    ContractPackage,
     Declared,
     Interface,
     Part,
@@ -24,160 +21,103 @@ from grader.assignment.contract.model import (
     Server,
     Subscription,
 )
-from grader.findings.fields import each_field, wanted_words
-from grader.findings.text import is_asked_of_text
-from grader.findings.words import Words, listing
+from grader.assignment.contract.spot import ANY, Asked, Fact, Spot, period_of
+from grader.findings.words import Words
 from grader.spec.document import Place
 
-ANY = "any"
-_P = TypeVar("_P", bound=Part)
+_CONSTANT = re.compile(r"^\s*[\w/\[\]<=]+\s+[A-Z]\w*\s*=", re.MULTILINE)
+"""A constant in the definition of an interface, such as ``int8 OFF=0``."""
 
 
-@dataclass(frozen=True)
-class Fact:
-    """A thing that a contract says of a part, and the standard check of it.
-
-    Attributes:
-        name: Its id, before the prefix of its part.
-        asked: The parameters of the check, or None where the contract does not say it.
-        requires: Facts whose checks must pass first, of this part or of those around it.
-        weight: Its share of the points, where the contract gives only their sum.
-    """
-
-    name: str
-    uses: str
-    asked: Callable[[Spot], dict[str, Any] | None]
-    title: str
-    hint: str | Words
-    requires: tuple[str, ...] = ()
-    weight: int = 1
+# What the checks of these facts are asked, where that takes more than an expression.
 
 
-@dataclass(frozen=True)
-class Spot:
-    """A part of a contract with its name and all that it lies in.
-
-    Attributes:
-        name: Of a topic, a service, an interface ...; of a program or a package its own name.
-        around: The parts that it lies in, the innermost first.
-    """
-
-    contract: Contract
-    place: Place
-    part: Part
-    name: str
-    package: str
-    executable: str = ""
-    around: tuple[Spot, ...] = field(default=(), repr=False)
-
-    def part_as(self, kind: type[_P]) -> _P:
-        """The part, which is of this kind."""
-        assert isinstance(self.part, kind)
-        return self.part
-
-    @property
-    def of_package(self) -> ContractPackage:
-        """The package that it lies in."""
-        return self.contract.packages[self.package]
-
-    @property
-    def program(self) -> Program:
-        """The program that it lies in."""
-        return self.of_package.executables[self.executable]
-
-    @property
-    def interface(self) -> str:
-        """The full name of an interface, such as ``bot_msgs/msg/BotStatus``."""
-        return f"{self.package}/{self.name}"
-
-    @cached_property
-    def words(self) -> Mapping[str, str]:
-        """What stands in the places of titles and hints."""
-        several = len(self.contract.programs) > 1
-        short = str(getattr(self.part, "type", "")).rpartition("/")[2]
-        found = {
-            "package": self.package,
-            "executable": self.executable,
-            "name": self.name,
-            "whose": f"of {self.executable} " if several and self.executable else "",
-            "subject": self.executable if several and self.executable else "The node",
-            "program": self.executable if several and self.executable else "The program",
-            "of_package": f" {self.package}" if len(self.contract.packages) > 1 else "",
-            "type": str(getattr(self.part, "type", "")),
-            "short": short,
-            "cpp_type": str(getattr(self.part, "type", "")).replace("/", "::"),
-        }
-        if self.executable:
-            alone = len(self.of_package.executables) == 1
-            found["module"] = module_of(self.package, self.executable, alone=alone)
-            found["node"], found["ends"] = self.program.node, str(self.program.ends)
-        if isinstance(self.part, Connection):
-            found["qos"] = listing(value.replace("_", " ") for value in self.part.qos.values())
-            found["depth"] = str(self.part.depth)
-        if isinstance(self.part, Publication):
-            found["on"] = f" on {self.name}" if len(self.program.publishes) > 1 else ""
-            found["count"] = (
-                "one message" if self.part.count == 1 else f"{self.part.count} messages"
-            )
-            found["are"] = "is" if self.part.count == 1 else "are"
-            found["period"] = str(period_of(self.part).get("period"))
-            found["rate"] = rate_words(self.part)
-            found["value"] = listing(
-                f"{name}{' that' if is_asked_of_text(value) else ''} {wanted_words(value)}"
-                for name, value in each_field(self.part.value)
-            )
-        if isinstance(self.part, Interface):
-            found["interface"] = self.interface
-            found["file"] = f"{self.name}.{self.name.split('/')[0]}"
-        return found
-
-
-def module_of(package: str, executable: str, *, alone: bool) -> str:
-    """The module of a program: called like its package if it is the only one in it."""
-    return package if alone else re.sub(r"\W", "_", executable.removesuffix(".py"))
-
-
-def period_of(part: Publication) -> dict[str, Any]:
-    """The parameters of ``timing.period``; none where the contract says no period."""
-    if part.period is None:
-        return {}
-    return part.period if isinstance(part.period, dict) else {"period": part.period}
-
-
-def rate_words(part: Publication) -> str:
-    """How often messages come, such as ``at least 9 Hz and at most 11 Hz``."""
-    limits = {"at_least": "at least", "at_most": "at most"}
-    return listing(f"{text} {part.rate[key]}" for key, text in limits.items() if key in part.rate)
-
-
-def _found(spot: Spot) -> dict[str, Any]:
+def _package(spot: Spot) -> Asked:
+    asked: dict[str, Any] = {"package": spot.package}
     if spot.of_package.interfaces:
-        build_type = spot.of_package.build_type[0]
-        return {"package": spot.package, "build_type": build_type, "remap": True}
-    return {"package": spot.package, "remap": True}
+        asked["build_type"] = spot.of_package.build_type[0]
+    return {**asked, "remap": True}
 
 
-def _executable(spot: Spot) -> dict[str, Any]:
+def _built(spot: Spot) -> Asked:
+    return {"package": spot.package} if spot.of_package.executables else None
+
+
+def _executable(spot: Spot) -> Asked:
     asked: dict[str, Any] = {"package": spot.package, "executable": spot.executable}
-    return {**asked, "remap": True} if len(spot.of_package.executables) == 1 else asked
+    if len(spot.of_package.executables) == 1:
+        asked["remap"] = True
+    return asked
 
 
-def _node(spot: Spot) -> dict[str, Any] | None:
+def _node(spot: Spot) -> Asked:
     if spot.program.node == ANY:
         return None
-    topics = list(spot.program.publishes)
-    return {"name": spot.program.node, **({"publishes": topics[0]} if topics else {})}
+    asked = {"name": spot.program.node}
+    if spot.program.publishes:
+        asked["publishes"] = next(iter(spot.program.publishes))
+    return asked
 
 
-def _qos(spot: Spot) -> dict[str, Any] | None:
-    asked = spot.part_as(Connection).qos
-    return {"topic": spot.name, **asked} if asked else None
+def _ends(spot: Spot) -> Asked:
+    return {"within": spot.program.ends} if spot.program.ends else None
 
 
-def _depth(spot: Spot) -> dict[str, Any] | None:
+def _of_topic(spot: Spot, parameters: Mapping[str, Any]) -> Asked:
+    return {"topic": spot.name, **parameters} if parameters else None
+
+
+def _depth(spot: Spot) -> Asked:
     part = spot.part_as(Connection)
     kind = "subscription" if isinstance(part, Subscription) else "publisher"
     return {"topic": spot.name, "depth": part.depth, "kind": kind} if part.depth else None
+
+
+def _sent(spot: Spot) -> Asked:
+    part = spot.part_as(Publication)
+    is_asked_more = part.value or part.period or part.rate or part.count
+    return {"topic": spot.name, "at_least": 1} if is_asked_more else None
+
+
+def _count(spot: Spot) -> Asked:
+    count = spot.part_as(Publication).count
+    return {"topic": spot.name, "exactly": count} if count else None
+
+
+def _value(spot: Spot) -> Asked:
+    value = spot.part_as(Publication).value
+    return {"topic": spot.name, "value": value} if value else None
+
+
+def _left_alone(spot: Spot) -> Asked:
+    topics = spot.program.leaves_alone
+    if topics == "robot":
+        # The check knows the robot's topics.
+        return {}
+    return {"topics": list(topics)} if topics else None
+
+
+def _not_subscribed(spot: Spot) -> Asked:
+    topics = list(spot.program.does_not_subscribe)
+    return {"topics": topics} if topics else None
+
+
+def _asked_server(spot: Spot) -> Asked:
+    return {"server": spot.name, "more": True}
+
+
+def _declaration(spot: Spot) -> Asked:
+    said = spot.part_as(Declared).model_dump(exclude_unset=True, exclude={"ids"}, mode="json")
+    return {"node": spot.program.node, "name": spot.name, **said}
+
+
+def _definition(spot: Spot) -> dict[str, Any]:
+    return {"interface": spot.interface, "definition": spot.part_as(Interface).definition}
+
+
+def _constants(spot: Spot) -> Asked:
+    asked = _definition(spot)
+    return asked if _CONSTANT.search(asked["definition"]) else None
 
 
 def _name_hint(end: str) -> Words:
@@ -187,35 +127,11 @@ def _name_hint(end: str) -> Words:
     return Words(hint.format("second", end), hint.format("first", end))
 
 
-def _sent(spot: Spot) -> dict[str, Any] | None:
-    part = spot.part_as(Publication)
-    counts = part.value or part.period or part.rate or part.count
-    return {"topic": spot.name, "at_least": 1} if counts else None
-
-
-def _declared(spot: Spot) -> dict[str, Any]:
-    assert isinstance(spot.part, Declared)
-    said = spot.part.model_dump(exclude_unset=True, exclude={"ids"}, mode="json")
-    return {"node": spot.program.node, "name": spot.name, **said}
-
-
-def _definition(spot: Spot) -> dict[str, Any]:
-    assert isinstance(spot.part, Interface)
-    return {"interface": spot.interface, "definition": spot.part.definition}
-
-
-def _constants(spot: Spot) -> dict[str, Any] | None:
-    asked = _definition(spot)
-    return (
-        asked if re.search(r"^\s*[\w/\[\]<=]+\s+[A-Z]\w*\s*=", asked["definition"], re.M) else None
-    )
-
-
 PACKAGE = (
     Fact(
         "package",
         "package.found",
-        _found,
+        _package,
         "The package {package} is there",
         Words(
             "Create it with `ros2 pkg create --build-type ament_python {package}`.",
@@ -226,22 +142,22 @@ PACKAGE = (
     Fact(
         "builds",
         "package.builds",
-        lambda it: {"package": it.package} if it.of_package.executables else None,
+        _built,
         "The package{of_package} builds with colcon",
         "Run `colcon build` in your workspace (the folder above src) and read its first error.",
-        ("package", "generated"),
+        requires=("package", "generated"),
     ),
     Fact(
         "dependencies",
         "package.dependencies",
-        lambda it: {"package": it.package} if it.of_package.executables else None,
+        _built,
         "package.xml{of_package} names every ROS package that the code uses",
         Words(
             "Write one `<depend>` in package.xml for every ROS package that you import.",
             "Write one `<depend>` in package.xml, and one find_package(...) in CMakeLists.txt, for "
             "every ROS package whose headers you include.",
         ),
-        ("builds",),
+        requires=("builds",),
     ),
 )
 
@@ -258,16 +174,16 @@ PROGRAM = (
             "ament_target_dependencies({executable} rclcpp ...) and install(TARGETS {executable} "
             "DESTINATION lib/${{PROJECT_NAME}}).",
         ),
-        ("builds",),
-        2,
+        requires=("builds",),
+        weight=2,
     ),
     Fact(
         "starts",
         "node.starts",
-        lambda it: {},
+        lambda spot: {},
         "{program} starts and creates a node",
         "Run `ros2 run {package} {executable}` yourself and read the last lines that it prints.",
-        ("executable",),
+        requires=("executable",),
     ),
     Fact(
         "node",
@@ -278,30 +194,30 @@ PROGRAM = (
             "The name of the node is the argument of super().__init__() in its class.",
             "The name of the node is the argument of Node(...) in the constructor of its class.",
         ),
-        ("starts",),
+        requires=("starts",),
     ),
     Fact(
         "alive",
         "node.alive",
-        lambda it: {} if it.program.alive else None,
+        lambda spot: {} if spot.program.alive else None,
         "{subject} stays alive",
         Words(
             "rclpy.spin(node) keeps the node running until it is interrupted.",
             "rclcpp::spin(node) keeps the node running until it is interrupted.",
         ),
-        ("starts",),
+        requires=("starts",),
     ),
     Fact(
         "ends",
         "node.ends",
-        lambda it: {"within": it.program.ends} if it.program.ends else None,
+        _ends,
         "{subject} ends by itself within {ends} of Ctrl+C",
         Words(
             "Ctrl+C ends rclpy.spin() with a KeyboardInterrupt. Do not catch it and go on.",
             "Ctrl+C makes rclcpp::spin() return. Do not start another loop after it, and install "
             "no handler of SIGINT.",
         ),
-        ("alive",),
+        requires=("alive",),
     ),
 )
 
@@ -309,29 +225,29 @@ PUBLICATION = (
     Fact(
         "topic",
         "topic.published",
-        lambda it: {"topic": it.name, "remap": True},
+        lambda spot: {"topic": spot.name, "remap": True},
         "{subject} publishes on {name}",
         _name_hint("publisher"),
-        ("starts",),
-        2,
+        requires=("starts",),
+        weight=2,
     ),
     Fact(
         "type",
         "topic.type",
-        lambda it: {"topic": it.name, "type": it.part_as(Connection).type},
+        lambda spot: {"topic": spot.name, "type": spot.part_as(Connection).type},
         "The topic {name} carries {type}",
         Words(
             "The first argument of create_publisher is the class of the messages.",
             "The type of the messages stands in angle brackets: "
             "create_publisher<package::msg::Type>(...).",
         ),
-        ("topic",),
-        2,
+        requires=("topic",),
+        weight=2,
     ),
     Fact(
         "qos",
         "qos.offered",
-        _qos,
+        lambda spot: _of_topic(spot, spot.part_as(Connection).qos),
         "The publisher{on} is {qos}",
         Words(
             "Give a queue size instead of a QoSProfile. Then you get the default, which is right "
@@ -339,7 +255,7 @@ PUBLICATION = (
             "Give a queue size instead of an rclcpp::QoS. Then you get the default, which is right "
             "here.",
         ),
-        ("topic",),
+        requires=("topic",),
     ),
     Fact(
         "depth",
@@ -350,7 +266,7 @@ PUBLICATION = (
             "The third argument of create_publisher is the queue size.",
             "The second argument of create_publisher is the queue size.",
         ),
-        ("topic",),
+        requires=("topic",),
     ),
     Fact(
         "sent",
@@ -363,59 +279,49 @@ PUBLICATION = (
             "Call publisher_->publish(message) in the callback of the timer. Call "
             "rclcpp::spin(node), which calls the callback.",
         ),
-        ("type",),
-        2,
+        requires=("type",),
+        weight=2,
     ),
     Fact(
         "once",
         "messages.count",
-        lambda it: (
-            {"topic": it.name, "exactly": count}
-            if (count := it.part_as(Publication).count)
-            else None
-        ),
+        _count,
         "Exactly {count} {are} published{on}",
         "Publish neither in a loop nor in a timer that goes on.",
-        ("sent",),
-        4,
+        requires=("sent",),
+        weight=4,
     ),
     Fact(
         "values",
         "messages.equal",
-        lambda it: (
-            {"topic": it.name, "value": value} if (value := it.part_as(Publication).value) else None
-        ),
+        _value,
         "Every message{on} has {value}",
         "Set the fields before you publish; all others keep their default of 0.",
-        ("sent",),
-        4,
+        requires=("sent",),
+        weight=4,
     ),
     Fact(
         "period",
         "timing.period",
-        lambda it: (
-            {"topic": it.name, **period_of(it.part_as(Publication))}
-            if period_of(it.part_as(Publication))
-            else None
-        ),
+        lambda spot: _of_topic(spot, period_of(spot.part_as(Publication))),
         "A message comes every {period}{on}",
         "`ros2 topic hz {name}` shows the rate.",
-        ("sent", "alive"),
-        8,
+        requires=("sent", "alive"),
+        weight=8,
     ),
     Fact(
         "rate",
         "timing.rate",
-        lambda it: {"topic": it.name, **rate} if (rate := it.part_as(Publication).rate) else None,
+        lambda spot: _of_topic(spot, spot.part_as(Publication).rate),
         "Messages come with {rate}{on}",
         "`ros2 topic hz {name}` shows the rate.",
-        ("sent", "alive"),
-        4,
+        requires=("sent", "alive"),
+        weight=4,
     ),
     Fact(
         "timer",
         "executor.timer",
-        lambda it: {"topic": it.name} if it.part_as(Publication).timer else None,
+        lambda spot: {"topic": spot.name} if spot.part_as(Publication).timer else None,
         "A timer calls the callback{on}, not a thread or a loop",
         Words(
             "Create a timer with self.create_timer(period_in_seconds, self.timer_callback), and "
@@ -423,8 +329,8 @@ PUBLICATION = (
             "Create a timer with timer_ = this->create_wall_timer(period, callback), and publish "
             "in its callback.",
         ),
-        ("sent", "responsive"),
-        4,
+        requires=("sent", "responsive"),
+        weight=4,
     ),
 )
 
@@ -432,35 +338,39 @@ SUBSCRIPTION = (
     Fact(
         "subscribes",
         "topic.subscribed",
-        lambda it: {"topic": it.name, "remap": True},
+        lambda spot: {"topic": spot.name, "remap": True},
         "{subject} subscribes to {name}",
         _name_hint("subscription"),
-        ("starts",),
-        2,
+        requires=("starts",),
+        weight=2,
     ),
     Fact(
         "subscribed_type",
         "topic.type",
-        lambda it: {"topic": it.name, "type": it.part_as(Connection).type, "kind": "subscription"},
+        lambda spot: {
+            "topic": spot.name,
+            "type": spot.part_as(Connection).type,
+            "kind": "subscription",
+        },
         "The subscription to {name} is of {type}",
         Words(
             "The first argument of create_subscription is the class of the messages.",
             "The type of the messages stands in angle brackets: "
             "create_subscription<package::msg::Type>(...).",
         ),
-        ("subscribes",),
-        2,
+        requires=("subscribes",),
+        weight=2,
     ),
     Fact(
         "subscribed_qos",
         "qos.requested",
-        _qos,
+        lambda spot: _of_topic(spot, spot.part_as(Connection).qos),
         "The subscription to {name} is {qos}",
         Words(
             "A queue size or qos_profile_sensor_data is right here.",
             "A queue size or rclcpp::SensorDataQoS() is right here.",
         ),
-        ("subscribes",),
+        requires=("subscribes",),
     ),
     Fact(
         "subscribed_depth",
@@ -471,7 +381,7 @@ SUBSCRIPTION = (
             "The fourth argument of create_subscription, after the callback, is the queue size.",
             "The second argument of create_subscription, before the callback, is the queue size.",
         ),
-        ("subscribes",),
+        requires=("subscribes",),
     ),
 )
 
@@ -479,37 +389,27 @@ AFTERWARDS = (
     Fact(
         "responsive",
         "executor.responsive",
-        lambda it: it.program.responsive or None,
+        lambda spot: spot.program.responsive or None,
         "The callbacks {whose}do not block the executor",
         "Do not loop or sleep in a callback: let it do its work once, and return.",
-        ("sent", "alive"),
-        4,
+        requires=("sent", "alive"),
+        weight=4,
     ),
     Fact(
         "untouched",
         "topic.untouched",
-        lambda it: (
-            None
-            if not it.program.leaves_alone
-            else {}
-            if it.program.leaves_alone == "robot"
-            else {"topics": list(it.program.leaves_alone)}
-        ),
+        _left_alone,
         "{subject} does not publish on the robot's own topics",
         "Only the robot publishes its sensors. Your node only subscribes to them.",
-        ("starts",),
+        requires=("starts",),
     ),
     Fact(
         "not_subscribed",
         "topic.not_subscribed",
-        lambda it: (
-            {"topics": list(it.program.does_not_subscribe)}
-            if it.program.does_not_subscribe
-            else None
-        ),
+        _not_subscribed,
         "{subject} does not subscribe to what is not for it",
         "What it needs comes from another node.",
-        ("starts",),
+        requires=("starts",),
     ),
 )
 """Facts of a program that build on those of its topics."""
@@ -518,15 +418,15 @@ SERVICE = (
     Fact(
         "service",
         "service.exists",
-        lambda it: {"service": it.name, "type": it.part_as(Server).type, "remap": True},
+        lambda spot: {"service": spot.name, "type": spot.part_as(Server).type, "remap": True},
         "{subject} offers the service {name}",
         Words(
             "self.create_service({short}, '{name}', self.callback); `ros2 service list -t` shows "
             "it.",
             'create_service<{cpp_type}>("{name}", callback); `ros2 service list -t` shows it.',
         ),
-        ("node",),
-        2,
+        requires=("node",),
+        weight=2,
     ),
 )
 
@@ -534,35 +434,31 @@ ACTION = (
     Fact(
         "action",
         "action.exists",
-        lambda it: {"action": it.name, "type": it.part_as(Server).type, "remap": True},
+        lambda spot: {"action": spot.name, "type": spot.part_as(Server).type, "remap": True},
         "{subject} offers the action {name}",
         Words(
             "ActionServer(self, {short}, '{name}', self.execute); `ros2 action list -t` shows it.",
             'rclcpp_action::create_server<{cpp_type}>(this, "{name}", ...); `ros2 action list '
             "-t` shows it.",
         ),
-        ("node",),
-        2,
+        requires=("node",),
+        weight=2,
     ),
 )
-
-
-def _asked_of(spot: Spot) -> dict[str, Any]:
-    return {"server": spot.name, "more": True}
 
 
 CALL = (
     Fact(
         "calls",
         "client.asks",
-        _asked_of,
+        _asked_server,
         "{subject} calls the service {name}",
         Words(
             "self.create_client({short}, '{name}').call_async(request) sends a request.",
             'create_client<{cpp_type}>("{name}")->async_send_request(request) sends a request.',
         ),
-        ("starts",),
-        2,
+        requires=("starts",),
+        weight=2,
     ),
 )
 
@@ -570,15 +466,15 @@ SENT_GOAL = (
     Fact(
         "sends_goals",
         "client.asks",
-        _asked_of,
+        _asked_server,
         "{subject} sends a goal to the action {name}",
         Words(
             "ActionClient(self, {short}, '{name}').send_goal_async(goal) sends a goal.",
             'rclcpp_action::create_client<{cpp_type}>(this, "{name}")->async_send_goal(goal) sends '
             "a goal.",
         ),
-        ("starts",),
-        2,
+        requires=("starts",),
+        weight=2,
     ),
 )
 
@@ -586,14 +482,14 @@ PARAMETER = (
     Fact(
         "parameter",
         "parameter.declared",
-        _declared,
+        _declaration,
         "The parameter {name} is declared",
         Words(
             "self.declare_parameter('{name}', default) in the constructor.",
             'this->declare_parameter("{name}", default) in the constructor.',
         ),
-        ("node",),
-        2,
+        requires=("node",),
+        weight=2,
     ),
 )
 
@@ -601,10 +497,10 @@ INTERFACE = (
     Fact(
         "definition",
         "interface.found",
-        lambda it: {"interface": it.interface, "remap": True},
+        lambda spot: {"interface": spot.interface, "remap": True},
         "The definition is in {file}",
         "Its folder is beside package.xml, and the file has the name of the interface.",
-        ("package",),
+        requires=("package",),
     ),
     Fact(
         "fields",
@@ -612,8 +508,8 @@ INTERFACE = (
         _definition,
         "{interface} has the fields that are asked for",
         "Two programs can communicate only if they have the same definition.",
-        ("definition",),
-        4,
+        requires=("definition",),
+        weight=4,
     ),
     Fact(
         "constants",
@@ -621,27 +517,27 @@ INTERFACE = (
         _constants,
         "{interface} has the constants that are asked for",
         "A constant has a name in upper case and an equals sign.",
-        ("definition",),
-        4,
+        requires=("definition",),
+        weight=4,
     ),
     Fact(
         "generated",
         "interface.generated",
-        lambda it: {"interface": it.interface},
+        lambda spot: {"interface": spot.interface},
         "The build generates {interface}",
         "After `colcon build` and sourcing, `ros2 interface show {interface}` works.",
-        ("definition",),
+        requires=("definition",),
     ),
     Fact(
         "manifest",
         "interface.manifest",
-        lambda it: {"interface": it.interface},
+        lambda spot: {"interface": spot.interface},
         "package.xml{of_package} declares that the package holds interfaces",
         (
             "Your machine has these packages already. Another machine installs only the packages "
             "that package.xml names."
         ),
-        ("generated",),
+        requires=("generated",),
     ),
 )
 
@@ -651,24 +547,24 @@ def spots(contract: Contract) -> Iterator[tuple[Spot, Sequence[Fact]]]:
 
     Packages of interfaces come first: the others are built on them.
     """
-    named = contract.packages.items()
-    for package, one in sorted(named, key=lambda item: not item[1].interfaces):
-        place: Place = ("contract", "packages", package)
-        here = Spot(contract, place, one, package, package)
-        yield here, PACKAGE
-        for name, interface in one.interfaces.items():
-            inside = (*place, "interfaces", name)
-            yield Spot(contract, inside, interface, name, package, around=(here,)), INTERFACE
-        for name, program in one.executables.items():
-            yield from _of_program(here, name, program)
+    packages = sorted(contract.packages.items(), key=lambda item: not item[1].interfaces)
+    for name, package in packages:
+        place: Place = ("contract", "packages", name)
+        spot = Spot(contract, place, package, name, name)
+        yield spot, PACKAGE
+        for inner, interface in package.interfaces.items():
+            inside = (*place, "interfaces", inner)
+            yield Spot(contract, inside, interface, inner, name, around=(spot,)), INTERFACE
+        for executable, program in package.executables.items():
+            yield from _of_program(spot, executable, program)
 
 
 def _of_program(
     package: Spot, name: str, program: Program
 ) -> Iterator[tuple[Spot, Sequence[Fact]]]:
-    place = (*package.place, "executables", name)
-    here = Spot(package.contract, place, program, name, package.package, name, (package,))
-    yield here, PROGRAM
+    contract, place = package.contract, (*package.place, "executables", name)
+    spot = Spot(contract, place, program, name, package.package, name, (package,))
+    yield spot, PROGRAM
     groups: tuple[tuple[str, Mapping[str, Part], Sequence[Fact]], ...] = (
         ("publishes", program.publishes, PUBLICATION),
         ("subscribes", program.subscribes, SUBSCRIPTION),
@@ -678,11 +574,9 @@ def _of_program(
         ("sends_goals", program.sends_goals, SENT_GOAL),
         ("parameters", program.parameters, PARAMETER),
     )
-    around = (here, package)
+    around = (spot, package)
     for key, parts, facts in groups:
-        for inside, part in parts.items():
-            spot = Spot(
-                package.contract, (*place, key, inside), part, inside, package.package, name, around
-            )
-            yield spot, facts
-    yield here, AFTERWARDS
+        for inner, part in parts.items():
+            inside = (*place, key, inner)
+            yield Spot(contract, inside, part, inner, package.package, name, around), facts
+    yield spot, AFTERWARDS

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from grader.assignment.contract.model import Connection, Contract, Declared, Program
-from grader.assignment.contract.standard import ANY, period_of, rate_words
+from grader.assignment.contract.spot import ANY, period_of, rate_words
 from grader.assignment.model import Assignment
 from grader.findings.fields import each_field, wanted_words
 from grader.findings.words import code, codes, listing, value_text
