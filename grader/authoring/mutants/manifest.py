@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 from grader.diagnosis.not_generated import InterfaceName, used_packages
 from grader.recording.submission import Definition
@@ -24,6 +25,9 @@ CMAKE = "CMakeLists.txt"
 _CLIENT_LIBRARIES = ("rclpy", "rclcpp")
 _GENERATE = "rosidl_generate_interfaces"
 _COMMENT = re.compile("<!--.*?-->", re.DOTALL)
+_INTERFACES = re.compile(r"\.(msg|srv|action)$")
+_NOTHING = "(?!)"
+"""A pattern that occurs nowhere."""
 _HEADER = re.compile(r"(#include\s*[<\"]\w+/(?:msg|srv|action)/)(\w+)(?=\.hpp)")
 
 
@@ -82,22 +86,22 @@ class PackageFiles:
         """The names in the definition that no other file has."""
         if "/" not in self.about:
             return []
-        words = {path: {*re.findall(r"\w+", text)} for path, text in self.texts.items()}
-        own = words.pop(f"{self.folder}{self.definition}", set())
-        return sorted(own.difference(*words.values()))
+        names = {path: {*re.findall(r"\w+", text)} for path, text in self.texts.items()}
+        in_definition = names.pop(f"{self.folder}{self.definition}", set())
+        return sorted(in_definition.difference(*names.values()))
 
     @property
     def sources(self) -> list[str]:
         """The source files of its programs and libraries, by path in the reference."""
-        inside = [one for one in self.texts if one.startswith(self.folder)]
-        found = [one for one in inside if one.endswith((".py", ".cpp", ".hpp"))]
         left_out = tuple(f"{self.folder}{name}/" for name in ("launch", "test"))
         return [
-            one
-            for one in found
-            if "/" in one.removeprefix(self.folder)
-            and not one.startswith(left_out)
-            and not one.endswith("__init__.py")
+            path
+            for path in self.texts
+            if path.startswith(self.folder)
+            and path.endswith((".py", ".cpp", ".hpp"))
+            and "/" in path.removeprefix(self.folder)
+            and not path.startswith(left_out)
+            and not path.endswith("__init__.py")
         ]
 
 
@@ -118,13 +122,14 @@ class Edit(Model):
             file = package.definition
         if not self.find:
             return package.deleted(file)
-        find = self.find
-        used = package.used
+        find, by, used = self.find, self.by, package.used
         for word, names in (("<first>", used[:1]), ("<used>", used), ("<unused>", package.unused)):
-            find = find.replace(word, "|".join(map(re.escape, names)) or "(?!)")
-        by = self.by.replace("<misspelt>", misspelt(used[0])) if used else self.by
-        place = re.compile(find, re.MULTILINE)
-        return package.edited(file, lambda text: place.sub(by, text, count=int(self.once)))
+            find = find.replace(word, "|".join(map(re.escape, names)) or _NOTHING)
+        if used:
+            by = by.replace("<misspelt>", misspelt(used[0]))
+        pattern = re.compile(find, re.MULTILINE)
+        count = 1 if self.once else 0
+        return package.edited(file, lambda text: pattern.sub(by, text, count=count))
 
 
 class Table(Model):
@@ -133,20 +138,29 @@ class Table(Model):
     edits: dict[str, Edit]
 
 
-Change = Callable[[PackageFiles], Files]
+Make = Callable[[PackageFiles], Files]
+
+
+class Change(NamedTuple):
+    """What makes a mutant, with its id and its title, and the checks that fail by it."""
+
+    id: str
+    title: str
+    checks: tuple[str, ...]
+    make: Make
+
+
 EDITS = read_source(Path(__file__).with_name("edits.yaml")).read(Table).edits
-CHANGES: list[tuple[str, str, tuple[str, ...], Change]] = [
-    (name, one.title, one.checks, one.made) for name, one in EDITS.items()
-]
-"""Id and title of each mutant, the checks that fail by it, and what makes it."""
+CHANGES = [Change(name, edit.title, edit.checks, edit.made) for name, edit in EDITS.items()]
+"""Those of the table, then those of the functions below."""
 
 
-def breaks(check: str) -> Callable[[Change], Change]:
+def breaks(check: str) -> Callable[[Make], Make]:
     """The function is a mutant's, by which a check of the catalogue fails."""
 
-    def added(make: Change) -> Change:
+    def added(make: Make) -> Make:
         title = (make.__doc__ or "").removesuffix(".")
-        CHANGES.append((make.__name__, title, (check,), make))
+        CHANGES.append(Change(make.__name__, title, (check,), make))
         return make
 
     return added
@@ -185,6 +199,7 @@ def package_misnamed(package: PackageFiles) -> Files:
     cmake = package.edited(CMAKE, lambda text: project.sub(rf"\1{other}", text))
     if cmake:
         return {**changed, **cmake}
+    # A package of Python names itself in setup.py and by an empty file too.
     marker = f"resource/{name}"
     changed |= package.edited("setup.py", lambda text: _renamed_setup(text, name))
     changed[f"{package.folder}resource/{other}"] = package.text(marker)
@@ -211,9 +226,10 @@ def executable_misnamed(package: PackageFiles) -> Files:
     name, other = package.about, misspelt(package.about)
     line = f"set_target_properties({name} PROPERTIES OUTPUT_NAME {other})\n"
     end = re.compile(r"^ament_package\s*\(", re.MULTILINE)
-    return package.edited(CMAKE, lambda text: end.sub(rf"{line}\g<0>", text)) or _entry_point(
-        package, lambda text: repr(text.replace(name, other, 1))
-    )
+    in_cmake = package.edited(CMAKE, lambda text: end.sub(rf"{line}\g<0>", text))
+    if in_cmake:
+        return in_cmake
+    return _entry_point(package, lambda text: repr(text.replace(name, other, 1)))
 
 
 @breaks("package.executable")
@@ -226,14 +242,13 @@ def entry_point_to_nothing(package: PackageFiles) -> Files:
 def import_misspelt(package: PackageFiles) -> Files:
     """The program imports a message by a name that does not exist."""
     for path in _modules(package):
-        for node in ast.walk(ast.parse(package.texts[path])):
-            if isinstance(node, ast.ImportFrom) and re.search(
-                r"\.(msg|srv|action)$", node.module or ""
-            ):
+        text = package.texts[path]
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.ImportFrom) and _INTERFACES.search(node.module or ""):
                 first = node.names[0]
                 # What uses it stays as it is.
                 other = f"{misspelt(first.name)} as {first.asname or first.name}"
-                return {path: _replaced(package.texts[path], first, other)}
+                return {path: _replaced(text, first, other)}
     return {}
 
 
@@ -253,8 +268,9 @@ def definition_in_lower_case(package: PackageFiles) -> Files:
 def interface_not_listed(package: PackageFiles) -> Files:
     """CMakeLists.txt generates another interface only."""
     other = _redefined(package, package.definition.replace("/", "/Other"))
-    kept = {f"{package.folder}{package.definition}": package.text(package.definition)}
-    return other | kept if other else {}
+    if not other:
+        return {}
+    return {**other, f"{package.folder}{package.definition}": package.text(package.definition)}
 
 
 @breaks("interface.manifest")
@@ -302,8 +318,9 @@ def never_initialised(package: PackageFiles) -> Files:
     for command in read_commands(package.text(CMAKE)):
         if command.name == "add_executable" and command.arguments[:1] == (package.about,):
             for path in command.arguments[1:]:
-                if found := package.edited(path, lambda text: call.sub("", text)):
-                    return found
+                without_call = package.edited(path, lambda text: call.sub("", text))
+                if without_call:
+                    return without_call
     return {}
 
 
@@ -343,13 +360,14 @@ def _entry_point(package: PackageFiles, change: Callable[[str], str]) -> Files:
 
 def _modules(package: PackageFiles) -> Iterator[str]:
     """The modules of a program: that of its entry point, then those that it names."""
-    entry = re.compile(rf"\s*{re.escape(package.about)}\s*=\s*([\w.]+)")
+    entry_point = re.compile(rf"\s*{re.escape(package.about)}\s*=\s*([\w.]+)")
     for _, value in _texts(ast.parse(package.text("setup.py"))):
-        if found := entry.match(value):
-            main = f"{package.folder}{found[1].replace('.', '/')}.py"
-            words = {*re.findall(r"\w+", package.texts.get(main, ""))}
-            yield from (one for one in package.sources if one == main)
-            yield from (one for one in package.sources if one != main and Path(one).stem in words)
+        match = entry_point.match(value)
+        if match:
+            main = f"{package.folder}{match[1].replace('.', '/')}.py"
+            names = {*re.findall(r"\w+", package.texts.get(main, ""))}
+            others = [path for path in package.sources if path != main and Path(path).stem in names]
+            yield from [main, *others] if main in package.sources else others
 
 
 def _setup_call(tree: ast.AST) -> ast.Call | None:
@@ -360,16 +378,21 @@ def _setup_call(tree: ast.AST) -> ast.Call | None:
 
 
 def _renamed_setup(text: str, name: str) -> str:
-    """setup.py with another name of the package; its modules keep theirs."""
+    """setup.py with another name of the package; its modules keep theirs.
+
+    One text is replaced at a time, and the rest after that: the places of the others move by it.
+    """
     tree = ast.parse(text)
     call = _setup_call(tree)
-    given = [one.value for one in call.keywords if one.arg == "packages"] if call else []
-    modules = [*ast.walk(given[0])] if given else []
-    for node in modules:
-        if isinstance(node, ast.Name) and not isinstance(given[0], ast.Call):
+    packages = [one.value for one in call.keywords if one.arg == "packages"] if call else []
+    in_packages = [*ast.walk(packages[0])] if packages else []
+    for node in in_packages:
+        # A variable with the name, such as [package_name]; find_packages(...) may stay.
+        if isinstance(node, ast.Name) and not isinstance(packages[0], ast.Call):
             return _renamed_setup(_replaced(text, node, repr(name)), name)
-    for node, value in _texts(tree):
+    for constant, value in _texts(tree):
         begin = value.removesuffix(name)
-        if node not in modules and value != begin and begin in ("", "resource/", "share/"):
-            return _renamed_setup(_replaced(text, node, repr(begin + misspelt(name))), name)
+        is_name = value != begin and begin in ("", "resource/", "share/")
+        if is_name and constant not in in_packages:
+            return _renamed_setup(_replaced(text, constant, repr(begin + misspelt(name))), name)
     return text
