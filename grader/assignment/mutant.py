@@ -135,10 +135,12 @@ class Edits(_Place):
 
     def every_edit(self, file: str | None = None) -> Iterator[tuple[Place, Edit]]:
         """Its edits, and where they stand in it; those that name no file are in the given one."""
-        one = self.model_dump(include={"file", "count", "replace"}) | {"with": self.with_}
-        single = [((), Edit.model_validate(one))] if self.replace is not None else []
-        listed = [(("edits", index), edit) for index, edit in enumerate(self.edits)]
-        for place, edit in (*single, *listed):
+        placed: list[tuple[Place, Edit]] = []
+        if self.replace is not None:
+            single = self.model_dump(include={"file", "count", "replace"}) | {"with": self.with_}
+            placed.append(((), Edit.model_validate(single)))
+        placed += [(("edits", index), edit) for index, edit in enumerate(self.edits)]
+        for place, edit in placed:
             yield place, edit.model_copy(update={"file": edit.file or self.file or file})
 
 
@@ -206,43 +208,60 @@ def mutate(
     Args:
         file: Where edits are that name no file.
     """
-    result = dict(files)
-    problems = list(_apply(change, result, file))
-    if not problems and result == dict(files):
+    changed = dict(files)
+    problems = [
+        *_replace_texts(change, changed, file),
+        *_write_files(change, changed),
+        *_move_files(change, changed),
+        *_edit_bag(change, changed),
+    ]
+    if not problems and changed == dict(files):
         problems.append(((), "changes nothing"))
-    return result, problems
+    return changed, problems
 
 
-def _apply(change: Edits, files: dict[str, bytes], file: str | None) -> Iterator[tuple[Place, str]]:
+def _replace_texts(
+    change: Edits, files: dict[str, bytes], file: str | None
+) -> Iterator[tuple[Place, str]]:
     for place, edit in change.every_edit(file):
         old, new = edit.replace.encode(), edit.with_.encode()
-        found = files.get(edit.file or "", b"").count(old)
         if edit.file is None:
             yield place, "says no `file`, and there is none for all edits"
         elif edit.file not in files:
             yield (*place, "file"), f"the reference has no file {edit.file!r}"
-        elif found != edit.count:
-            text = f"the text occurs {found} times in {edit.file}, not {edit.count}"
+        elif files[edit.file].count(old) != edit.count:
+            times = files[edit.file].count(old)
+            text = f"the text occurs {times} times in {edit.file}, not {edit.count}"
             yield (*place, "replace"), text
         else:
             files[edit.file] = files[edit.file].replace(old, new)
+
+
+def _write_files(change: Edits, files: dict[str, bytes]) -> Iterator[tuple[Place, str]]:
     for name, content in change.files.items():
         if content is not None:
             files[name] = content.encode()
         elif not _take(name, files):
             yield ("files", name), f"nothing to delete: the reference has no {name!r}"
+
+
+def _move_files(change: Edits, files: dict[str, bytes]) -> Iterator[tuple[Place, str]]:
     for source, target in change.move.items():
         moved = _take(source, files)
         if not moved:
             yield ("move", source), f"nothing to move: the reference has no {source!r}"
-        files.update({target + path.removeprefix(source): moved[path] for path in moved})
-    if change.bag is not None:
-        bag = _take(change.bag.folder, files)
-        if not bag:
-            text = f"the reference has no folder {change.bag.folder!r}"
-            yield ("bag", "folder"), text
-        else:
-            files.update(_edited_bag(change.bag, bag))
+        for path, content in moved.items():
+            files[target + path.removeprefix(source)] = content
+
+
+def _edit_bag(change: Edits, files: dict[str, bytes]) -> Iterator[tuple[Place, str]]:
+    if change.bag is None:
+        return
+    bag = _take(change.bag.folder, files)
+    if bag:
+        files.update(_edited_bag(change.bag, bag))
+    else:
+        yield ("bag", "folder"), f"the reference has no folder {change.bag.folder!r}"
 
 
 def _edited_bag(edit: BagEdit, files: Mapping[str, bytes]) -> dict[str, bytes]:
@@ -254,18 +273,18 @@ def _edited_bag(edit: BagEdit, files: Mapping[str, bytes]) -> dict[str, bytes]:
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_bytes(content)
         messages, definitions = read_bag(before / edit.folder)
-        begin_ns = min(one.recorded_ns for one in messages)
+        begin_ns = min(message.recorded_ns for message in messages)
         first_ns = begin_ns + (edit.since or 0.0) * NS
         last_ns = math.inf if edit.until is None else begin_ns + edit.until * NS
-        numbers: Counter[str] = Counter()
+        counts: Counter[str] = Counter()
         kept = []
-        for one in messages:
-            name = one.channel.name
-            numbers[name] += 1
-            is_skipped = name in edit.without or numbers[name] % edit.every.get(name, 1)
-            if first_ns <= one.recorded_ns <= last_ns and not is_skipped:
-                channel = replace(one.channel, name=edit.rename.get(name, name))
-                kept.append(replace(one, channel=channel))
+        for message in messages:
+            topic = message.channel.name
+            counts[topic] += 1
+            is_skipped = topic in edit.without or counts[topic] % edit.every.get(topic, 1) != 0
+            if first_ns <= message.recorded_ns <= last_ns and not is_skipped:
+                channel = replace(message.channel, name=edit.rename.get(topic, topic))
+                kept.append(replace(message, channel=channel))
         (after / edit.folder).parent.mkdir(parents=True, exist_ok=True)
         write_bag(after / edit.folder, kept, definitions, edit.storage)
         return read_files(after)
@@ -291,21 +310,23 @@ def expected_statuses(
     requires = {spec.id: spec.requires for spec in assignment.checks}
     statuses = {}
     for check in requires:
-        status = Status.FAILED if check in lost else Status.PASSED
-        statuses[check] = Status.SKIPPED if required_by(check, requires) & stopping else status
+        if required_by(check, requires) & stopping:
+            statuses[check] = Status.SKIPPED
+        else:
+            statuses[check] = Status.FAILED if check in lost else Status.PASSED
     return statuses
 
 
 def required_by(check: str, requires: Mapping[str, tuple[str, ...]]) -> set[str]:
     """Everything that a check requires, directly or not; without itself."""
-    found: set[str] = set()
+    required: set[str] = set()
     waiting = list(requires.get(check, ()))
     while waiting:
         name = waiting.pop()
-        if name not in found:
-            found.add(name)
+        if name not in required:
+            required.add(name)
             waiting.extend(requires.get(name, ()))
-    return found - {check}
+    return required - {check}
 
 
 def deviations(expected: Mapping[str, Status], actual: Mapping[str, Status]) -> dict[str, str]:
@@ -335,15 +356,16 @@ class Mutants:
 
 def reference_of(assignment: str, folder: Path | None = None, language: Language = PYTHON) -> Path:
     """The folder of an assignment's reference solution: beside it, or rosgrade's own."""
-    own = resources.reference() / language.own / assignment
-    places = [folder / language.reference, own] if folder is not None else [own]
+    places = [resources.reference() / language.own / assignment]
+    if folder is not None:
+        places.insert(0, folder / language.reference)
     for place in places:
         if place.is_dir():
             return place
     listed = " or ".join(map(str, places))
     is_own = folder is None or folder.is_relative_to(resources.root())
-    lacking = is_own and not resources.reference().is_dir()
-    advice = "; install rosgrade-solutions" if lacking else ""
+    lacks_solutions = is_own and not resources.reference().is_dir()
+    advice = "; install rosgrade-solutions" if lacks_solutions else ""
     raise UsageError(f"the assignment {assignment!r} has no reference solution: {listed}{advice}")
 
 
@@ -358,37 +380,39 @@ def load_mutants(
     Those of one language may stand in both files. Where standard mutants follow from a contract,
     there need be no file.
     """
-    reference = reference_of(assignment.id, folder, language) if reference is None else reference
+    if reference is None:
+        reference = reference_of(assignment.id, folder, language)
     files = read_files(reference)
-    file = folder / language.mutants
-    found = Mutants(file, reference, (), (), {})
+    loaded = Mutants(folder / language.mutants, reference, (), (), {})
     for written in dict.fromkeys((PYTHON, language)):
         if (folder / written.mutants).exists():
-            more = _read_mutants(folder, written, language, assignment, files)
-            twice = {one.id for one in _changes(found)} & {one.id for one in _changes(more)}
-            if twice:
-                text = f"{', '.join(sorted(twice))} stands in {PYTHON.mutants} as well"
-                raise AssignmentError(more.file, [Problem(text)])
-            found = replace(
-                found,
-                file=more.file,
-                mutants=found.mutants + more.mutants,
-                variants=found.variants + more.variants,
-                derived={**found.derived, **more.derived},
-            )
-    if not (found.mutants or has_standard_mutants(assignment)):
-        source = read_source(file)
-        raise AssignmentError(file, [source.problem(("mutants",), "there is no mutant")])
-    return found
+            loaded = _joined(loaded, _read_mutants(folder, written, language, assignment, files))
+    if not loaded.mutants and not has_standard_mutants(assignment):
+        source = read_source(folder / language.mutants)
+        problem = source.problem(("mutants",), "there is no mutant")
+        raise AssignmentError(source.file, [problem])
+    return loaded
+
+
+def _joined(first: Mutants, second: Mutants) -> Mutants:
+    """The mutants of both files; an id that stands in both is an error."""
+    ids = {change.id for change in (*first.mutants, *first.variants)}
+    twice = ids & {change.id for change in (*second.mutants, *second.variants)}
+    if twice:
+        text = f"{', '.join(sorted(twice))} stands in {PYTHON.mutants} as well"
+        raise AssignmentError(second.file, [Problem(text)])
+    return replace(
+        first,
+        file=second.file,
+        mutants=first.mutants + second.mutants,
+        variants=first.variants + second.variants,
+        derived={**first.derived, **second.derived},
+    )
 
 
 def has_standard_mutants(assignment: Assignment) -> bool:
     """Whether mutants follow from the assignment."""
     return assignment.contract is not None
-
-
-def _changes(mutants: Mutants) -> tuple[Change, ...]:
-    return (*mutants.mutants, *mutants.variants)
 
 
 def _read_mutants(
@@ -401,51 +425,55 @@ def _read_mutants(
     """What one file has for a language; ``written`` is the language of the file itself."""
     source = read_source(folder / written.mutants)
     content = source.read(MutantFile)
+    default_file = getattr(content.file, language.key)
     problems = [*source.duplicates("id", "mutants", "variants")]
     problems += _losses(source, content, assignment)
-    kept: dict[str, list[Any]] = {"mutants": [], "variants": []}
-    for key, changes in (("mutants", content.mutants), ("variants", content.variants)):
-        for index, change in enumerate(changes):
-            edits, inner = _edits_of(change, language, is_own=written is language)
+    changes: dict[str, list[Any]] = {"mutants": [], "variants": []}
+    for key, entries in (("mutants", content.mutants), ("variants", content.variants)):
+        for index, entry in enumerate(entries):
+            edits, inside = _edits_of(entry, language, is_own=written is language)
             if edits is None:
                 continue
-            if edits is not change and written is language and change.has_edits:
+            place: Place = (key, index, *inside)
+            if edits is not entry and written is language and entry.has_edits:
                 text = f"has edits of its own and under {language.key!r}: write them in one place"
                 problems.append(source.problem((key, index), text))
-            named = getattr(content.file, language.key)
-            _, found = mutate(edits, files, named)
-            problems += [
-                source.problem((key, index, *inner, *inside), text) for inside, text in found
-            ]
-            every = tuple(edit for _, edit in edits.every_edit(named))
-            made = {"edits": every, "replace": None}
-            made |= {key: getattr(edits, key) for key in ("files", "move", "bag")}
-            kept[key].append(change.model_copy(update=made))
+            _, misfits = mutate(edits, files, default_file)
+            problems += [source.problem((*place, *below), text) for below, text in misfits]
+            changes[key].append(_with_edits(entry, edits, default_file))
     if problems:
         raise AssignmentError(source.file, in_order(problems))
-    return Mutants(
-        source.file, Path(), tuple(kept["mutants"]), tuple(kept["variants"]), content.derived
-    )
+    mutants, variants = map(tuple, changes.values())
+    return Mutants(source.file, Path(), mutants, variants, content.derived)
 
 
 def _edits_of(
     change: Change, language: Language, *, is_own: bool
 ) -> tuple[Edits | None, tuple[str, ...]]:
     """What a change is in a language, and where that stands in it; None if it is none there."""
-    own = getattr(change, language.key)
-    if own is not None:
-        return own, (language.key,)
+    edits = getattr(change, language.key)
+    if edits is not None:
+        return edits, (language.key,)
     is_of_other = change.python is not None or change.cpp is not None
-    return (change if is_own and (change.has_edits or not is_of_other) else None), ()
+    # Where nothing is changed at all, that is a problem of the file's own language.
+    if is_own and (change.has_edits or not is_of_other):
+        return change, ()
+    return None, ()
+
+
+def _with_edits(change: Change, edits: Edits, default_file: str | None) -> Change:
+    """The change as it is in one language, each of its edits with its file."""
+    listed = tuple(edit for _, edit in edits.every_edit(default_file))
+    others = {key: getattr(edits, key) for key in ("files", "move", "bag")}
+    return change.model_copy(update={"edits": listed, "replace": None, **others})
 
 
 def apply(change: Change, reference: Path, target: Path) -> None:
     """Write a changed copy of the reference into an empty folder."""
-    files, found = mutate(change, read_files(reference))
-    if found:
-        raise AssignmentError(
-            reference, [Problem(f"{change.id!r} does not apply: {text}") for _, text in found]
-        )
+    files, misfits = mutate(change, read_files(reference))
+    if misfits:
+        problems = [Problem(f"{change.id!r} does not apply: {text}") for _, text in misfits]
+        raise AssignmentError(reference, problems)
     for name, content in files.items():
         file = target / name
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -463,21 +491,19 @@ def read_files(folder: Path) -> dict[str, bytes]:
 
 def _losses(source: Source, content: MutantFile, assignment: Assignment) -> Iterator[Problem]:
     requires = {spec.id: spec.requires for spec in assignment.checks}
-    named: list[tuple[Place, tuple[str, ...]]] = [
-        (("mutants", index, "loses"), mutant.loses) for index, mutant in enumerate(content.mutants)
-    ]
-    named += [
-        (("derived", name, "loses"), given.loses)
-        for name, given in content.derived.items()
-        if given
-    ]
-    for inside, loses in named:
-        for number, lost in enumerate(loses):
-            place = (*inside, number)
-            if lost not in requires:
-                advice = nearest_or_all(lost, requires, "The checks are")
-                yield source.problem(place, f"there is no check {lost!r}.{advice}")
-            above = sorted(required_by(lost, requires) & set(loses))
+    losses: dict[Place, tuple[str, ...]] = {
+        ("mutants", index, "loses"): mutant.loses for index, mutant in enumerate(content.mutants)
+    }
+    for name, derived in content.derived.items():
+        if derived:
+            losses["derived", name, "loses"] = derived.loses
+    for place, checks in losses.items():
+        for number, check in enumerate(checks):
+            if check not in requires:
+                advice = nearest_or_all(check, requires, "The checks are")
+                text = f"there is no check {check!r}.{advice}"
+                yield source.problem((*place, number), text)
+            above = sorted(required_by(check, requires) & set(checks))
             if above:
-                text = f"{lost!r} requires {above[0]!r}, so it is skipped: leave it out"
-                yield source.problem(place, text)
+                text = f"{check!r} requires {above[0]!r}, so it is skipped: leave it out"
+                yield source.problem((*place, number), text)

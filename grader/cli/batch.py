@@ -22,6 +22,7 @@ from grader.batch.intake import collect, collect_roster
 from grader.batch.ledger import Ledger, TakenFrom
 from grader.batch.roster import read_roster
 from grader.batch.used_assignment import in_use, load_used
+from grader.batch.worker import Order, make_grading
 from grader.cli import NOT_GRADED
 from grader.cli.options import Quiet, SandboxChoice, Seed, assignment_argument, assignment_places
 from grader.cli.screen.console import output_console, say
@@ -107,10 +108,10 @@ def batch(
     named, loaded = loaded, in_use(Ledger(out), loaded)
     refuse_part(out, loaded.folder, f"the assignment in {loaded.folder}")
     rules = course_of(out, course, loaded.assignment.id)
-    order = executors.Order(str(loaded.folder.resolve()), loaded.sha256, seed, sandbox)
+    order = Order(str(loaded.folder.resolve()), loaded.sha256, seed, sandbox)
     admission = Admission(cells=at_once)
     # Before anything is read or written: without a sandbox there is no batch.
-    grading = executors.make_grading(order, loaded, admission) if scheduler is None else None
+    grading = make_grading(order, loaded, admission) if scheduler is None else None
     began_s = time.monotonic()
     with Scratch("batch") as staging, Progress(quiet).shown() as progress:
         if grading is not None and not quiet:

@@ -20,11 +20,10 @@ from grader.batch.executor import (
     DaskExecutor,
     ExecutorLost,
     LocalExecutor,
-    Order,
-    make_grading,
 )
 from grader.batch.intake import collect
 from grader.batch.ledger import Ledger
+from grader.batch.worker import Order, make_grading
 from grader.errors import UsageError
 from grader.machine import resources
 from grader.report.model.result import grade_json

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.batch.executor import Parcel, unpack
+from grader.batch.worker import Parcel, unpack
 from grader.errors import GraderFault
 from grader.submission.prepare import fingerprint
 
