@@ -27,18 +27,19 @@ _GIT_LIMIT_S = 20.0
 
 def timed(rows: Sequence[Collected], staging: Path) -> list[Collected]:
     """Rows with their times: the roster is asked first, then platform and names, then git."""
-    found = []
-    for given in rows:
-        row = given
-        text = next((row.columns[name] for name in _COLUMNS if row.columns.get(name)), "")
+    return [_timed(row, staging) for row in rows]
+
+
+def _timed(row: Collected, staging: Path) -> Collected:
+    text = next((row.columns[name] for name in _COLUMNS if row.columns.get(name)), "")
+    if text:
         try:
-            row = row.at((_iso(text), "the roster")) if text else row
+            row = row.at((_iso(text), "the roster"))
         except ValueError as error:
             row = row.with_problem(f"when it was handed in is not known: {error}")
-        if row.path is not None and not row.handed_in:
-            row = row.at(_of_commit(row.path, staging / "committed"))
-        found.append(row)
-    return found
+    if row.path is not None and not row.handed_in:
+        row = row.at(_of_commit(row.path, staging / "committed"))
+    return row
 
 
 def of_metadata(about: Mapping[str, Any]) -> tuple[str, str]:
@@ -56,19 +57,21 @@ def of_canvas(
     ``beside`` is the folder around an archive, where files of anything else may lie too.
     """
     times: dict[str, tuple[str, str]] = {}
-    folders = filter(None, (folder, beside))
-    for file in (one for place in folders for one in sorted(place.glob(CANVAS_TIMES))):
+    folders = [folder] if beside is None else [folder, beside]
+    for file in (file for place in folders for file in sorted(place.glob(CANVAS_TIMES))):
         try:
-            told = [one for one in json.loads(file.read_bytes()) if one.get("submitted_at")]
-            times |= {
-                str(one["user_id"]): (_iso(str(one["submitted_at"])), "Canvas") for one in told
-            }
+            times |= _read_canvas(file)
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             why = "is no list of submissions of Canvas"
             if file.parent != beside:
                 raise UsageError(f"{file}: {why}: {error!r}") from error
             on_left_out(f"{shown(file.name)} {why}, so it is left out")
     return times
+
+
+def _read_canvas(file: Path) -> dict[str, tuple[str, str]]:
+    submissions = [one for one in json.loads(file.read_bytes()) if one.get("submitted_at")]
+    return {str(one["user_id"]): (_iso(str(one["submitted_at"])), "Canvas") for one in submissions}
 
 
 def of_name(name: str) -> tuple[str, str]:

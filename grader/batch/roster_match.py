@@ -35,31 +35,35 @@ class _Names:
         It is the beginning that most of the names share. If they share several, it is the only one
         that logins of the roster follow, in two names at least.
         """
-        hyphens = ((stem, at) for stem in stems for at, sign in enumerate(stem) if sign == "-")
-        shared = Counter(stem[: at + 1] for stem, at in hyphens)
-        most = max(shared.values(), default=0)
+        stems_with: Counter[str] = Counter()
+        for stem in stems:
+            hyphens = [at for at, character in enumerate(stem) if character == "-"]
+            stems_with.update(stem[: at + 1] for at in hyphens)
+        most = max(stems_with.values(), default=0)
         if most <= max(1, len(stems) / 2):
             return ""
-        known = {
-            prefix: sum(bool(self._login_behind(prefix, stem)) for stem in stems)
-            for prefix, count in shared.items()
+        logins_behind = {
+            prefix: len([stem for stem in stems if self._login_behind(prefix, stem)])
+            for prefix, count in stems_with.items()
             if count == most
         }
-        fitting = [prefix for prefix, count in known.items() if count]
-        is_sure = len(fitting) == 1 and (len(known) == 1 or known[fitting[0]] > 1)
+        fitting = [prefix for prefix, count in logins_behind.items() if count]
+        if len(fitting) != 1:
+            return ""
+        is_sure = len(logins_behind) == 1 or logins_behind[fitting[0]] > 1
         return fitting[0] if is_sure else ""
 
     def exact(self, entry: Collected) -> set[str]:
         """Students with exactly its names; several where two of its names contradict each other."""
         keys: set[str] = set()
         for name in entry.names:
-            found = {
+            of_name = {
                 student.key
                 for form in name_forms(name)
                 for student in self._alike.get(resemblance(form), ())
-                if comparable_name(form) in student.logins or comparable_name(form) in student.names
+                if comparable_name(form) in student.logins | student.names
             }
-            keys = keys & found or keys | found
+            keys = (keys & of_name) or (keys | of_name)
         return keys or self._login_behind(self._prefix, stem_of(entry.item))
 
     def alike(self, entry: Collected) -> set[str]:
@@ -82,45 +86,64 @@ def matched(entries: list[Collected], roster: Roster) -> list[Collected]:
     A name that is only similar is not matched; the rows of submission and student say so.
     """
     names = _Names(roster.students, entries)
-    named: dict[str, set[str]] = {}
+    stated = _stated(roster)
     students = {student.key: student for student in roster.students}
-    for student in roster.students:
-        if student.submission:
-            file = PurePosixPath(student.submission).name.removesuffix(".git")
-            named.setdefault(file, set()).add(student.key)
     rows: list[Collected] = []
-    handed: dict[str, list[tuple[int, str]]] = {}
+    # Key of a student -> which rows hold what the student handed in, and what else may be theirs.
+    indices: dict[str, list[int]] = {}
     doubtful: dict[str, list[str]] = {}
     for entry in entries:
         # What the roster says itself needs no guess, and a team may have handed in one for all.
-        stated = named.get(entry.item.name, set()) | named.get(stem_of(entry.item), set())
-        keys = stated or names.exact(entry)
-        if not stated and len(keys) != 1:
-            may_be = sorted(keys or names.alike(entry))
-            for key in may_be:
-                doubtful.setdefault(key, []).append(shown(entry.item.name))
-            why = "" if keys else "not in the roster"
-            theirs = f"may be {listing(may_be, 'or')}" if may_be else ""
-            rows.append(entry.with_problem(why, theirs))
+        keys = stated.get(entry.item.name, set()) | stated.get(stem_of(entry.item), set())
+        is_sure = bool(keys)
+        if not is_sure:
+            keys = names.exact(entry)
+            is_sure = len(keys) == 1
+        if is_sure:
+            for key in sorted(keys):
+                indices.setdefault(key, []).append(len(rows))
+                rows.append(entry.of(students[key]))
             continue
-        for key in sorted(keys):
-            handed.setdefault(key, []).append((len(rows), shown(entry.item.name)))
-            rows.append(entry.of(students[key]))
-    for key, found in handed.items():
-        for at, file in found if len(found) > 1 else ():
-            others = [other for _, other in found[:_MOST_TWICE] if other != file] or [file]
-            rows[at] = rows[at].with_problem(f"handed in twice: {listing(others)} too")
-        for at, _ in found if key in doubtful else ():
-            rows[at] = rows[at].with_problem(f"{listing(doubtful[key])} may be theirs too")
-    for student in roster.students:
-        if student.key not in handed:
-            why = NOTHING
-            if student.submission:
-                why += f": {shown(student.submission)} is not among the submissions"
-            other = doubtful.get(student.key)
-            theirs = f"{listing(other)} may be theirs" if other else ""
-            rows.append(Collected("").with_problem(why, theirs).of(student))
+        candidates = sorted(keys or names.alike(entry))
+        for key in candidates:
+            doubtful.setdefault(key, []).append(shown(entry.item.name))
+        why = "" if keys else "not in the roster"
+        may_be = f"may be {listing(candidates, 'or')}" if candidates else ""
+        rows.append(entry.with_problem(why, may_be))
+    for key, of_student in indices.items():
+        _note_others(rows, of_student, doubtful.get(key, []))
+    absent = (student for student in roster.students if student.key not in indices)
+    rows += [_row_of_absent(student, doubtful.get(student.key, [])) for student in absent]
     return rows
+
+
+def _stated(roster: Roster) -> dict[str, set[str]]:
+    """Names of files that the roster itself says -> keys of the students that it says them of."""
+    keys: dict[str, set[str]] = {}
+    for student in roster.students:
+        if student.submission:
+            file = PurePosixPath(student.submission).name.removesuffix(".git")
+            keys.setdefault(file, set()).add(student.key)
+    return keys
+
+
+def _note_others(rows: list[Collected], indices: list[int], doubtful: list[str]) -> None:
+    """Note on the rows of a student what else may be of that student."""
+    files = [shown(rows[index].item.name) for index in indices]
+    for index, file in zip(indices, files, strict=True):
+        if len(files) > 1:
+            others = [other for other in files[:_MOST_TWICE] if other != file] or [file]
+            rows[index] = rows[index].with_problem(f"handed in twice: {listing(others)} too")
+        if doubtful:
+            rows[index] = rows[index].with_problem(f"{listing(doubtful)} may be theirs too")
+
+
+def _row_of_absent(student: Student, doubtful: list[str]) -> Collected:
+    why = NOTHING
+    if student.submission:
+        why += f": {shown(student.submission)} is not among the submissions"
+    may_be = f"{listing(doubtful)} may be theirs" if doubtful else ""
+    return Collected("").with_problem(why, may_be).of(student)
 
 
 def unique(rows: list[Collected]) -> list[Collected]:
@@ -128,12 +151,12 @@ def unique(rows: list[Collected]) -> list[Collected]:
     # A browser numbers what it saves in the same way, so `ana (2)` may be there as well.
     taken = {row.key for row in rows}
     counts: dict[str, int] = {}
-    found = []
-    for row in sorted(rows, key=lambda item: item.key):
+    numbered = []
+    for row in sorted(rows, key=lambda row: row.key):
         key, number = row.key, counts.get(row.key, 0) + 1
         while number > 1 and (key := f"{row.key} ({number})") in taken:
             number += 1
         counts[row.key] = number
         taken.add(key)
-        found.append(replace(row, key=key))
-    return found
+        numbered.append(replace(row, key=key))
+    return numbered

@@ -11,7 +11,7 @@ from datetime import datetime, timedelta
 
 from grader.course.instant import later, read_time, shown_length, shown_time, utc
 from grader.course.load import Rules
-from grader.course.model import Attempts, points_of
+from grader.course.model import Attempts, Late, points_of
 from grader.grade.model import total
 from grader.report.model.result_model import AdjustmentPart, Result
 
@@ -48,11 +48,11 @@ class HandInTime:
             return None, f"handed in {shown_time(moment)} by {self.source}, so {_ADVICE}"
         # In the student's favour: a due time of 23:59 lasts until this minute ends.
         moment = moment.astimezone(rules.due.tzinfo).replace(second=0, microsecond=0)
-        said = f"handed in {shown_time(moment)} by {self.source}"
+        when = f"handed in {shown_time(moment)} by {self.source}"
         if self.graded and utc(moment) > utc(read_time(self.graded)):
-            return None, f"{said}, but graded before that: a clock is wrong, so {_NOTHING}"
+            return None, f"{when}, but graded before that: a clock is wrong, so {_NOTHING}"
         if self.marked_late and utc(moment) <= utc(rules.due_of_all):
-            text = f"marked late by the platform, but {said}, before the due time"
+            text = f"marked late by the platform, but {when}, before the due time"
             return None, f"{text}: {_NOTHING}"
         return moment, ""
 
@@ -89,27 +89,36 @@ def lateness(handed: HandInTime, score: float, rules: Rules, max_score: float) -
     moment, note = handed.known(rules)
     if moment is None or utc(moment) <= utc(rules.due):
         return Lateness(note=note)
-    by, late = utc(moment) - utc(rules.due), rules.late
-    closed = rules.closes is not None and utc(moment) > utc(rules.closes)
-    points, words = score, f"the assignment closed at {shown_time(rules.closes or moment)}"
-    if not closed:
-        if late is None or by.total_seconds() <= late.grace:
-            return Lateness()
-        count = _begun(rules.due, moment, late.per)
-        most = max_score if late.at_most is None else points_of(late.at_most, max_score)
-        points = min(count * points_of(late.deduct, max_score), most, score)
-        is_share = isinstance(late.deduct, str)
-        each = f"{late.deduct} of {max_score:g}" if is_share else f"{late.deduct:g}"
-        limit = f", at most {late.at_most}" if late.at_most is not None else ""
-        words = f"{count} {late.per}{'s' * (count != 1)} × {each} points{limit}"
+    late_by = utc(moment) - utc(rules.due)
+    is_closed = rules.closes is not None and utc(moment) > utc(rules.closes)
+    if is_closed:
+        points, why = score, f"the assignment closed at {shown_time(rules.closes or moment)}"
+    elif rules.late is None or late_by.total_seconds() <= rules.late.grace:
+        return Lateness()
+    else:
+        units = _begun(rules.due, moment, rules.late.per)
+        points, why = _deduction(rules.late, units, max_score)
+        points = min(points, score)
     line = AdjustmentPart(
         kind="late",
-        title="Handed in after the end" if closed else f"Late by {shown_length(by)}",
+        title="Handed in after the end" if is_closed else f"Late by {shown_length(late_by)}",
         points=0.0 - points,
-        reason=f"handed in {shown_time(moment)} by {handed.source}, {shown_length(by)} after the "
-        f"due time {shown_time(rules.due)}; {words}",
+        reason=f"handed in {shown_time(moment)} by {handed.source}, {shown_length(late_by)} after "
+        f"the due time {shown_time(rules.due)}; {why}",
     )
-    return Lateness(points, line, closed=closed)
+    return Lateness(points, line, closed=is_closed)
+
+
+def _deduction(late: Late, units: int, max_score: float) -> tuple[float, str]:
+    """What so many days or hours of lateness cost, and how that is reckoned."""
+    points = units * points_of(late.deduct, max_score)
+    is_share = isinstance(late.deduct, str)
+    each = f"{late.deduct} of {max_score:g}" if is_share else f"{late.deduct:g}"
+    unit = late.per if units == 1 else f"{late.per}s"
+    words = f"{units} {unit} × {each} points"
+    if late.at_most is None:
+        return min(points, max_score), words
+    return min(points, points_of(late.at_most, max_score)), f"{words}, at most {late.at_most}"
 
 
 def _begun(due: datetime, moment: datetime, per: str) -> int:
@@ -149,42 +158,57 @@ def ruled(results: Sequence[Result], times: Sequence[HandInTime], rules: Rules) 
     last, current = len(results) - 1, results[-1]
     if current.score is None:
         return Ruled(last)
-    rule, most = rules.attempts or Attempts(), current.final_max_score
-    # What a person may still give could make an attempt the best one.
-    scores = [each.possible_score for each in results]
-    known = [each.known_score or 0.0 for each in results]
-    late = [lateness(*each, rules, most) for each in zip(times, known, strict=True)]
-    version = current.assignment.sha256
-    same = [
-        at
-        for at, each in enumerate(results)
-        if each.score is not None and each.assignment.sha256 == version
+    rule = rules.attempts or Attempts()
+    # A deduction takes no more than is there by now.
+    known_scores = [result.known_score or 0.0 for result in results]
+    late = [
+        lateness(time, score, rules, current.final_max_score)
+        for time, score in zip(times, known_scores, strict=True)
     ]
-    allowed = [at for at in same if rule.at_most is None or at < rule.at_most] or [last]
+    comparable = _comparable(results)
+    allowed = [at for at in comparable if rule.at_most is None or at < rule.at_most] or [last]
     allowed = [at for at in allowed if not late[at].closed] or allowed
     counts = allowed[-1]
     if rule.counts == "best":
-        counts = max(allowed, key=lambda at: (scores[at] - late[at].points, known[at], at))
+        # What a person may still give could make an attempt the best one.
+        possible = [
+            result.possible_score - one.points for result, one in zip(results, late, strict=True)
+        ]
+        counts = max(allowed, key=lambda at: (possible[at], known_scores[at], at))
     elif rule.counts == "last before the deadline":
         in_time = [at for at in allowed if not times[at].is_late(rules)]
         counts = (in_time or allowed)[-1]
-    lines = [late[counts].line]
-    if counts != last:
-        judged, of_last = (_judged(results[at]) for at in (counts, last))
-        line = AdjustmentPart(
-            kind="attempts",
-            title=f"Attempt {counts + 1} of {len(results)} counts ({rule.words})",
-            points=judged - of_last,
-            reason=f"it has {judged:g} of {current.max_score:g} points, the last attempt has "
-            f"{of_last:g}",
-        )
-        lines.insert(0, line)
-    notes = (late[counts].note, _NOT_COMPARED if rules.attempts and len(same) <= last else "")
-    return Ruled(
-        counts, tuple(line for line in lines if line is not None), tuple(filter(None, notes))
+    lines = [_line_of_attempt(results, counts, rule)] if counts != last else []
+    lines += [line for line in [late[counts].line] if line is not None]
+    notes = [late[counts].note] if late[counts].note else []
+    if rules.attempts is not None and len(comparable) < len(results):
+        notes.append(_NOT_COMPARED)
+    return Ruled(counts, tuple(lines), tuple(notes))
+
+
+def _comparable(results: Sequence[Result]) -> list[int]:
+    """Indices of the attempts with a grade by the same version of the assignment as the last."""
+    version = results[-1].assignment.sha256
+    return [
+        at
+        for at, result in enumerate(results)
+        if result.score is not None and result.assignment.sha256 == version
+    ]
+
+
+def _line_of_attempt(results: Sequence[Result], counts: int, rule: Attempts) -> AdjustmentPart:
+    """The line of the last attempt's report that says which other one counts."""
+    score, of_last = _judged_score(results[counts]), _judged_score(results[-1])
+    return AdjustmentPart(
+        kind="attempts",
+        title=f"Attempt {counts + 1} of {len(results)} counts ({rule.words})",
+        points=score - of_last,
+        reason=f"it has {score:g} of {results[-1].max_score:g} points, the last attempt has "
+        f"{of_last:g}",
     )
 
 
-def _judged(result: Result) -> float:
-    added = (one.points for one in result.adjustments if not one.is_of_counted)
+def _judged_score(result: Result) -> float:
+    """The score with what persons added to it, but not what is of the attempt that counts."""
+    added = [one.points for one in result.adjustments if not one.is_of_counted]
     return total(points for points in (result.score, *added) if points is not None)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from grader.assignment.model import Visibility
 from grader.course.instant import instant, later
-from grader.course.model import Attempts, CourseFile, Late
+from grader.course.model import Attempts, CourseFile, Extension, Late
 from grader.errors import AssignmentError, UsageError
 from grader.spec.document import Place
 from grader.spec.nearest_name import nearest_or_all
@@ -49,26 +49,26 @@ class Course:
         if assignment not in self.spec.assignments:
             nearest = nearest_or_all(assignment, self.spec.assignments)
             raise UsageError(f"{self.file}: has no assignment {assignment!r}.{nearest}")
-        one = self.spec.assignments[assignment]
-        due = due_of_all = self.instant(one.due)
-        for each in self.spec.extensions:
-            if (each.assignment, comparable_name(each.student)) == (
-                assignment,
-                comparable_name(student),
-            ):
-                if each.due:
-                    due = self.instant(each.due)
-                elif each.tokens and self.spec.tokens:
-                    due = later(due_of_all, each.tokens, self.spec.tokens.worth)
-                else:
-                    due = later(due_of_all, each.days or 0, "day")
+        own = self.spec.assignments[assignment]
+        due = due_of_all = self.instant(own.due)
+        for extension in self.spec.extensions:
+            named = (extension.assignment, comparable_name(extension.student))
+            if named == (assignment, comparable_name(student)):
+                due = self._extended(extension, due_of_all)
         return Rules(
             due=due,
             due_of_all=due_of_all,
-            closes=max(self.instant(one.closes), due) if one.closes else None,
-            late=one.late or self.spec.late,
-            attempts=one.attempts or self.spec.attempts,
+            closes=max(self.instant(own.closes), due) if own.closes else None,
+            late=own.late or self.spec.late,
+            attempts=own.attempts or self.spec.attempts,
         )
+
+    def _extended(self, extension: Extension, due_of_all: datetime) -> datetime:
+        if extension.due:
+            return self.instant(extension.due)
+        if extension.tokens and self.spec.tokens:
+            return later(due_of_all, extension.tokens, self.spec.tokens.worth)
+        return later(due_of_all, extension.days or 0, "day")
 
     def visible(self, assignment: str, now: datetime) -> frozenset[str]:
         """Which checks students may see at a time, by their visibility.
@@ -76,15 +76,17 @@ class Course:
         Those of ``after_due_date`` are shown when the due time has passed for all, also with an
         extension, and the assignment is closed.
         """
-        students = [one.student for one in self.spec.extensions if one.assignment == assignment]
-        rules = [self.rules(assignment, student) for student in ("", *students)]
-        shown = {Visibility.VISIBLE.value}
+        extensions = [one for one in self.spec.extensions if one.assignment == assignment]
+        rules = [self.rules(assignment)]
+        rules += [self.rules(assignment, extension.student) for extension in extensions]
+        visible = {Visibility.VISIBLE.value}
+        # The minute of the due time is still in time.
         if now >= max(one.closes or one.due for one in rules) + timedelta(minutes=1):
-            shown.add(Visibility.AFTER_DUE_DATE.value)
+            visible.add(Visibility.AFTER_DUE_DATE.value)
             published = self.spec.assignments[assignment].published
             if published and now >= self.instant(published):
-                shown.add(Visibility.AFTER_PUBLISHED.value)
-        return frozenset(shown)
+                visible.add(Visibility.AFTER_PUBLISHED.value)
+        return frozenset(visible)
 
     def instant(self, text: str) -> datetime:
         """The point in time that a text means in the course's time zone."""
@@ -100,23 +102,32 @@ def load_course(file: Path) -> Course:
     """Read the rules of a course; every mistake in them is named with its line."""
     source = read_source(file)
     course = Course(file, source.read(CourseFile))
-    found = [*_times(course)] or [*_contradictions(course)]
-    found += [*_groups(source, course.spec), *_extensions(source, course.spec)]
-    if found:
-        raise AssignmentError(file, in_order(source.problem(*one) for one in found))
+    mistakes = list(_unreadable_times(course))
+    if not mistakes:
+        mistakes += _contradictions(course)
+    mistakes += _groups(source, course.spec)
+    mistakes += _extensions(source, course.spec)
+    if mistakes:
+        raise AssignmentError(file, in_order(source.problem(*mistake) for mistake in mistakes))
     return course
 
 
-def _times(course: Course) -> Mistakes:
-    times: list[tuple[Place, str | None]] = [
-        (("assignments", name, key), getattr(one, key))
-        for name, one in course.spec.assignments.items()
-        for key in ("due", "closes", "published")
-    ]
-    times += [(("extensions", at, "due"), one.due) for at, one in enumerate(course.spec.extensions)]
-    for place, text in times:
+def _times(course: Course) -> Iterator[tuple[Place, str]]:
+    """Every time in the file."""
+    for name, rules in course.spec.assignments.items():
+        for key in ("due", "closes", "published"):
+            text = getattr(rules, key)
+            if text:
+                yield ("assignments", name, key), text
+    for index, extension in enumerate(course.spec.extensions):
+        if extension.due:
+            yield ("extensions", index, "due"), extension.due
+
+
+def _unreadable_times(course: Course) -> Mistakes:
+    for place, text in _times(course):
         try:
-            _ = text and course.instant(text)
+            course.instant(text)
         except ValueError as error:
             yield place, str(error)
             if course.spec.time_zone is None:
@@ -125,43 +136,46 @@ def _times(course: Course) -> Mistakes:
 
 
 def _contradictions(course: Course) -> Mistakes:
-    for name, one in course.spec.assignments.items():
-        for key, text in (("closes", one.closes), ("published", one.published)):
-            if text and course.instant(text) < course.instant(one.due):
-                yield ("assignments", name, key), f"is before the due time, {one.due}"
-    for at, extension in enumerate(course.spec.extensions):
-        own = course.spec.assignments.get(extension.assignment)
-        if own and extension.due and course.instant(extension.due) <= course.instant(own.due):
-            yield ("extensions", at, "due"), f"is not later than the due time of all, {own.due}"
+    assignments = course.spec.assignments
+    for name, rules in assignments.items():
+        for key, text in (("closes", rules.closes), ("published", rules.published)):
+            if text and course.instant(text) < course.instant(rules.due):
+                yield ("assignments", name, key), f"is before the due time, {rules.due}"
+    for index, extension in enumerate(course.spec.extensions):
+        if extension.assignment in assignments and extension.due:
+            due = assignments[extension.assignment].due
+            if course.instant(extension.due) <= course.instant(due):
+                yield ("extensions", index, "due"), f"is not later than the due time of all, {due}"
 
 
 def _groups(source: Source, spec: CourseFile) -> Mistakes:
-    seen: dict[str, Place] = {}
-    for at, members in enumerate(spec.groups):
+    places: dict[str, Place] = {}
+    for index, members in enumerate(spec.groups):
         for number, member in enumerate(members):
-            place: Place = ("groups", at, number)
-            first = seen.setdefault(comparable_name(member), place)
+            place: Place = ("groups", index, number)
+            first = places.setdefault(comparable_name(member), place)
             if first != place:
                 yield place, f"{member!r} is in a group already (line {source.line(first)})"
 
 
 def _extensions(source: Source, spec: CourseFile) -> Mistakes:
-    seen: dict[tuple[str, str], int] = {}
-    used: Counter[str] = Counter()
-    most = spec.tokens.each if spec.tokens is not None else 0
-    for at, one in enumerate(spec.extensions):
-        if one.assignment not in spec.assignments:
-            nearest = nearest_or_all(one.assignment, spec.assignments)
-            text = f"no assignment {one.assignment!r} in this file.{nearest}"
-            yield ("extensions", at, "assignment"), text
-        if [one.due, one.days, one.tokens].count(None) != 2:
-            yield ("extensions", at), "give either `due`, `days` or `tokens`"
-        used[comparable_name(one.student)] += one.tokens or 0
-        if one.tokens and used[comparable_name(one.student)] > most:
-            text = f"{one.student} uses {used[comparable_name(one.student)]} of {most} late tokens"
-            yield ("extensions", at, "tokens"), text
-        first = seen.setdefault((comparable_name(one.student), one.assignment), at)
-        if first != at:
+    indices: dict[tuple[str, str], int] = {}
+    used_tokens: Counter[str] = Counter()
+    most_tokens = spec.tokens.each if spec.tokens is not None else 0
+    for index, extension in enumerate(spec.extensions):
+        student, assignment = comparable_name(extension.student), extension.assignment
+        if assignment not in spec.assignments:
+            nearest = nearest_or_all(assignment, spec.assignments)
+            text = f"no assignment {assignment!r} in this file.{nearest}"
+            yield ("extensions", index, "assignment"), text
+        if [extension.due, extension.days, extension.tokens].count(None) != 2:
+            yield ("extensions", index), "give either `due`, `days` or `tokens`"
+        used_tokens[student] += extension.tokens or 0
+        if extension.tokens and used_tokens[student] > most_tokens:
+            text = f"{extension.student} uses {used_tokens[student]} of {most_tokens} late tokens"
+            yield ("extensions", index, "tokens"), text
+        first = indices.setdefault((student, assignment), index)
+        if first != index:
             line = source.line(("extensions", first))
-            text = f"{one.student} has an extension for {one.assignment} already (line {line})"
-            yield ("extensions", at), text
+            text = f"{extension.student} has an extension for {assignment} already (line {line})"
+            yield ("extensions", index), text
