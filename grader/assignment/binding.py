@@ -41,24 +41,24 @@ def bind(
     place = ("checks", index)
     if spec.python is not None:
         try:
-            found = load_own_check(spec.python, source.file.parent)
+            check = load_own_check(spec.python, source.file.parent)
         except ValueError as error:
             return None, [source.problem((*place, "python"), str(error))]
     elif spec.uses in catalogue:
-        found = catalogue[str(spec.uses)]
+        check = catalogue[str(spec.uses)]
     else:
         advice = nearest_or_all(str(spec.uses), sorted(catalogue), "The checks are")
         text = f"there is no check {spec.uses!r}.{advice}"
         return None, [source.problem((*place, "uses"), text)]
-    parameters, problems = source.examine(found.parameters, (*place, "with"))
+    parameters, problems = source.examine(check.parameters, (*place, "with"))
     if parameters is None:
         return None, problems
     looser: list[tuple[float, Parameters]] = []
     for number, partial in enumerate(spec.partial):
         where = (*place, "partial", number, "with")
-        other, mistaken = source.examine(found.parameters, where, base=(*place, "with"))
-        problems += mistaken
-        if other is not None:
-            looser.append((partial.share, other))
+        changed, mistakes = source.examine(check.parameters, where, base=(*place, "with"))
+        problems += mistakes
+        if changed is not None:
+            looser.append((partial.share, changed))
     looser.sort(key=lambda item: -item[0])
-    return BoundCheck(spec, found, parameters, tuple(looser)), problems
+    return BoundCheck(spec, check, parameters, tuple(looser)), problems

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
@@ -84,20 +84,20 @@ def list_assignments() -> tuple[str, ...]:
 
 def find_assignment(name: str | Path) -> Path:
     """Find the YAML file of an assignment by its id, its folder, or itself."""
-    given = Path(name)
-    if given.is_file():
-        return given
-    if (given / ASSIGNMENT_FILE).is_file():
-        return given / ASSIGNMENT_FILE
-    known = list_assignments()
-    if str(name) in known:
+    path = Path(name)
+    if path.is_file():
+        return path
+    if (path / ASSIGNMENT_FILE).is_file():
+        return path / ASSIGNMENT_FILE
+    own_ids = list_assignments()
+    if str(name) in own_ids:
         return resources.assignments() / str(name) / ASSIGNMENT_FILE
-    if given.is_dir():
-        raise UsageError(f"{given}: there is no {ASSIGNMENT_FILE} in it")
-    if given.name != str(name) or given.suffix:
-        raise UsageError(f"{given}: no such file or folder")
+    if path.is_dir():
+        raise UsageError(f"{path}: there is no {ASSIGNMENT_FILE} in it")
+    if path.name != str(name) or path.suffix:
+        raise UsageError(f"{path}: no such file or folder")
     raise UsageError(
-        f"no assignment {str(name)!r}.{nearest_or_all(str(name), known)} "
+        f"no assignment {str(name)!r}.{nearest_or_all(str(name), own_ids)} "
         f"For your own assignment give its folder, such as path/to/{name}."
     )
 
@@ -111,34 +111,39 @@ def load_assignment(
     """
     file = find_assignment(name)
     written = ungrouped(read_source(file))
-    values = {name: str(one.example) for name, one in read_variables(written).items()}
+    examples = {name: str(one.example) for name, one in read_variables(written).items()}
     # A place that takes no variable is found here, and not when a submission is judged.
     expanded(written)
-    source = expanded_with(written, values)
-    assignment, tried, found = bound_checks(source, catalogue)
-    found += rules.problems(source, assignment, tried)
-    for number, given in enumerate(assignment.underlays):
-        try:
-            find_underlay(given, file.parent)
-        except UsageError as error:
-            found.append(source.problem(("underlays", number), str(error)))
-    folder = file.resolve().parent.name
-    if file.name == ASSIGNMENT_FILE and assignment.id != folder:
-        text = f"{assignment.id!r} is not the name of its folder, {folder!r}"
-        found.append(source.problem(("id",), text))
-    bound = tuple(check for check in tried if check is not None)
-    if not found:
-        interfaces = Interfaces.of(file.parent, values, assignment.underlays)
-        found += simulation.problems(source, assignment, interfaces)
-        found += interface_problems(source, assignment, bound, interfaces)
-        found += field_problems(source, assignment, bound, interfaces)
-    if found:
-        raise AssignmentError(file, in_order(found))
+    source = expanded_with(written, examples)
+    assignment, tried, problems = bound_checks(source, catalogue)
+    problems += rules.problems(source, assignment, tried)
+    problems += _outside_problems(source, assignment)
+    checks = tuple(check for check in tried if check is not None)
+    if not problems:
+        interfaces = Interfaces.of(file.parent, examples, assignment.underlays)
+        problems += simulation.problems(source, assignment, interfaces)
+        problems += interface_problems(source, assignment, checks, interfaces)
+        problems += field_problems(source, assignment, checks, interfaces)
+    if problems:
+        raise AssignmentError(file, in_order(problems))
     digest = folder_sha256(file.parent) if file.name == ASSIGNMENT_FILE else _sha256(file)
-    assignment, bound = with_runs(assignment, bound)
+    assignment, checks = with_runs(assignment, checks)
     return LoadedAssignment(
-        assignment, file, digest, bound, assignment.withheld, values=values, source=written
+        assignment, file, digest, checks, assignment.withheld, values=examples, source=written
     )
+
+
+def _outside_problems(source: Source, assignment: Assignment) -> Iterator[Problem]:
+    """What does not fit to the folder that the file is in, or to the underlays of this machine."""
+    for number, underlay in enumerate(assignment.underlays):
+        try:
+            find_underlay(underlay, source.file.parent)
+        except UsageError as error:
+            yield source.problem(("underlays", number), str(error))
+    folder = source.file.resolve().parent.name
+    if source.file.name == ASSIGNMENT_FILE and assignment.id != folder:
+        text = f"{assignment.id!r} is not the name of its folder, {folder!r}"
+        yield source.problem(("id",), text)
 
 
 def bound_checks(
@@ -147,37 +152,38 @@ def bound_checks(
     """Read an assignment and its checks, with what is wrong in them; None for such a check."""
     assignment = simulation.with_turtles(source.read(Assignment), source.file.parent)
     try:
-        own = lesson_checks(source.file.parent)
+        catalogue = {**catalogue, **lesson_checks(source.file.parent)}
     except ValueError as error:
         problem = source.problem(("checks",), str(error))
         raise AssignmentError(source.file, [problem]) from error
-    known = {**catalogue, **own}
-    tried = [bind(source, index, spec, known) for index, spec in enumerate(assignment.checks)]
-    found = [problem for _, problems in tried for problem in problems]
-    return assignment, [check for check, _ in tried], found
+    checks, problems = [], []
+    for index, spec in enumerate(assignment.checks):
+        check, mistakes = bind(source, index, spec, catalogue)
+        checks.append(check)
+        problems += mistakes
+    return assignment, checks, problems
 
 
 def folder_sha256(folder: Path, besides: Path | None = None) -> str:
     """Hash the paths and contents of all files in a folder, hidden ones and caches left out."""
     digest = sha256()
-    # Or grading a submission from within an assignment's folder would change the assignment.
-    tools = {"__pycache__", "rosgrade-report"}
     files: dict[str, Path] = {}
-    # Not into what is left out: a grading writes there meanwhile.
     for root, folders, names in os.walk(folder):
         here = Path(root)
-        folders[:] = [
-            name
-            for name in folders
-            if not name.startswith(".") and name not in tools and here / name != besides
-        ]
+        # os.walk goes not into what is left out: a grading writes there meanwhile.
+        folders[:] = [name for name in folders if not _is_left_out(name) and here / name != besides]
         for name in names:
             file = here / name
-            if not name.startswith(".") and name not in tools and file.is_file():
+            if not _is_left_out(name) and file.is_file():
                 files[file.relative_to(folder).as_posix()] = file
     for inside in sorted(files):
         digest.update(os.fsencode(inside) + f"\0{_sha256(files[inside])}\n".encode())
     return digest.hexdigest()
+
+
+def _is_left_out(name: str) -> bool:
+    """Hidden files, caches, and reports: else grading in the folder would change its hash."""
+    return name.startswith(".") or name in {"__pycache__", "rosgrade-report"}
 
 
 def _sha256(file: Path) -> str:

@@ -30,23 +30,27 @@ def select(
     if not checks and not scenarios:
         return loaded
     requires = {bound.spec.id: bound.spec.requires for bound in loaded.checks}
-    named = [scenario.id for scenario in loaded.assignment.scenarios]
+    every_scenario = [scenario.id for scenario in loaded.assignment.scenarios]
     _refuse_unknown("check", checks, requires, loaded)
-    _refuse_unknown("scenario", scenarios, named, loaded)
-    wanted = set(checks or requires).union(*(required_by(name, requires) for name in checks))
-    kept = {}
+    _refuse_unknown("scenario", scenarios, every_scenario, loaded)
+    chosen_checks = set(checks or requires)
+    for name in checks:
+        chosen_checks |= required_by(name, requires)
+    chosen_scenarios = scenarios or every_scenario
+    judged_in = {}
     for bound in loaded.checks:
-        of_it = loaded.scenarios_of(bound)
-        judged_in = tuple(one.id for one in of_it if one.id in (scenarios or named))
+        ids = [scenario.id for scenario in loaded.scenarios_of(bound)]
+        ids = [scenario for scenario in ids if scenario in chosen_scenarios]
         # What is handed in is judged without any run.
         needs_none = bound.check.subject is Subject.SUBMISSION
-        if bound.spec.id in wanted and (judged_in or needs_none):
-            kept[bound.spec.id] = bound, judged_in
+        if bound.spec.id in chosen_checks and (ids or needs_none):
+            judged_in[bound.spec.id] = tuple(ids)
     parts = []
-    for bound, judged_in in kept.values():
-        required = tuple(one for one in bound.spec.requires if one in kept)
-        changes = {"scenarios": judged_in, "requires": required}
-        parts.append(dataclasses.replace(bound, spec=bound.spec.model_copy(update=changes)))
+    for bound in loaded.checks:
+        if bound.spec.id in judged_in:
+            required = tuple(check for check in bound.spec.requires if check in judged_in)
+            changes = {"scenarios": judged_in[bound.spec.id], "requires": required}
+            parts.append(dataclasses.replace(bound, spec=bound.spec.model_copy(update=changes)))
     needed = {scenario for bound in parts for scenario in bound.spec.scenarios}
     assignment = loaded.assignment.model_copy(
         update={

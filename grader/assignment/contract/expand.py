@@ -45,54 +45,55 @@ def expanded(source: Source) -> Source:
     if contract is None:
         raise AssignmentError(source.file, problems)
     derivation = Derivation(contract)
-    found = [*derivation.problems(), *_misfits(source, derivation)]
-    if found:
-        problems = [source.problem(place, text) for place, text in found]
+    mistakes = [*derivation.problems(), *_misfits(source, derivation)]
+    if mistakes:
+        problems = [source.problem(place, text) for place, text in mistakes]
         raise AssignmentError(source.file, in_order(problems))
     packages = _in_list("packages", _packages(contract))
     checks = _in_list("checks", _checks(source, derivation))
-    runs, authors = (source.data.get(key) or [] for key in ("scenarios", "checks"))
-    of_runs = [_of_run(contract, run) for run in runs]
+    authors_checks = source.data.get("checks") or []
+    runs = source.data.get("scenarios") or []
+    made_in_runs = [_of_run(contract, run) for run in runs]
     data = {
         **source.data,
-        "packages": [one.value for one in packages.values()],
-        "checks": [*(one.value for one in checks.values()), *authors],
+        "packages": [made.value for made in packages.values()],
+        "checks": [*(made.value for made in checks.values()), *authors_checks],
     }
     if runs:
         data["scenarios"] = [
-            {**run, **{key: one.value for key, one in parts.items()}} if parts else run
-            for run, parts in zip(runs, of_runs, strict=True)
+            _with_made(run, made) for run, made in zip(runs, made_in_runs, strict=True)
         ]
-    in_runs: dict[Place, _Made] = {
-        ("scenarios", number, key): one
-        for number, parts in enumerate(of_runs)
-        for key, one in parts.items()
-    }
-    written = Rewriting(source)
-    written.begins("packages", _PACKAGES)
-    written.begins("checks", (KEY,))
-    written.moved_all("checks", authors, by=len(checks))
-    for made in (packages, checks, in_runs):
-        for place, one in made.items():
-            _note(written, place, one)
-    return written.document(data)
+    rewriting = Rewriting(source)
+    rewriting.begins("packages", _PACKAGES)
+    rewriting.begins("checks", (KEY,))
+    rewriting.moved_all("checks", authors_checks, by=len(checks))
+    for place, made in (packages | checks).items():
+        _note(rewriting, place, made)
+    for number, made_in_run in enumerate(made_in_runs):
+        for key, made in made_in_run.items():
+            _note(rewriting, ("scenarios", number, key), made)
+    return rewriting.document(data)
 
 
-def _in_list(key: str, made: Iterable[_Made]) -> dict[Place, _Made]:
+def _with_made(run: Any, made: Mapping[str, _Made]) -> Any:
+    return {**run, **{key: part.value for key, part in made.items()}} if made else run
+
+
+def _in_list(key: str, entries: Iterable[_Made]) -> dict[Place, _Made]:
     """Entries of a list, by their places."""
-    return {(key, number): one for number, one in enumerate(made)}
+    return {(key, number): entry for number, entry in enumerate(entries)}
 
 
-def _note(written: Rewriting, place: Place, made: _Made) -> None:
+def _note(rewriting: Rewriting, place: Place, made: _Made) -> None:
     """Note where a part that is made comes from."""
     if made.origin is None:
         return
-    written.made(made.value, made.origin, place)
+    rewriting.made(made.value, made.origin, place)
     for inside, origin in made.closer.items():
         value = made.value
         for step in inside:
             value = value[step]
-        written.made(value, origin, (*place, *inside))
+        rewriting.made(value, origin, (*place, *inside))
 
 
 def expanded_with(source: Source, values: Values) -> Source:
@@ -112,8 +113,8 @@ _ORDER = ("rosgrade", "id", "title", "variables", "packages")
 def plain(source: Source) -> dict[str, Any]:
     """A document with all that its contract stands for, and without the contract."""
     data = expanded(source).data
-    names = [*(name for name in _ORDER if name in data), *(n for n in data if n not in _ORDER)]
-    return {name: data[name] for name in names if name != KEY}
+    keys = dict.fromkeys((*_ORDER, *data))
+    return {key: data[key] for key in keys if key in data and key != KEY}
 
 
 def _misfits(source: Source, derivation: Derivation) -> Iterator[tuple[Place, str]]:
@@ -123,48 +124,52 @@ def _misfits(source: Source, derivation: Derivation) -> Iterator[tuple[Place, st
             yield (key,), "expected a list: each entry begins with '- '"
     if "packages" in source.data:
         yield ("packages",), "the packages stand in the contract: leave 'packages' out"
-    ids = {one.id for one in derivation.kept}
-    authors = source.data.get("checks")
-    for index, entry in enumerate(authors if isinstance(authors, list) else ()):
-        if isinstance(entry, dict) and isinstance(entry.get("id"), str) and entry["id"] in ids:
+    standard_ids = [check.id for check in derivation.kept]
+    authors_checks = source.data.get("checks")
+    if not isinstance(authors_checks, list):
+        return
+    for index, entry in enumerate(authors_checks):
+        id_ = entry.get("id") if isinstance(entry, dict) else None
+        if id_ in standard_ids:
             text = (
-                f"{entry['id']!r} comes from the contract already: write what differs under "
-                f"'contract: checks: {entry['id']}', or take its points away there"
+                f"{id_!r} comes from the contract already: write what differs under "
+                f"'contract: checks: {id_}', or take its points away there"
             )
             yield ("checks", index, "id"), text
 
 
 def _packages(contract: Contract) -> Iterator[_Made]:
     """The entries of ``packages``."""
-    for name, one in contract.packages.items():
-        kinds = list(one.build_type)
+    for name, package in contract.packages.items():
+        build_types = list(package.build_type)
         entry = {
             "name": name,
-            "build_type": kinds if len(kinds) > 1 else kinds[0],
-            "depends": list(one.depends),
-            "executables": list(one.executables),
+            "build_type": build_types if len(build_types) > 1 else build_types[0],
+            "depends": list(package.depends),
+            "executables": list(package.executables),
         }
         yield _Made({key: value for key, value in entry.items() if value}, (*_PACKAGES, name))
 
 
 def _checks(source: Source, derivation: Derivation) -> Iterator[_Made]:
     """The standard checks, as entries of ``checks``."""
-    for one in derivation.kept:
-        entry = derivation.entry(one)
-        yield _Made(entry, one.place, dict(_changed(source, one, entry)))
+    for check in derivation.kept:
+        entry = derivation.entry(check)
+        yield _Made(entry, check.place, dict(_changed(source, check, entry)))
 
 
 def _changed(
-    source: Source, one: Derived, entry: Mapping[str, Any]
+    source: Source, check: Derived, entry: Mapping[str, Any]
 ) -> Iterator[tuple[Place, Place]]:
     """What of a standard check its author wrote under its id, with where it is written."""
     for key, value in entry.items():
-        of_with = value if key == "with" and isinstance(value, dict) else ()
-        insides: list[Place] = [(key, name) for name in of_with] or [(key,)]
-        for inside in insides:
-            origin = (KEY, "checks", one.id, *inside)
+        places: list[Place] = [(key,)]
+        if key == "with" and isinstance(value, dict) and value:
+            places = [(key, parameter) for parameter in value]
+        for place in places:
+            origin = (KEY, "checks", check.id, *place)
             if origin in source.lines:
-                yield inside, origin
+                yield place, origin
 
 
 def _of_run(contract: Contract, run: Any) -> dict[str, _Made]:
@@ -176,21 +181,22 @@ def _of_run(contract: Contract, run: Any) -> dict[str, _Made]:
     if launched != run.get("launch"):
         made["launch"] = _Made(launched, None if "launch" in run else _PACKAGES)
     entries = launched if isinstance(launched, list) else []
-    names = [one.get("executable") for one in entries if isinstance(one, dict)]
-    topics = {
-        topic: (published.type, (*_PACKAGES, package, "executables", name, "publishes", topic))
-        for (package, name), program in contract.programs.items()
-        if name in names
-        for topic, published in program.publishes.items()
-    }
+    executables = [entry.get("executable") for entry in entries if isinstance(entry, dict)]
+    types: dict[str, str] = {}
+    origins: dict[str, Place] = {}
+    for (package, name), program in contract.programs.items():
+        if name in executables:
+            for topic, published in program.publishes.items():
+                types[topic] = published.type
+                origins[topic] = (*_PACKAGES, package, "executables", name, "publishes", topic)
     if "world" in run:
-        topics.pop(_command_topic(run), None)
-    if "record" not in run and topics:
-        record = [{"topic": topic, "type": type} for topic, (type, _) in topics.items()]
-        origins: dict[Place, Place] = {
-            (number,): origin for number, (_, origin) in enumerate(topics.values())
+        types.pop(_command_topic(run), None)
+    if "record" not in run and types:
+        record = [{"topic": topic, "type": type_} for topic, type_ in types.items()]
+        closer: dict[Place, Place] = {
+            (number,): origins[topic] for number, topic in enumerate(types)
         }
-        made["record"] = _Made(record, _PACKAGES, origins)
+        made["record"] = _Made(record, _PACKAGES, closer)
     return made
 
 
@@ -204,9 +210,13 @@ def _launched(contract: Contract, scenario: dict[str, Any]) -> Any:
     if len(contract.packages) > 1:
         only["package"] = package
     return [
-        {**only, **one} if isinstance(one, dict) and not {"executable", "file"} & {*one} else one
-        for one in launched
+        {**only, **entry} if isinstance(entry, dict) and _says_no_program(entry) else entry
+        for entry in launched
     ]
+
+
+def _says_no_program(launch: dict[str, Any]) -> bool:
+    return "executable" not in launch and "file" not in launch
 
 
 def _command_topic(scenario: dict[str, Any]) -> str:
