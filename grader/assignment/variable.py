@@ -43,9 +43,11 @@ class Role(Model):
     @property
     def parts(self) -> list[tuple[str, str]]:
         """What a node or an executable does: each key with a name or a type."""
-        found = {key: getattr(self, key) for key in _DOES}
-        each = {key: (one,) if isinstance(one, str) else one for key, one in found.items()}
-        return [(key, one) for key, names in each.items() for one in names]
+        parts = []
+        for key in _DOES:
+            names = getattr(self, key)
+            parts += [(key, name) for name in ((names,) if isinstance(names, str) else names)]
+        return parts
 
 
 class Variable(Model):
@@ -110,12 +112,18 @@ class Variable(Model):
         if not re.fullmatch(self.part, str(self.example)):
             raise ValueError("the 'example' must be of letters, digits and underscores")
         if self.where is not None:
-            described = {*dict(self.where.parts), *(["node"] if self.where.node else [])}
-            can = {*_DOES} if self.in_ in ("nodes", "executables") else {"node"}
-            if self.match != ANY or self.in_ in _UNDESCRIBED or not described <= can:
-                wrong = ", ".join(sorted(described - can)) or "where"
-                raise ValueError(f"{wrong!r} says nothing of 'match: {self.match}' in {self.in_}")
+            self._check_role(self.where)
         return self
+
+    def _check_role(self, role: Role) -> None:
+        """Nodes and executables do something; what else is looked for is had by a node."""
+        said = {key for key, _ in role.parts}
+        if role.node:
+            said.add("node")
+        possible = {*_DOES} if self.in_ in ("nodes", "executables") else {"node"}
+        if self.match != ANY or self.in_ in _UNDESCRIBED or not said <= possible:
+            wrong = ", ".join(sorted(said - possible)) or "where"
+            raise ValueError(f"{wrong!r} says nothing of 'match: {self.match}' in {self.in_}")
 
     @property
     def is_of_runs(self) -> bool:
@@ -157,7 +165,8 @@ def fill(value: Any, values: Values, key: str = "") -> Any:
     if key == "type" and "/" in text:
         package, slash, rest = text.partition("/")
         return values.get(text, values.get(package + slash, package + slash) + rest)
-    return int(text) if _PLACE.fullmatch(value) and _NUMBER.fullmatch(text) else text
+    is_number = _PLACE.fullmatch(value) and _NUMBER.fullmatch(text)
+    return int(text) if is_number else text
 
 
 def fill_text(text: str, values: Values) -> str:
@@ -167,14 +176,11 @@ def fill_text(text: str, values: Values) -> str:
 
 def fill_interface(text: str, values: Values) -> str:
     """A text of a package of interfaces, or a path in it, with the values in their places."""
-    names = [(key, own) for key, own in values.items() if "/" in key]
-    words = {
-        step: mine
-        for key, own in names
-        for step, mine in zip(key.split("/"), own.split("/"), strict=True)
-        if step
-    }
-    return re.sub(r"\w+", lambda word: words.get(word[0], word[0]), fill_text(text, values))
+    chosen: dict[str, str] = {}
+    for example, name in values.items():
+        if "/" in example:
+            chosen |= zip(example.split("/"), name.split("/"), strict=True)
+    return re.sub(r"\w+", lambda word: chosen.get(word[0], word[0]), fill_text(text, values))
 
 
 def filled(source: Source, values: Values) -> Source:
@@ -192,27 +198,38 @@ def filled(source: Source, values: Values) -> Source:
 
 def alike(name: str, variables: Mapping[str, Variable]) -> list[str]:
     """The variables that stand for the same things; each takes one, in the order of their names."""
-    own = variables[name]
+    if not variables[name].is_free:
+        return []
+    looked_for = _looked_for(variables[name])
     return [
         other
-        for other, one in variables.items()
-        if own.match == one.match == ANY
-        and (own.in_, own.kind, own.of, own.where) == (one.in_, one.kind, one.of, one.where)
+        for other, variable in variables.items()
+        if variable.is_free and _looked_for(variable) == looked_for
     ]
+
+
+def _looked_for(variable: Variable) -> tuple[object, ...]:
+    """What a variable of which the whole name is free is found by."""
+    return variable.in_, variable.kind, variable.of, variable.where
 
 
 def form(name: str, variables: Mapping[str, Variable], values: Values) -> re.Pattern[str]:
     """The form of a variable's names; what is chosen is the group ``value``."""
     variable = variables[name]
-    if variable.match == ANY:
-        return re.compile(f"(?P<value>{variable.part})")
+    value = f"(?P<value>{variable.part})"
+    if variable.is_free:
+        return re.compile(value)
+    # Text and names of variables alternate.
     steps = _PLACE.split(fill_text(str(variable.match), values))
-    steps[::2] = map(re.escape, steps[::2])
-    parts = [variables[step].part for step in steps[1::2]]
-    first = steps.index(name, 1)
-    steps[1::2] = parts
-    steps[first] = f"(?P<value>{variable.part})"
-    return re.compile("".join(steps))
+    pattern, is_named = "", False
+    for index, step in enumerate(steps):
+        if index % 2 == 0:
+            pattern += re.escape(step)
+        elif step == name and not is_named:
+            pattern, is_named = pattern + value, True
+        else:
+            pattern += variables[step].part
+    return re.compile(pattern)
 
 
 def read_variables(source: Source) -> dict[str, Variable]:
@@ -221,32 +238,33 @@ def read_variables(source: Source) -> dict[str, Variable]:
     Raises:
         AssignmentError: One is not as it must be; what else is wrong in the document shows later.
     """
-    written = source.data.get(KEY)
-    written = written if isinstance(written, dict) else {}
-    found: dict[str, Variable] = {}
+    entries = source.data.get(KEY)
+    entries = entries if isinstance(entries, dict) else {}
+    variables: dict[str, Variable] = {}
     problems: list[Problem] = []
-    for name, entry in written.items():
+    for name, entry in entries.items():
         variable, mistakes = source.examine(Variable, (KEY, name))
         problems += mistakes
         if variable is None:
             continue
-        places = _PLACE.findall(variable.match or "")
-        if variable.match not in (None, ANY) and not {name} <= {*places} <= {*written}:
+        in_match = {*_PLACE.findall(variable.match or "")}
+        has_form = variable.match is not None and not variable.is_free
+        if has_form and not (name in in_match and in_match <= {*entries}):
             text = f"{variable.match!r} must have {{{name}}} in it, and may have other variables"
             problems.append(source.problem((KEY, name, "match"), text))
         for key in ("of", "where"):
             said = entry.get(key)
-            if not {*_PLACE.findall(json.dumps(said))} <= {*found}:
+            if not {*_PLACE.findall(json.dumps(said))} <= {*variables}:
                 text = f"{said!r} may have only variables in it that stand above {name!r}"
                 problems.append(source.problem((KEY, name, key), text))
-        for other, one in found.items():
-            mine = (variable.in_, variable.kind, variable.of, variable.where)
-            same = mine == (one.in_, one.kind, one.of, None)
-            if same and variable.match == one.match == ANY:
+        for other, earlier in variables.items():
+            is_any = variable.is_free and variable.where is None
+            is_same = _looked_for(variable)[:3] == _looked_for(earlier)[:3]
+            if is_any and earlier.is_free and is_same:
                 text = f"{other!r} takes any name of the {variable.in_} already: give one a form"
                 text += ", another 'of', or both the same 'where'"
                 problems.append(source.problem((KEY, name, "match"), text))
-        found[name] = variable
+        variables[name] = variable
     if problems:
         raise AssignmentError(source.file, problems)
-    return found
+    return variables

@@ -85,6 +85,12 @@ def test_a_form_may_have_other_variables_known_or_not() -> None:
     assert form("robot", variables, {"team": "blue"}).fullmatch("red_arm.x") is None
 
 
+def test_a_text_in_a_form_may_be_the_name_of_the_variable() -> None:
+    one = Variable(match="grp{k}n{n}", example="7")
+    found = form("n", {"k": one, "n": one}, {}).fullmatch("grp_An7")
+    assert found is not None and found["value"] == "7"
+
+
 def test_interfaces_are_written_with_the_names_of_the_submission(tmp_path: Path) -> None:
     package = tmp_path / "interfaces" / "g{n}_msgs" / "msg"
     package.mkdir(parents=True)
