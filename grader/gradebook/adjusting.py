@@ -16,7 +16,7 @@ from grader.course.load import Course, load_course
 from grader.errors import UsageError
 from grader.grading.attempts import attempts_of
 from grader.report.audience import VISIBLE_ONLY
-from grader.report.model.result_model import Result
+from grader.report.model.result_model import AttemptPart, Result
 from grader.review.adjust import adjusted
 from grader.review.model import ClassReview
 from grader.review.store import ReviewStore
@@ -79,33 +79,38 @@ class ClassAdjustments:
         entry = self._entries.get(result.submission.id)
         if entry is None:
             return self._reviewed(result, result.submission.id), ()
-        tried = [*self._graded_before(entry), (entry, result)]
-        hashes = [one.sha256 for one, _ in tried]
+        attempts = [*self._graded_before(entry), (entry, result)]
+        hashes = [attempt.sha256 for attempt, _ in attempts]
         results = [
-            self._reviewed(each, entry.review_key, hashes[:at])
-            for at, (_, each) in enumerate(tried)
+            self._reviewed(of_attempt, entry.review_key, hashes[:index])
+            for index, (_, of_attempt) in enumerate(attempts)
         ]
         times = [
-            HandInTime(one.handed_in, one.handed_in_from, one.late, each.started)
-            for one, each in tried
+            HandInTime(attempt.handed_in, attempt.handed_in_from, attempt.late, of_attempt.started)
+            for attempt, of_attempt in attempts
         ]
-        found = Ruled(len(tried) - 1)
+        by_rules = Ruled(counts=len(attempts) - 1)
         if self._course is not None and not entry.attempt_of:
             rules = self._course.rules(self._written.assignment, entry.key)
-            found = ruled(results, times, rules)
-        several = len(tried) > 1
-        parts = attempts_of(results, [one.at for one in times], found.counts) if several else ()
-        added = [one for one in results[found.counts].adjustments if one.is_of_counted]
-        added += [one for one in results[-1].adjustments if not one.is_of_counted]
-        update = {"attempts": parts, "adjustments": (*added, *found.lines)}
-        return results[-1].model_copy(update=update), found.notes
+            by_rules = ruled(results, times, rules)
+        parts: tuple[AttemptPart, ...] = ()
+        if len(attempts) > 1:
+            parts = attempts_of(results, [time.at for time in times], by_rules.counts)
+        last, counted = results[-1], results[by_rules.counts]
+        adjustments = [
+            *(one for one in counted.adjustments if one.is_of_counted),
+            *(one for one in last.adjustments if not one.is_of_counted),
+            *by_rules.lines,
+        ]
+        update = {"attempts": parts, "adjustments": tuple(adjustments)}
+        return last.model_copy(update=update), by_rules.notes
 
     def _graded_before(self, entry: Entry) -> Iterator[tuple[Entry, Result]]:
         """The earlier attempts of a row that are graded, first to last."""
-        for one in self._earlier.get(entry.key, ()):
-            result = self._ledger.result(one.key)
-            if result is not None and result.submission.sha256 == one.sha256:
-                yield one, result
+        for attempt in self._earlier.get(entry.key, ()):
+            result = self._ledger.result(attempt.key)
+            if result is not None and result.submission.sha256 == attempt.sha256:
+                yield attempt, result
 
     def _reviewed(self, result: Result, key: str, before: Sequence[str] = ()) -> Result:
         return adjusted(result, self._store.student(key).content, self._of_class, before)
@@ -129,16 +134,18 @@ def course_of(out: Path, named: Path | None, assignment: str) -> Course | None:
 
 def _remembered(place: str | None, out: Path, assignment: str) -> Course | None:
     """The rules that lie where a batch remembers, if it was graded with any."""
-    if place is not None and not Path(place).is_file():
+    if place is None:
+        return None
+    if not Path(place).is_file():
         raise UsageError(
             f"{place}: does not exist, and the rules of {out} lie there. Put it back, or name "
             "another place with `rosgrade batch ... --course FILE`"
         )
-    return _load(Path(place), assignment) if place is not None else None
+    return _load(Path(place), assignment)
 
 
 def _load(file: Path, assignment: str) -> Course:
-    found = load_course(file)
+    course = load_course(file)
     # Refuse rules of other assignments at once.
-    found.rules(assignment)
-    return found
+    course.rules(assignment)
+    return course

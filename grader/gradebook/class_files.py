@@ -35,37 +35,48 @@ _MOST_TWINS = 5
 
 def copies(done: Sequence[Done]) -> int:
     """How many submissions are the same as another one; what a team shares is one."""
-    return sum(len(set(map(_hand, same))) - 1 for same in _same(done).values())
+    return sum(len({_owner(entry) for entry in same}) - 1 for same in _same(done).values())
 
 
 def _same(done: Sequence[Done]) -> dict[str, list[Entry]]:
     """Rows by the key of the one that was graded for all with the same submission."""
     same: dict[str, list[Entry]] = defaultdict(list)
-    for item in done:
-        same[item.entry.original].append(item.entry)
+    for row in done:
+        same[row.entry.original].append(row.entry)
     return same
 
 
-def _hand(entry: Entry) -> str:
+def _owner(entry: Entry) -> str:
+    """Key of the student or the team whose work a row is."""
     return entry.attempt_of or entry.team or entry.key
 
 
 def _note(done: Done, same: Sequence[Entry]) -> str:
-    parts = [done.entry.fault or done.entry.problem]
-    others = [entry.key for entry in same if _hand(entry) != _hand(done.entry)]
-    if others:
-        # A class of 500 that handed in the starter package needs no 500 names on each row.
-        twins = others[:_MOST_TWINS]
-        left = len(others) - len(twins)
-        named = [*twins, f"{left} {'other' if left == 1 else 'others'}"] if left else twins
-        parts.append(f"the same submission as {listing(named)}")
-    if done.result is not None and done.result.submission.problem:
-        parts.append(done.result.submission.problem)
-    if done.result is not None and not done.result.graded:
-        errors = (one.observed for one in done.result.checks if one.status is Status.ERROR)
-        still = counted_points(total(one.max_points for one in done.result.open))
-        parts.append(f"not graded, {still} open: {one_line(next(errors, ''))}")
-    return "; ".join(part for part in parts if part)
+    """What the instructor should know of a row.
+
+    Args:
+        same: All rows with the same submission.
+    """
+    notes = [done.entry.fault or done.entry.problem, _twins(done.entry, same)]
+    result = done.result
+    if result is not None and result.submission.problem:
+        notes.append(result.submission.problem)
+    if result is not None and not result.graded:
+        errors = (check.observed for check in result.checks if check.status is Status.ERROR)
+        points = counted_points(total(check.max_points for check in result.open))
+        notes.append(f"not graded, {points} open: {one_line(next(errors, ''))}")
+    return "; ".join(note for note in notes if note)
+
+
+def _twins(entry: Entry, same: Sequence[Entry]) -> str:
+    """Who else handed in the same; a class of 500 needs no 500 names on each row."""
+    others = [other.key for other in same if _owner(other) != _owner(entry)]
+    if not others:
+        return ""
+    names, unnamed = others[:_MOST_TWINS], len(others[_MOST_TWINS:])
+    if unnamed:
+        names.append(f"{unnamed} {'other' if unnamed == 1 else 'others'}")
+    return f"the same submission as {listing(names)}"
 
 
 def standing(ledger: Ledger, entry: Entry) -> Done:
@@ -88,19 +99,18 @@ def class_rows(
 ) -> list[ClassRow]:
     """The rows of a class as the overview shows them, sorted by key; ``attempts``: earlier too."""
     same = _same(done)
-    own = (item for item in done if attempts or not item.entry.attempt_of)
-    rows = sorted(own, key=lambda item: item.entry.key)
+    rows = [row for row in done if attempts or not row.entry.attempt_of]
     return [
         ClassRow(
-            id=item.entry.key,
-            name=item.entry.name,
-            report=_report(item, ledger),
-            result=item.result,
-            note=_note(item, same[item.entry.original]),
-            late=item.entry.late or _is_late(item.result),
-            missing=not (item.entry.sha256 or item.entry.fault),
+            id=row.entry.key,
+            name=row.entry.name,
+            report=_report(row, ledger),
+            result=row.result,
+            note=_note(row, same[row.entry.original]),
+            late=row.entry.late or _is_late(row.result),
+            missing=not (row.entry.sha256 or row.entry.fault),
         )
-        for item in rows
+        for row in sorted(rows, key=lambda row: row.entry.key)
     ]
 
 
@@ -120,10 +130,10 @@ def write_class(done: Sequence[Done], ledger: Ledger) -> Path:
     write_whole(ledger.out / GRADES_FILE, grades_csv(rows))
     overview = ledger.out / OVERVIEW_FILE
     store = ReviewStore(ledger.out)
-    found = clusters(rows, store.of_class().content.shares)
-    vanished = store.vanished({item.entry.review_key for item in done})
+    causes = clusters(rows, store.of_class().content.shares)
+    vanished = store.vanished({row.entry.review_key for row in done})
     pages = sorted(file.name for file in (ledger.out / INSTRUCTOR_FOLDER).glob("*.html"))
-    write_whole(overview, render_overview(rows, found, vanished, pages))
+    write_whole(overview, render_overview(rows, causes, vanished, pages))
     return overview
 
 
@@ -139,16 +149,15 @@ def find_reports(out: Path) -> tuple[Path, ...]:
         return (out,)
     if (out / BATCH_FILE).is_file():
         ledger = Ledger(out)
-        graded = (one.entry.key for one in all_standing(ledger) if one.result is not None)
-        found = tuple(sorted(map(ledger.folder, graded)))
-        if not found:
+        graded = [row.entry.key for row in all_standing(ledger) if row.result is not None]
+        if not graded:
             raise UsageError(f"{out}: nothing of this batch is graded yet")
-        return found
-    inside = sorted(file.parent.relative_to(out) for file in out.rglob(RESULT_FILE))
-    found = tuple(out / path for path in inside if "/." not in f"/{path}")
-    if not found:
+        return tuple(sorted(ledger.folder(key) for key in graded))
+    folders = sorted(file.parent.relative_to(out) for file in out.rglob(RESULT_FILE))
+    reports = tuple(out / folder for folder in folders if "/." not in f"/{folder}")
+    if not reports:
         raise UsageError(f"{out}: there is no {RESULT_FILE} in it or in a folder below it")
-    return found
+    return reports
 
 
 def read_class(out: Path) -> list[ClassRow]:

@@ -47,9 +47,8 @@ def bring_up_to_date(
     for before in done:
         row = adjust.row(before)
         entry, result = row.entry, row.result
-        shows_more = row.fresh and any(
-            check.visibility in released for check in (result.checks if result else ())
-        )
+        checks = result.checks if result is not None else ()
+        shows_more = row.fresh and any(check.visibility in released for check in checks)
         if result != before.result or shows_more:
             try:
                 render_again(ledger.folder(entry.key), amended=adjust)
@@ -73,10 +72,12 @@ def render_again(
     result = found.result or read_result(folder / RESULT_FILE)
     loaded = _load(assignment or found.assignment_folder("report", str(folder)))
     refuse_changed(folder, result.assignment.sha256, loaded)
-    shown = visible_part(loaded) if result.withheld.checks else loaded
-    graded = regrading.regrade(select(shown, tuple(check.id for check in result.checks)), found)
-    before = {check.id: check.status for check in result.checks}
-    changed = [one.id for one in graded.grade.results if before.get(one.id) is not one.status]
+    if result.withheld.checks:
+        loaded = visible_part(loaded)
+    judged = select(loaded, tuple(check.id for check in result.checks))
+    graded = regrading.regrade(judged, found)
+    stored = {check.id: check.status for check in result.checks}
+    changed = [check.id for check in graded.grade.results if stored.get(check.id) != check.status]
     if changed:
         raise UsageError(
             f"{folder}: judging again does not give the stored result ({', '.join(changed)}). "
@@ -101,9 +102,8 @@ class Regraded:
     @property
     def gained(self) -> float:
         """Points of the checks gained, negative if lost; 0 unless both are graded."""
-        before, after = (
-            one.score if one is not None else None for one in (self.before, self.done.result)
-        )
+        before = self.before.score if self.before is not None else None
+        after = self.done.result.score if self.done.result is not None else None
         return total((after, -before)) if before is not None and after is not None else 0.0
 
 

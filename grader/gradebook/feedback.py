@@ -40,28 +40,29 @@ def class_feedback(out: Path) -> tuple[list[Feedback], list[str]]:
     """
     ledger = Ledger(out)
     # As after a batch, also reports are written that show checks which are released by now.
-    done = (replace(one, fresh=True) for one in all_standing(ledger))
-    now = bring_up_to_date(done, ledger)
-    visible, entries = ClassAdjustments(ledger).visible, {one.entry.key: one.entry for one in now}
-    found, problems = [], []
-    for row in class_rows(now, ledger):
+    as_fresh = (replace(row, fresh=True) for row in all_standing(ledger))
+    done = bring_up_to_date(as_fresh, ledger)
+    entries = {row.entry.key: row.entry for row in done}
+    visible = ClassAdjustments(ledger).visible
+    feedback, problems = [], []
+    for row in class_rows(done, ledger):
         entry, why = entries[row.id], why_no_score(row)
         if row.result is not None and row.status in (RowStatus.GRADED, RowStatus.UNREADABLE):
             copy = for_student(row.result, visible)
             file = REPORT_FILE if copy is row.result else STUDENT_FILE
             report = ledger.folder(row.id) / file
             if NOT_UP_TO_DATE not in entry.problem and report.is_file():
-                found.append(Feedback(entry, copy, report))
+                feedback.append(Feedback(entry, copy, report))
                 continue
             why = entry.problem or f"{NOT_UP_TO_DATE}: `rosgrade report` writes it again"
         problems.append(f"{one_line(row.id)}: {one_line(why)}")
-    return found, problems
+    return feedback, problems
 
 
-def letters(found: Sequence[Feedback], subject: str) -> tuple[list[Letter], list[str]]:
+def letters(feedback: Sequence[Feedback], subject: str) -> tuple[list[Letter], list[str]]:
     """A message for each student who has an address, and who has none."""
     messages, problems = [], []
-    for one in found:
+    for one in feedback:
         # "Lopez, Ana" is Ana Lopez.
         name = " ".join(reversed(one.entry.name.split(",", 1))).strip()
         to = address(one.entry.email, name)

@@ -28,25 +28,27 @@ def write_similarity(loaded: LoadedAssignment, ledger: Ledger) -> tuple[Path, in
     same: dict[str, list[Entry]] = {}
     for entry in _entries(ledger):
         same.setdefault(entry.original, []).append(entry)
-    names = {key: ", ".join(one.name or one.key for one in found) for key, found in same.items()}
-    known = _known(loaded)
-    own = {
-        key: prints.keys() - known
-        for key in same
-        if (prints := similarity.fingerprints(_files(ledger, key)))
+    names = {
+        key: ", ".join(entry.name or entry.key for entry in entries)
+        for key, entries in same.items()
     }
-    pairs = similarity.find_pairs(
-        own, {key: found[0].team for key, found in same.items() if found[0].team}
-    )
-    shown = {key for pair in pairs[: similarity.MOST_PAIRS] for key in (pair.first, pair.second)}
+    teams = {key: entries[0].team for key, entries in same.items() if entries[0].team}
+    given_to_all = _given_to_all(loaded)
+    hashes: dict[str, set[int]] = {}
+    for key in same:
+        prints = similarity.fingerprints(_files(ledger, key))
+        if prints:
+            hashes[key] = prints.keys() - given_to_all
+    pairs = similarity.find_pairs(hashes, teams)
+    on_page = {key for pair in pairs[: similarity.MOST_PAIRS] for key in (pair.first, pair.second)}
     page = similarity.render_similarity(
         loaded.assignment.title,
         pairs,
-        {key: _files(ledger, key) for key in shown},
-        {key: names[key] for key in own},
-        [name for key, name in names.items() if key not in own],
+        {key: _files(ledger, key) for key in on_page},
+        {key: names[key] for key in hashes},
+        [name for key, name in names.items() if key not in hashes],
     )
-    return _written(ledger, "similarity.html", page), len(pairs)
+    return _write_page(ledger, "similarity.html", page), len(pairs)
 
 
 def write_questions(
@@ -66,8 +68,8 @@ def write_questions(
             # A damaged one is reported where it is judged.
             with suppress(RosgradeError):
                 recordings.append(read_recording(file))
-        asked = ask(Work(recordings, _files(ledger, entry.key), usual))
-        students.append((entry.name or entry.key, asked))
+        questions = ask(Work(recordings, _files(ledger, entry.key), usual))
+        students.append((entry.name or entry.key, questions))
         on_read(entry.key)
     page = render_page(
         "questions.html.j2",
@@ -75,34 +77,34 @@ def write_questions(
         title=loaded.assignment.title,
         students=students,
     )
-    return _written(ledger, "questions.html", page), len(students)
+    return _write_page(ledger, "questions.html", page), len(students)
 
 
 def _entries(ledger: Ledger) -> list[Entry]:
     """Rows with a submission, without earlier attempts."""
-    return [one for one in ledger.read().entries if one.sha256 and not one.attempt_of]
+    return [entry for entry in ledger.read().entries if entry.sha256 and not entry.attempt_of]
 
 
 def _files(ledger: Ledger, key: str) -> dict[str, str]:
     return read_kept_source(ledger.folder(key) / SOURCE_FOLDER).files
 
 
-def _known(loaded: LoadedAssignment) -> set[int]:
+def _given_to_all(loaded: LoadedAssignment) -> set[int]:
     """Hashes of what does not count: the starter and the reference, in both languages."""
-    known: set[int] = set()
+    hashes: set[int] = set()
     for language in LANGUAGES:
         # An assignment may be for Python only, or have no reference.
         with suppress(UsageError):
-            known |= similarity.all_hashes(starter_files(loaded, cpp=language is CPP))
+            hashes |= similarity.all_hashes(starter_files(loaded, cpp=language is CPP))
         with suppress(UsageError):
             reference = reference_of(loaded.assignment.id, loaded.folder, language)
-            known |= similarity.all_hashes(read_kept_source(reference).files)
-    return known
+            hashes |= similarity.all_hashes(read_kept_source(reference).files)
+    return hashes
 
 
-def _written(ledger: Ledger, name: str, page: str) -> Path:
+def _write_page(ledger: Ledger, name: str, page: str) -> Path:
     file = ledger.out / INSTRUCTOR_FOLDER / name
     write_whole(file, page)
     adjust = ClassAdjustments(ledger)
-    write_class([adjust.row(one) for one in all_standing(ledger)], ledger)
+    write_class([adjust.row(row) for row in all_standing(ledger)], ledger)
     return file

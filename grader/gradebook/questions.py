@@ -104,26 +104,33 @@ class Question:
 
 def ask(work: Work) -> list[Question]:
     """The most special questions about a work, of different rules if possible; always the same."""
-    found = [sorted(rule(work), key=lambda one: -one.weight) for rule in _RULES]
-    ranked = [(turn, -one.weight, one) for asked in found for turn, one in enumerate(asked)]
+    ranked: list[tuple[int, int, Question]] = []
+    for rule in _RULES:
+        # The first questions of all rules come before the second ones.
+        questions = sorted(rule(work), key=lambda question: -question.weight)
+        ranked += [(turn, -one.weight, one) for turn, one in enumerate(questions)]
     chosen: list[Question] = []
-    for *_, one in sorted(ranked, key=lambda item: item[:2]):
+    for _, _, question in sorted(ranked, key=lambda item: item[:2]):
         # Two questions about one line are one.
-        if not any(set(one.evidence[:1]) & set(other.evidence) for other in chosen):
-            chosen.append(one)
+        if not any(set(question.evidence[:1]) & set(other.evidence) for other in chosen):
+            chosen.append(question)
     return chosen[:QUESTIONS]
 
 
 def pause(work: Work) -> Iterator[Question]:
     """Nothing was published for much longer than usual."""
     for recording, messages in work.published():
-        gaps = [(later.stamp_ns - one.stamp_ns, one.stamp_ns) for one, later in pairwise(messages)]
-        (long, began), usual = max(gaps), median(gap for gap, _ in gaps)
-        if long - NS * recording.stolen_s(began, began + long) > _SPECIAL * usual:
+        gaps_ns = [
+            (after.stamp_ns - before.stamp_ns, before.stamp_ns)
+            for before, after in pairwise(messages)
+        ]
+        (longest_ns, began_ns), usual_ns = max(gaps_ns), median(gap_ns for gap_ns, _ in gaps_ns)
+        stolen_ns = NS * recording.stolen_s(began_ns, began_ns + longest_ns)
+        if longest_ns - stolen_ns > _SPECIAL * usual_ns:
             text = (
-                f"{_at(recording, began)}, {code(messages[0].topic)} falls silent for "
-                f"{long / NS:.2g} s, though a message usually follows after {usual / NS:.2g} s. "
-                "Why?"
+                f"{_at(recording, began_ns)}, {code(messages[0].topic)} falls silent for "
+                f"{longest_ns / NS:.2g} s, though a message usually follows after "
+                f"{usual_ns / NS:.2g} s. Why?"
             )
             yield Question(text, work.evidence(r"\bpublish\("), 4)
 
@@ -134,34 +141,36 @@ def jump(work: Work) -> Iterator[Question]:
         rows = [dict(_numbers(message.value)) for message in messages]
         for field in rows[0]:
             values = [row.get(field, 0.0) for row in rows]
-            sizes = [abs(later - one) for one, later in pairwise(values)]
-            size = max(sizes)
-            if size <= _SPECIAL * median(sizes):
+            changes = [abs(after - before) for before, after in pairwise(values)]
+            largest = max(changes)
+            if largest <= _SPECIAL * median(changes):
                 continue
-            at = sizes.index(size) + 1
+            index = changes.index(largest) + 1
+            message = messages[index]
             text = (
-                f"{_at(recording, messages[at].stamp_ns)}, {code(field)} on "
-                f"{code(messages[at].topic)} goes from {values[at - 1]:.3g} to {values[at]:.3g}. "
+                f"{_at(recording, message.stamp_ns)}, {code(field)} on {code(message.topic)} goes "
+                f"from {values[index - 1]:.3g} to {values[index]:.3g}. "
                 "Which line does that, and what made it do so just then?"
             )
-            poses = (one for one in recording.truth if one.time_ns >= messages[at].stamp_ns)
-            seen = [
-                f"{one.robot or 'the robot'} was at ({one.x_m:.2f}, {one.y_m:.2f}) m"
-                for one in poses
-            ][:1]
-            yield Question(text, (*work.evidence(rf"\b{re.escape(field)}\s*=[^=]"), *seen), 4)
+            evidence = work.evidence(rf"\b{re.escape(field)}\s*=[^=]")
+            poses = (pose for pose in recording.truth if pose.time_ns >= message.stamp_ns)
+            pose = next(poses, None)
+            if pose is not None:
+                robot = pose.robot or "the robot"
+                evidence += (f"{robot} was at ({pose.x_m:.2f}, {pose.y_m:.2f}) m",)
+            yield Question(text, evidence, 4)
 
 
 def timer(work: Work) -> Iterator[Question]:
     """Another period of a timer."""
-    declared = next((found for found in map(timers, work.recordings) if found), ())
+    declared = next(filter(None, map(timers, work.recordings)), ())
     facts = [f"a timer calls {code(one.callback)} every {one.period_s:g} s" for one in declared]
     for place in work.places(r"\bcreate_(?:wall_)?timer\b"):
         text = (
             f"{place.short} creates a timer. What would the report show if its period were three "
             "times as long?"
         )
-        yield Question(text, (str(place), *facts), 1 + 2 * work.is_rare(place))
+        yield Question(text, (str(place), *facts), _weight(1, place, work))
 
 
 def queue(work: Work) -> Iterator[Question]:
@@ -179,7 +188,7 @@ def queue(work: Work) -> Iterator[Question]:
             f"{place.short} creates a {kind}. With what QoS? Which messages would be lost if "
             "its depth were 1, and when?"
         )
-        yield Question(text, (str(place), *ends), 2 * work.is_rare(place))
+        yield Question(text, (str(place), *ends), _weight(0, place, work))
 
 
 def line(work: Work) -> Iterator[Question]:
@@ -192,10 +201,15 @@ def line(work: Work) -> Iterator[Question]:
     ):
         for place in sorted(places, key=lambda one: -len(one.text)):
             text = f"{place.short} reads {code(place.text)}. {asked}"
-            yield Question(text, (str(place),), weight + 2 * work.is_rare(place))
+            yield Question(text, (str(place),), _weight(weight, place, work))
 
 
 _RULES = (pause, jump, timer, queue, line)
+
+
+def _weight(weight: int, place: Place, work: Work) -> int:
+    """The weight of a question about a line, which is more where few others have the line."""
+    return weight + 2 if work.is_rare(place) else weight
 
 
 def _at(recording: Recording, time_ns: int) -> str:

@@ -50,16 +50,16 @@ Fingerprints = Mapping[int, list[Gram]]
 
 def fingerprints(files: Mapping[str, str]) -> Fingerprints:
     """The fingerprints of a submission's programs, given by their paths."""
-    found: dict[int, list[Gram]] = defaultdict(list)
+    places: dict[int, list[Gram]] = defaultdict(list)
     for row in _rows(files):
         chosen = None
         for start in range(max(1, len(row) - WINDOW + 1)):
             # The last of equals stays the smallest for longest.
-            smallest = min(row[start : start + WINDOW], key=lambda one: (one[0], -one[1].token))
+            smallest = min(row[start : start + WINDOW], key=lambda item: (item[0], -item[1].token))
             if smallest is not chosen:
                 chosen = smallest
-                found[chosen[0]].append(chosen[1])
-    return found
+                places[chosen[0]].append(chosen[1])
+    return places
 
 
 def all_hashes(files: Mapping[str, str]) -> set[int]:
@@ -76,12 +76,11 @@ def _rows(files: Mapping[str, str]) -> Iterator[list[tuple[int, Gram]]]:
             continue
         left -= len(text)
         tokens = list(_tokens(text, language))
-        runs = (tokens[start : start + RUN] for start in range(len(tokens) - RUN + 1))
-        row = [
-            (crc32(" ".join(token for token, _ in run).encode()), Gram(file, start, first, last))
-            for start, run in enumerate(runs)
-            for first, last in [(run[0][1], run[-1][1])]
-        ]
+        row = []
+        for start in range(len(tokens) - RUN + 1):
+            run = tokens[start : start + RUN]
+            code = crc32(" ".join(token for token, _ in run).encode())
+            row.append((code, Gram(file, start, first=run[0][1], last=run[-1][1])))
         if row:
             yield row
 
@@ -95,7 +94,7 @@ def _tokens(text: str, language: str) -> Iterator[tuple[str, int]]:
     lines = [(number, line.strip()) for number, line in enumerate(text.split("\n"), 1)]
     lines = [one for one in lines if one[1] and not one[1].startswith(_IMPORTS)]
     code = "\n".join(line for _, line in lines)
-    at, before = 0, ""
+    index, before = 0, ""
     for _, kind, value in get_lexer_by_name(language).get_tokens_unprocessed(code):
         token = value.strip()
         if kind in Name or kind in Number:
@@ -104,9 +103,9 @@ def _tokens(text: str, language: str) -> Iterator[tuple[str, int]]:
             # A string comes in pieces.
             token = "string" if kind is not String.Doc and before != "string" else ""
         if token and kind not in Comment and token not in _LEFT_OUT:
-            yield token, lines[at][0]
+            yield token, lines[index][0]
             before = token
-        at += value.count("\n")
+        index += value.count("\n")
 
 
 THRESHOLD = 0.4
@@ -154,18 +153,18 @@ def find_pairs(submissions: Mapping[str, Collection[int]], teams: Mapping[str, s
         for code in submissions[key]:
             holders[code].append(key)
     rare = {code: keys for code, keys in holders.items() if len(keys) <= most}
-    own = Counter(key for keys in rare.values() for key in keys)
+    rare_counts = Counter(key for keys in rare.values() for key in keys)
     shared: dict[tuple[str, str], list[int]] = defaultdict(list)
     for code, keys in rare.items():
         for pair in combinations(keys, 2):
             shared[pair].append(code)
-    found = [
-        Pair(first, second, len(codes) / min(own[first], own[second]), frozenset(codes))
-        for (first, second), codes in shared.items()
-        if len(codes) >= FEWEST and (first not in teams or teams[first] != teams.get(second))
-    ]
-    alike = [pair for pair in found if pair.score >= THRESHOLD]
-    return sorted(alike, key=lambda one: (-one.score, -len(one.shared), one.first, one.second))
+    alike = []
+    for (first, second), codes in shared.items():
+        are_team = first in teams and teams[first] == teams.get(second)
+        score = len(codes) / min(rare_counts[first], rare_counts[second])
+        if len(codes) >= FEWEST and score >= THRESHOLD and not are_team:
+            alike.append(Pair(first, second, score, frozenset(codes)))
+    return sorted(alike, key=lambda pair: (-pair.score, -len(pair.shared), pair.first, pair.second))
 
 
 def shared_passages(
@@ -175,8 +174,8 @@ def shared_passages(
     # Fingerprints of one passage are as far apart in one program as in the other.
     rows: dict[tuple[str, str, int], list[tuple[Gram, Gram]]] = defaultdict(list)
     for code in shared:
-        for one, other in zip(first[code], second[code], strict=False):
-            rows[one.file, other.file, one.token - other.token].append((one, other))
+        for gram, other in zip(first[code], second[code], strict=False):
+            rows[gram.file, other.file, gram.token - other.token].append((gram, other))
     passages: list[list[tuple[Gram, Gram]]] = []
     for row in map(sorted, rows.values()):
         passages.append(row[:1])
@@ -186,13 +185,12 @@ def shared_passages(
             passages[-1].append(grams)
     marks: tuple[Marks, Marks] = ({}, {})
     number = 1
-    for passage in sorted(passages, key=lambda one: (-len(one), one[0])):
-        fresh = [
-            [line for line in _lines(passage, side) if line not in marks[side]] for side in (0, 1)
-        ]
-        if all(fresh):
-            for side, lines in enumerate(fresh):
-                marks[side].update(dict.fromkeys(lines, number))
+    for passage in sorted(passages, key=lambda grams: (-len(grams), grams[0])):
+        in_first = [line for line in _lines(passage, 0) if line not in marks[0]]
+        in_second = [line for line in _lines(passage, 1) if line not in marks[1]]
+        if in_first and in_second:
+            marks[0].update(dict.fromkeys(in_first, number))
+            marks[1].update(dict.fromkeys(in_second, number))
             number += 1
     return marks
 
