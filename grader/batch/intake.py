@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import re
 import shutil
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -69,8 +70,12 @@ def collect(
         raise UsageError(f"{source}: holds no submission; expected one folder or archive for each")
     if any(row.download for row in rows):
         times = of_canvas(folder, source.parent if source.is_file() else None, on_left_out)
-        rows = [row.at(times.get(row.names[0], NOT_KNOWN)) if row.download else row for row in rows]
-    rows = matched(rows, roster) if roster else rows
+        for index, row in enumerate(rows):
+            if row.download:
+                user = row.names[0]
+                rows[index] = row.at(times.get(user, NOT_KNOWN))
+    if roster is not None:
+        rows = matched(rows, roster)
     return with_groups(timed(unique(rows), staging), course)
 
 
@@ -145,33 +150,34 @@ def _opened(source: Path, staging: Path) -> Path:
 
 def _inner(folder: Path, *, is_unpacked: bool) -> Path:
     """The only folder in a folder, where it is that of the class: an archive or an export of it."""
-    inside = [item for item in folder.iterdir() if not is_ignored(item)]
-    if len(inside) != 1 or not inside[0].is_dir():
+    items = [item for item in folder.iterdir() if not is_ignored(item)]
+    if len(items) != 1 or not items[0].is_dir():
         return folder
-    is_export = (inside[0] / GRADESCOPE_METADATA).is_file()
-    return inside[0] if is_export or (is_unpacked and not _manifest_of_one(inside[0])) else folder
+    is_export = (items[0] / GRADESCOPE_METADATA).is_file()
+    is_of_archive = is_unpacked and not _manifest_of_one(items[0])
+    return items[0] if is_export or is_of_archive else folder
 
 
 def _refuse_single(folder: Path, source: Path) -> None:
-    found = _manifest_of_one(folder)
-    if found is not None:
+    manifest = _manifest_of_one(folder)
+    if manifest is not None:
         raise UsageError(
-            f"{source}: looks like one submission ({shown(str(found))} is in it); name the folder "
-            "that holds those of the class, or use `rosgrade check`"
+            f"{source}: looks like one submission ({shown(str(manifest))} is in it); name the "
+            "folder that holds those of the class, or use `rosgrade check`"
         )
 
 
 def _manifest_of_one(folder: Path) -> Path | None:
     """The package.xml by which a folder looks like one submission, relative to it; or None."""
-    found = [folder / MANIFEST, *sorted((folder / "src").glob(f"*/{MANIFEST}"))]
-    return next((file.relative_to(folder) for file in found if file.is_file()), None)
+    manifests = [folder / MANIFEST, *sorted((folder / "src").glob(f"*/{MANIFEST}"))]
+    return next((file.relative_to(folder) for file in manifests if file.is_file()), None)
 
 
 def _rows(
     folder: Path, staging: Path, on_left_out: Callable[[str], None], out: Path | None
 ) -> Iterator[Collected]:
     metadata = _gradescope(folder / GRADESCOPE_METADATA)
-    canvas: dict[str, list[tuple[Path, re.Match[str]]]] = {}
+    canvas: dict[str, list[_Download]] = {}
     for item in sorted(folder.iterdir(), key=lambda path: os.fsencode(path.name)):
         if is_ignored(item) or item.name == GRADESCOPE_METADATA or item.match(CANVAS_TIMES):
             continue
@@ -182,7 +188,7 @@ def _rows(
         if item.name in metadata:
             yield from _of_gradescope(item, metadata[item.name])
         elif match:
-            canvas.setdefault(match["user"], []).append((item, match))
+            canvas.setdefault(match["user"], []).append(_Download(item, match))
         elif item.is_dir() or item.name.lower().endswith((*SUFFIXES, *FOREIGN)):
             stem = stem_of(item)
             moodle = _MOODLE.fullmatch(stem)
@@ -193,50 +199,64 @@ def _rows(
         else:
             why = "is neither a folder nor an archive, so it is left out"
             on_left_out(f"{shown(item.name)} {why}")
-    for files in canvas.values():
-        yield _of_canvas(files, staging)
+    for downloads in canvas.values():
+        yield _of_canvas(downloads, staging)
 
 
-def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> Collected:
-    match = files[0][1]
-    named, again = _names(files)
-    path, fault = only_archive(named), ""
+class _Download(NamedTuple):
+    """A file as Canvas lets a teacher download it, and what its name there says."""
+
+    file: Path
+    name: re.Match[str]
+
+
+def _of_canvas(downloads: list[_Download], staging: Path) -> Collected:
+    """What one student handed in, in one file or in several."""
+    name = downloads[0].name
+    files, note = _under_own_names(downloads)
+    path, fault = only_archive(files), ""
     if path is None:
-        path = staging / f"canvas-{match['user']}"
-        fault = _gather(named, path)
+        path = staging / f"canvas-{name['user']}"
+        fault = _gather(files, path)
     return Collected(
-        shown(f"{match['name']}_{match['user']}"),
-        late=any(one["late"] for _, one in files),
+        shown(f"{name['name']}_{name['user']}"),
+        late=any(download.name["late"] for download in downloads),
         fault=fault,
         path=None if fault else path,
         item=path,
-        names=(match["user"], match["name"]),
-        download=carrier([file.name for file, _ in files]),
-        problem=again,
+        names=(name["user"], name["name"]),
+        download=carrier([download.file.name for download in downloads]),
+        problem=note,
     )
 
 
-def _names(files: list[tuple[Path, re.Match[str]]]) -> tuple[dict[str, Path], str]:
+def _under_own_names(downloads: list[_Download]) -> tuple[dict[str, Path], str]:
     """Each file under the name that it was handed in with, as far as that tells them apart.
 
     Of an archive that was handed in several times (``ws.zip``, ``ws-1.zip``) only the last counts,
     and a note says so.
     """
-    ordered = sorted(files, key=lambda one: int(one[1]["attachment"]))
-    plain = [_AGAIN.sub("", named["file"]) for _, named in ordered]
-    given, names = [named["file"] for _, named in ordered], {}
-    same: dict[str, list[str]] = {}
-    for name, called, (file, _) in zip(plain, given, ordered, strict=True):
-        is_archive = name.lower().endswith(SUFFIXES)
-        names[name if plain.count(name) == 1 or is_archive else called] = file
+    downloads = sorted(downloads, key=lambda download: int(download.name["attachment"]))
+    times = Counter(_own_name(download) for download in downloads)
+    files: dict[str, Path] = {}
+    archives: dict[str, list[str]] = {}
+    for download in downloads:
+        own, given = _own_name(download), download.name["file"]
+        is_archive = own.lower().endswith(SUFFIXES)
+        files[own if is_archive or times[own] == 1 else given] = download.file
         if is_archive:
-            same.setdefault(name, []).append(called)
-    notes = (
-        f"{listing(one)} are taken for one archive that was handed in again: only the last counts"
-        for one in same.values()
-        if len(one) > 1
-    )
-    return names, shown("; ".join(notes))
+            archives.setdefault(own, []).append(given)
+    notes = [
+        f"{listing(names)} are taken for one archive that was handed in again: only the last counts"
+        for names in archives.values()
+        if len(names) > 1
+    ]
+    return files, shown("; ".join(notes))
+
+
+def _own_name(download: _Download) -> str:
+    """The name without what Canvas adds where a file is handed in again."""
+    return _AGAIN.sub("", download.name["file"])
 
 
 def _gather(files: Mapping[str, Path], folder: Path) -> str:
@@ -282,10 +302,12 @@ def _gradescope(file: Path) -> Mapping[str, Any]:
 
 def _of_gradescope(item: Path, about: Any) -> Iterator[Collected]:
     """An exported folder, for each of its team; Gradescope writes keys with a colon in front."""
-    submitters = about.get(":submitters") if isinstance(about, dict) else None
-    listed = submitters if isinstance(submitters, list) else []
-    people = [person for person in listed if isinstance(person, dict)]
-    time = of_metadata(about if isinstance(about, dict) else {})
+    about = about if isinstance(about, dict) else {}
+    submitters = about.get(":submitters")
+    if not isinstance(submitters, list):
+        submitters = []
+    people = [person for person in submitters if isinstance(person, dict)]
+    time = of_metadata(about)
     for person in people or [{}]:
         values = (person.get(field) for field in (":sid", ":email", ":name"))
         names = tuple(str(value) for value in values if value) or (item.name,)

@@ -64,28 +64,34 @@ def _settled(row: ReviewedRow, by: str) -> Iterator[Given]:
 
 
 def _update(review: AttemptReview, row: ReviewedRow, sent: Any, by: str) -> dict[str, Any]:
-    comments, index = list(review.comments), sent.get("index")
     if sent["do"] == "give":
-        points, check = float(sent["points"]), sent.get("check") or None
-        left = still_open(row.row.result.checks) if row.row.result else ()
-        # What is judged in the end must not count twice; a deduction is about something else.
-        instead = points >= 0 and check in {one.id for one in left}
-        reason = str(sent["reason"])
-        new = Given(points=points, reason=reason, by=by, check=check, instead=instead)
-        return {"given": (*review.given, new)}
+        return {"given": (*review.given, _given(row, sent, by))}
+    index = sent.get("index")
     if sent["do"] == "take":
-        return {"given": tuple(one for at, one in enumerate(review.given) if at != index)}
+        given = [points for at, points in enumerate(review.given) if at != index]
+        return {"given": tuple(given)}
+    comments = list(review.comments)
     if index is not None and index not in range(len(comments)):
         raise IndexError(index)
     if sent["do"] == "uncomment":
         del comments[index]
     elif sent["do"] == "comment":
         comment = Comment(text=sent["text"], by=by, file=sent.get("file"), line=sent.get("line"))
-        begin, end = (len(comments), None) if index is None else (index, index + 1)
-        comments[begin:end] = [comment]
+        if index is None:
+            comments.append(comment)
+        else:
+            comments[index] = comment
     else:
         raise ValueError(sent["do"])
     return {"comments": tuple(comments)}
+
+
+def _given(row: ReviewedRow, sent: Any, by: str) -> Given:
+    points, check = float(sent["points"]), sent.get("check") or None
+    unjudged = still_open(row.row.result.checks) if row.row.result else ()
+    # What is judged in the end must not count twice; a deduction is about something else.
+    instead = points >= 0 and check in {one.id for one in unjudged}
+    return Given(points=points, reason=str(sent["reason"]), by=by, check=check, instead=instead)
 
 
 def _scores(
@@ -106,12 +112,13 @@ def _scores(
 def change_cluster(reviewed: ReviewedClass, sent: Any) -> None:
     """Forgive a cause of failures, take that back, comment it for all who have it, or split it."""
     check, cause, store = sent["check"], sent["cause"], reviewed.store
-    found = [one for one in reviewed.clusters() if (one.check, one.cause) == (check, cause)]
-    if not found:
+    clusters = {(cluster.check, cluster.cause): cluster for cluster in reviewed.clusters()}
+    cluster = clusters.get((check, cause))
+    if cluster is None:
         raise UsageError("Nobody fails for this cause any more. Load the page again.")
     if sent["do"] == "comment":
         comment = Comment(text=sent["text"], by=reviewed.by)
-        for saved, attempt in _reviews(reviewed, found[0].lost):
+        for saved, attempt in _reviews(reviewed, cluster.lost):
             comments = saved.content.of(attempt).comments
             if comment.text not in (one.text for one in comments):
                 changed = saved.content.about(attempt, comments=(*comments, comment))
@@ -120,12 +127,13 @@ def change_cluster(reviewed: ReviewedClass, sent: Any) -> None:
         return
     if sent["do"] == "split":
         name = str(sent["name"]).strip()
-        for saved, attempt in _reviews(reviewed, found[0].lost.keys() & sent["students"]):
+        for saved, attempt in _reviews(reviewed, cluster.lost.keys() & sent["students"]):
             causes = {**saved.content.of(attempt).causes, check: name}
-            causes = {one: named for one, named in causes.items() if named}
+            if not name:
+                del causes[check]
             store.save(saved.content.about(attempt, causes=causes), saved.version)
         return
-    if found[0].forgiven != sent["was"]:
+    if cluster.forgiven != sent["was"]:
         raise ReviewConflict("This was forgiven or taken back meanwhile. Load the page again.")
     now = store.of_class()
     kept = [one for one in now.content.forgiven if (one.check, one.cause) != (check, cause)]
@@ -139,8 +147,8 @@ def _reviews(
     reviewed: ReviewedClass, keys: Container[str]
 ) -> Iterator[tuple[Saved[StudentReview], str]]:
     """The review of each student or team, with the attempt that is in the class."""
-    found = {row.entry.review_key: row for row in reviewed.rows() if row.row.id in keys}
-    for key, row in found.items():
+    rows = {row.entry.review_key: row for row in reviewed.rows() if row.row.id in keys}
+    for key, row in rows.items():
         yield reviewed.store.student(key), row.attempt
 
 

@@ -83,28 +83,31 @@ class ReviewServer(LocalServer):
         first = next((row.row for row in rows if row.row.waits_for), None)
         if first is not None:
             links = {"Begin with the first that waits": f"{link(first)}?waiting", **links}
-        found = self._class.clusters()
+        causes = self._class.clusters()
         vanished = self._class.store.vanished({row.entry.review_key for row in rows})
-        pages = sorted(one.name for one in (self._class.out / INSTRUCTOR_FOLDER).glob("*.html"))
-        shown = [row.row for row in rows]
-        return HTMLResponse(render_overview(shown, found, vanished, pages, link, links))
+        pages = sorted(file.name for file in (self._class.out / INSTRUCTOR_FOLDER).glob("*.html"))
+        class_rows = [row.row for row in rows]
+        return HTMLResponse(render_overview(class_rows, causes, vanished, pages, link, links))
 
     def _submission(self, request: Request) -> Response:
         row, rows = self._class.find(request.path_params["name"])
         only_waiting = "waiting" in request.query_params
-        at = [one.row.id for one in rows].index(row.attempts[-1])
-        wanted = [bool(one.row.waits_for) or not only_waiting for one in rows]
+        index = [other.row.id for other in rows].index(row.attempts[-1])
+
+        def is_listed(other: ReviewedRow) -> bool:
+            return bool(other.row.waits_for) or not only_waiting
+
         return _page(
             "review",
             row=row,
-            number=at + 1,
+            number=index + 1,
             count=len(rows),
-            before=next((rows[i] for i in reversed(range(at)) if wanted[i]), None),
-            after=next((rows[i] for i in range(at + 1, len(rows)) if wanted[i]), None),
+            before=next(filter(is_listed, reversed(rows[:index])), None),
+            after=next(filter(is_listed, rows[index + 1 :]), None),
             only_waiting=only_waiting,
-            waiting=sum(bool(one.row.waits_for) for one in rows),
+            waiting=len([other for other in rows if other.row.waits_for]),
             source=self._class.source(row),
-            link=lambda one: f"../{quote(one.name)}/",
+            link=lambda other: f"../{quote(other.name)}/",
             attempts=[f"../{quote(folder_name(key))}/" for key in row.attempts],
             shown=row.attempts.index(row.row.id),
             panel=Markup(self._panel(row)),
@@ -174,34 +177,36 @@ class ReviewServer(LocalServer):
         return FileResponse(recordings[name], filename=recordings[name].name)
 
     def _instructor_file(self, request: Request) -> Response:
-        there = {one.name: one for one in (self._class.out / INSTRUCTOR_FOLDER).glob("*.html")}
-        file = there.get(request.path_params["file"])
+        pages = (self._class.out / INSTRUCTOR_FOLDER).glob("*.html")
+        file = {page.name: page for page in pages}.get(request.path_params["file"])
         if file is None:
             return PlainTextResponse("There is no such page.", 404)
         return FileResponse(file, headers=_FRAMED)
 
     def _clusters(self, _: Request) -> Response:
-        found = self._class.clusters()
+        clusters = self._class.clusters()
         return _page(
             "review_clusters",
-            clusters=found[:MOST_CLUSTERS],
-            left=len(found) - MOST_CLUSTERS,
+            clusters=clusters[:MOST_CLUSTERS],
+            left=len(clusters) - MOST_CLUSTERS,
             rows={row.row.id: row for row in self._class.rows()},
             quote=quote,
         )
 
     def _example(self, request: Request) -> Response:
         """Two students of a cluster, each with the check, and the lines of source around it."""
-        check, examples = request.query_params.get("check", ""), []
+        examples = []
         for name in request.query_params.getlist("name")[:2]:
             row, _ = self._class.find(name)
             result = self._class.ledger.whole_result(row.row.id)
-            checks = {one.id: one for one in (result.checks if result else ())}
-            if (found := checks.get(check)) is None:
+            checks = {check.id: check for check in (result.checks if result else ())}
+            check = checks.get(request.query_params.get("check", ""))
+            if check is None:
                 continue
             source = ShownSource(self._class.source(row).files, None)
-            shown = ((one, source.show(one, "example")[1]) for one in places(found))
-            examples.append((row, found, *next((pair for pair in shown if pair[1]), (None, []))))
+            excerpts = ((one, source.show(one, "example")[1]) for one in places(check))
+            place, lines = next((excerpt for excerpt in excerpts if excerpt[1]), (None, []))
+            examples.append((row, check, place, lines))
         return HTMLResponse(_part("review_example.html.j2", examples=examples))
 
     def _change_cluster(self, _: Request, sent: Any) -> Response:
@@ -232,9 +237,9 @@ class ReviewServer(LocalServer):
         if do == "back":
             new = load_before(ledger)
         else:
-            scratch = do == "preview"
-            place = Path(tempfile.mkdtemp(dir=self._scratch.name)) if scratch else new_place(ledger)
-            new = with_text(self._class.loaded, str(sent["text"]), place)
+            is_preview = do == "preview"
+            place = Path(tempfile.mkdtemp(dir=self._scratch.name)) if is_preview else None
+            new = with_text(self._class.loaded, str(sent["text"]), place or new_place(ledger))
         if new is None:
             raise UsageError("There is no assignment to go back to.")
         self._background.judge(do.capitalize(), check, new, write=do != "preview")

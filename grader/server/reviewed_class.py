@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from grader.grading.files import RESULT_FILE
 from grader.report.files import file_version, folder_name
 from grader.report.model.class_row import ClassRow
 from grader.report.model.cluster import Cluster, clusters
-from grader.report.model.result_model import AdjustmentPart
+from grader.report.model.result_model import AdjustmentPart, AttemptPart
 from grader.review.model import AttemptReview, StudentReview
 from grader.review.store import ReviewStore, Saved
 from grader.submission.kept_source import SOURCE_FOLDER, KeptSource, read_kept_source
@@ -47,8 +48,7 @@ class ReviewedRow:
     @property
     def counts(self) -> str:
         """The hash of the attempt that counts, which is the one that a person gives points to."""
-        tried = self.row.result.attempts if self.row.result is not None else ()
-        return next((one.sha256 for one in tried if one.counts), self.attempt)
+        return next((part.sha256 for part in self._tried if part.counts), self.attempt)
 
     @property
     def written(self) -> AttemptReview:
@@ -58,8 +58,12 @@ class ReviewedRow:
     @property
     def earlier(self) -> list[AttemptReview]:
         """What is written about the attempts before it."""
-        tried = self.row.result.attempts if self.row.result is not None else ()
-        return self.saved.content.others_than(self.written, [one.sha256 for one in tried])
+        return self.saved.content.others_than(self.written, [part.sha256 for part in self._tried])
+
+    @property
+    def _tried(self) -> tuple[AttemptPart, ...]:
+        """All attempts, as the result has them."""
+        return self.row.result.attempts if self.row.result is not None else ()
 
     @property
     def name(self) -> str:
@@ -97,28 +101,26 @@ class ReviewedClass:
             return self._rows()
 
     def _rows(self) -> list[ReviewedRow]:
-        written, adjust = self.ledger.read(), None
+        written = self.ledger.read()
         course = file_version(self.out / written.course) if written.course else None
         forgiven = self.store.of_class().content.forgiven
-        shared = (file_version(self.out / BATCH_FILE), course, forgiven)
-        found = {}
+        of_class = (file_version(self.out / BATCH_FILE), course, forgiven)
+        # Made once, where a row is read again.
+        adjust: ClassAdjustments | None = None
+        read: dict[str, _Read] = {}
         for entry in written.entries:
             files = (self.ledger.folder(entry.key) / RESULT_FILE, self.store.file(entry.review_key))
-            version = (*map(file_version, files), shared)
-            known, read = self._known.get(entry.key, (None, None))
-            if read is None or known != version:
+            version = (*map(file_version, files), of_class)
+            if entry.key not in self._known or self._known[entry.key][0] != version:
                 adjust = adjust or ClassAdjustments(self.ledger)
-                read = self._read(entry, adjust)
-                self._known[entry.key] = version, read
-            found[entry.key] = read
-        attempts: dict[str, tuple[str, ...]] = {}
-        for entry in sorted(written.entries, key=lambda one: not one.attempt_of):
-            student = entry.attempt_of or entry.key
-            attempts[student] = (*attempts.get(student, ()), entry.key)
+                self._known[entry.key] = version, self._read(entry, adjust)
+            read[entry.key] = self._known[entry.key][1]
+        attempts = _attempts(written.entries)
         rows = []
-        for row in class_rows([one[0] for one in found.values()], self.ledger, attempts=True):
-            done, saved, problem = found[row.id]
-            of_student = attempts[done.entry.attempt_of or row.id]
+        every = [done for done, _, _ in read.values()]
+        for row in class_rows(every, self.ledger, attempts=True):
+            done, saved, problem = read[row.id]
+            of_student = attempts[_student(done.entry)]
             rows.append(ReviewedRow(row, done.entry, saved, problem, of_student))
         return rows
 
@@ -127,13 +129,13 @@ class ReviewedClass:
         rows = self._all()
         for row in rows:
             if row.name == name:
-                return row, [one for one in rows if not one.entry.attempt_of]
+                return row, [other for other in rows if not other.entry.attempt_of]
         raise UsageError(f"{name}: is no submission of this class any more")
 
     def counted(self, row: ReviewedRow) -> ReviewedRow:
         """The row of the attempt that counts for the student whose row it is."""
-        tried = (one for one in (row, *self._all()) if one.row.id in row.attempts)
-        return next((one for one in tried if one.attempt == row.counts), row)
+        of_student = (other for other in (row, *self._all()) if other.row.id in row.attempts)
+        return next((other for other in of_student if other.attempt == row.counts), row)
 
     def clusters(self) -> tuple[Cluster, ...]:
         """Failures with the same cause."""
@@ -153,6 +155,18 @@ class ReviewedClass:
             why = str(error)
             unread = AdjustmentPart(kind="manual", title="a review that can be read", points=None)
             result = done.result and done.result.model_copy(update={"adjustments": (unread,)})
-            entry = replace(entry, problem="; ".join(filter(None, (entry.problem, why))))
             saved = Saved(StudentReview(key=entry.review_key), "")
-            return replace(done, entry=entry, result=result), saved, why
+            return replace(done, entry=entry.with_problem(why), result=result), saved, why
+
+
+def _attempts(entries: Iterable[Entry]) -> dict[str, tuple[str, ...]]:
+    """Key of a student -> keys of all rows of the student, first to last."""
+    attempts: dict[str, tuple[str, ...]] = {}
+    for entry in sorted(entries, key=lambda entry: not entry.attempt_of):
+        student = _student(entry)
+        attempts[student] = (*attempts.get(student, ()), entry.key)
+    return attempts
+
+
+def _student(entry: Entry) -> str:
+    return entry.attempt_of or entry.key
