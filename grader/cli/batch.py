@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, nullcontext
 from pathlib import Path
 from statistics import median
@@ -90,13 +90,8 @@ def batch(
         raise UsageError(f"batch takes one folder, not {count} submissions: give their folder")
     again = is_batch(assignment)
     if again:
-        out, before = Path(assignment), Ledger(Path(assignment)).read().taken_from
-        if before is None and submissions is None:
-            raise UsageError(f"{out}: say where the submissions lie: rosgrade batch {out} FOLDER")
-        if before is not None:
-            submissions = submissions or Path(before.submissions)
-            roster = roster or (Path(before.roster) if before.roster else None)
-            seed = before.seed if seed is None else seed
+        out = Path(assignment)
+        submissions, roster, seed = _as_before(out, submissions, roster, seed)
         loaded = load_used(Ledger(out))
     else:
         loaded = load_assignment(assignment)
@@ -112,6 +107,12 @@ def batch(
     admission = Admission(cells=at_once)
     # Before anything is read or written: without a sandbox there is no batch.
     grading = make_grading(order, loaded, admission) if scheduler is None else None
+
+    def executor() -> executors.BatchExecutor:
+        if grading is None:
+            return executors.DaskExecutor(str(scheduler), order)
+        return executors.LocalExecutor(grading, admission.most)
+
     began_s = time.monotonic()
     with Scratch("batch") as staging, Progress(quiet).shown() as progress:
         if grading is not None and not quiet:
@@ -121,31 +122,52 @@ def batch(
             progress.note(f"graded with {loaded.file}, as the class is")
         rows = _rows(submissions, roster, rules, out, staging, progress)
         with Ledger(out).opened() as ledger:
-            place = str(rules.file.resolve()) if rules is not None else None
-            lists = str(roster.resolve()) if roster is not None else None
-            taken = TakenFrom(str(submissions.resolve()), lists, seed)
-            work = Batch(loaded, ledger, frozenset(retry or ()), place, taken, keep=again)
-            progress.begin("reading", len(rows))
-            entries, to_do = work.read(rows, progress.advance)
-            # What people wrote must be readable before anything is run.
-            for key in ClassAdjustments(ledger).vanished():
-                progress.note(f"the review of {key} stays, but the class has no such student")
-            executor: executors.BatchExecutor | None = None
-            if to_do and scheduler is not None:
-                executor = executors.DaskExecutor(scheduler, order)
-            elif to_do and grading is not None:
-                executor = executors.LocalExecutor(grading, admission.most)
-            known = [e for e in entries if e.key not in to_do and ledger.result(e.key) is not None]
-            progress.begin("grading", len(entries), already=len(known))
-            with closing(executor) if executor is not None else nullcontext():
-                done = _graded(work, work.grade(to_do, executor), len(entries), progress)
-            done = bring_up_to_date(done, ledger)
+            rules_file = str(rules.file.resolve()) if rules is not None else None
+            roster_file = str(roster.resolve()) if roster is not None else None
+            taken = TakenFrom(str(submissions.resolve()), roster_file, seed)
+            work = Batch(loaded, ledger, frozenset(retry or ()), rules_file, taken, keep=again)
+            done = bring_up_to_date(_grade(work, rows, executor, progress), ledger)
             overview = write_class(done, ledger)
     console = output_console()
     console.print(_summary(done, time.monotonic() - began_s), soft_wrap=True)
     say(f"Overview: {overview}")
     say(f"Grades: {overview.with_name(GRADES_FILE)}")
     raise typer.Exit(NOT_GRADED if any(row.cannot_be_graded for row in class_rows(done)) else 0)
+
+
+def _as_before(
+    out: Path, submissions: Path | None, roster: Path | None, seed: int | None
+) -> tuple[Path, Path | None, int | None]:
+    """Submissions, roster and seed: those that are named now, else those of the batch before."""
+    before = Ledger(out).read().taken_from
+    if before is None:
+        if submissions is None:
+            raise UsageError(f"{out}: say where the submissions lie: rosgrade batch {out} FOLDER")
+        return submissions, roster, seed
+    if roster is None and before.roster:
+        roster = Path(before.roster)
+    return submissions or Path(before.submissions), roster, before.seed if seed is None else seed
+
+
+def _grade(
+    work: Batch,
+    rows: list[Collected],
+    make_executor: Callable[[], executors.BatchExecutor],
+    progress: Progress,
+) -> list[Done]:
+    """Grade what is still to be graded; no executor is made where that is nothing."""
+    ledger = work.ledger
+    progress.begin("reading", len(rows))
+    entries, to_do = work.read(rows, progress.advance)
+    # What people wrote must be readable before anything is run.
+    for key in ClassAdjustments(ledger).vanished():
+        progress.note(f"the review of {key} stays, but the class has no such student")
+    executor = make_executor() if to_do else None
+    keys = [entry.key for entry in entries if entry.key not in to_do]
+    graded_before = [key for key in keys if ledger.result(key) is not None]
+    progress.begin("grading", len(entries), already=len(graded_before))
+    with closing(executor) if executor is not None else nullcontext():
+        return _graded(work, work.grade(to_do, executor), len(entries), progress)
 
 
 def _rows(
@@ -158,17 +180,19 @@ def _rows(
 ) -> list[Collected]:
     """Who handed in what, with what is strange about it told; nothing of it holds the results."""
     is_roster = submissions.suffix.lower() == ".csv" and submissions.is_file()
-    listed = submissions if is_roster else roster
-    names = read_roster(listed) if listed is not None else None
-    if names is not None and is_roster:
-        progress.begin("fetching", len(names.students))
-        rows = collect_roster(names, submissions.parent, staging, progress.advance, rules)
+    roster_file = submissions if is_roster else roster
+    students = read_roster(roster_file) if roster_file is not None else None
+    if students is not None and is_roster:
+        progress.begin("fetching", len(students.students))
+        rows = collect_roster(students, submissions.parent, staging, progress.advance, rules)
     else:
-        rows = collect(submissions, staging, names, progress.note, out, rules)
-    for problem in names.problems if names is not None else ():
-        progress.note(f"{listed}: {problem}")
-    for stranger in unknown_students(rows, rules) if rules is not None else ():
-        progress.note(stranger)
+        rows = collect(submissions, staging, students, progress.note, out, rules)
+    if students is not None:
+        for problem in students.problems:
+            progress.note(f"{roster_file}: {problem}")
+    if rules is not None:
+        for line in unknown_students(rows, rules):
+            progress.note(line)
     for row in rows:
         if row.path is not None:
             # Results within a submission would be a part of it.
@@ -180,9 +204,9 @@ def _graded(work: Batch, finished: Iterator[Done], count: int, progress: Progres
     """The rows of a class as they are finished; what is there at an interrupt is written."""
     done: list[Done] = []
     try:
-        for item in finished:
-            done.append(item)
-            progress.advance(item.entry.key, _said(item), fresh=item.fresh)
+        for row in finished:
+            done.append(row)
+            progress.advance(row.entry.key, _outcome(row), fresh=row.fresh)
     except (KeyboardInterrupt, executors.ExecutorLost):
         # A second Ctrl-C takes away nothing of what is written because of the first.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -212,7 +236,7 @@ def _at_once(jobs: str) -> int | None:
     return int(jobs)
 
 
-def _said(done: Done) -> str:
+def _outcome(done: Done) -> str:
     if done.result is None:
         return done.entry.fault or done.entry.problem or "not graded"
     if done.result.submission.problem:
@@ -226,7 +250,7 @@ def _summary(done: Sequence[Done], wall_s: float) -> str:
     rows = class_rows(done)
     scores = [row.score for row in rows if row.score is not None]
     count = Counter(row.status for row in rows)
-    fresh = sum(item.fresh for item in done)
+    fresh = len([row for row in done if row.fresh])
     graded = len(scores) + count[RowStatus.WAITING]
     parts = [f"{graded} of {len(rows)} graded ({fresh} now, in {wall_s:.0f} s)"]
     if scores:

@@ -17,7 +17,7 @@ from grader.cli.options import Quiet, UsedAssignment, exit_code
 from grader.cli.screen.console import output_console, say
 from grader.cli.screen.progress import Progress
 from grader.gradebook.class_files import GRADES_FILE, class_rows
-from grader.gradebook.class_regrading import regrade_class, write_regraded
+from grader.gradebook.class_regrading import Regraded, regrade_class, write_regraded
 from grader.grading.attempts import with_history
 from grader.grading.files import REPORT_FILE, write_graded
 from grader.grading.regrading import compare, find_recordings, refuse_other
@@ -92,29 +92,33 @@ def _class(batch: Ledger, assignment: str | None, quiet: bool, *, write: bool) -
                 rows.append(row)
                 progress.advance(row.done.entry.key)
         for row in rows:
-            problem = [f"not judged again: {row.problem}"] if row.problem else []
-            for change in (*row.changes, *problem):
+            for change in row.changes:
                 say(f"{row.done.entry.key}: {change}")
+            if row.problem:
+                say(f"{row.done.entry.key}: not judged again: {row.problem}")
         if write:
             say(f"Overview: {write_regraded(rows, ledger)}")
             say(f"Grades: {ledger.out / GRADES_FILE}")
         else:
             say(NOTHING_WRITTEN)
-    gain = [row for row in rows if row.gained > 0]
-    lose = [row for row in rows if row.gained < 0]
-    judged = sum(row.done.fresh for row in rows)
+    gains = [row.gained for row in rows if row.gained > 0]
+    losses = [-row.gained for row in rows if row.gained < 0]
+    judged = [row for row in rows if row.done.fresh]
+    changed = [row for row in rows if row.changes]
     say(
-        f"{judged} judged again in {time.monotonic() - began_s:.1f} s: {len(gain)} gain "
-        f"{sum(row.gained for row in gain):g} points, {len(lose)} lose "
-        f"{-sum(row.gained for row in lose):g} points, "
-        f"{sum(bool(row.changes) for row in rows)} with a change"
+        f"{len(judged)} judged again in {time.monotonic() - began_s:.1f} s: {len(gains)} gain "
+        f"{sum(gains):g} points, {len(losses)} lose {sum(losses):g} points, "
+        f"{len(changed)} with a change"
     )
-    results = ((row.problem, row.done.result) for row in rows)
-    left = sum(bool(why) or not (one is None or one.graded) for why, one in results)
+    left = [row for row in rows if row.problem or _is_not_graded(row)]
     if left:
         say(
-            f"{left} cannot be judged again from their recordings; run them again with "
+            f"{len(left)} cannot be judged again from their recordings; run them again with "
             "`rosgrade batch ... --retry NAME`"
         )
     rows_now = class_rows([row.done for row in rows])
     raise typer.Exit(NOT_GRADED if any(row.cannot_be_graded for row in rows_now) or left else 0)
+
+
+def _is_not_graded(row: Regraded) -> bool:
+    return row.done.result is not None and not row.done.result.graded

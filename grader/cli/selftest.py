@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -81,12 +82,14 @@ def selftest(
     if cpp:
         UnderlayStore(cache_folder(), ros.find()).fetched([find_underlay("rclcpp")])
 
-    def chosen_trial(trial: Trial) -> bool:
-        return trial.role is Role.REFERENCE if record else not only or trial.id in only
+    def is_chosen(trial: Trial) -> bool:
+        if record:
+            return trial.role is Role.REFERENCE
+        return not only or trial.id in only
 
     console = output_console()
     perfect = True
-    chosen = chosen_sandbox(sandbox, Progress(quiet))
+    place = chosen_sandbox(sandbox, Progress(quiet))
     for name in assignments or list_assignments():
         loaded = load_assignment(name)
         reference = reference_of(loaded.assignment.id, loaded.folder, language)
@@ -96,19 +99,17 @@ def selftest(
         results: list[TrialResult] = []
         graded: list[Graded] = []
         every = trials(loaded, language)
-        for missing in {*(only or ())} - {trial.id for trial in every}:
-            near = nearest_or_all(missing, [trial.id for trial in every])
-            raise UsageError(f"{loaded.assignment.id} has no mutant {missing!r}.{near}")
-        wanted = [*filter(chosen_trial, every)]
-        with Runner(ros.find(), sandbox=chosen) as runner, Progress(quiet).shown() as progress:
+        _refuse_unknown(loaded.assignment.id, only or (), [trial.id for trial in every])
+        chosen = [*filter(is_chosen, every)]
+        with Runner(ros.find(), sandbox=place) as runner, Progress(quiet).shown() as progress:
             grading = Grading(loaded, runner, cache_folder())
             on_graded = graded.append if record else lambda _: None
             setup = Setup(loaded, grading, reference, language, on_graded)
             kept_in = keep and keep / loaded.assignment.id
-            for result in run_selftest(setup, wanted, jobs=jobs or 2 * cpu_count(), keep=kept_in):
+            for result in run_selftest(setup, chosen, jobs=jobs or 2 * cpu_count(), keep=kept_in):
                 results.append(result)
                 progress.say(
-                    f"{loaded.assignment.id}: {len(results)} of {len(wanted)} graded: "
+                    f"{loaded.assignment.id}: {len(results)} of {len(chosen)} graded: "
                     f"{result.trial.id}: {'WRONG' if result.wrong else 'ok'}"
                 )
         if record:
@@ -121,10 +122,17 @@ def selftest(
     raise typer.Exit(0 if perfect else 1)
 
 
+def _refuse_unknown(assignment: str, only: Sequence[str], ids: Sequence[str]) -> None:
+    unknown = sorted({*only}.difference(ids))
+    if unknown:
+        near = nearest_or_all(unknown[0], ids)
+        raise UsageError(f"{assignment} has no mutant {unknown[0]!r}.{near}")
+
+
 def _print(console: Console, assignment: str, results: list[TrialResult]) -> None:
     table = Table("", assignment, "WHAT", "LOST", box=None, pad_edge=False)
-    order = ("reference", "variant", "mutant", "starter")
-    for result in sorted(results, key=lambda r: (order.index(r.trial.role.value), r.trial.id)):
+    order = [Role.REFERENCE, Role.VARIANT, Role.MUTANT, Role.STARTER]
+    for result in sorted(results, key=lambda r: (order.index(r.trial.role), r.trial.id)):
         table.add_row(
             "WRONG" if result.wrong else "ok",
             result.trial.id,

@@ -33,9 +33,9 @@ def attempts_of(
     """
     times = list(handed_in) or [result.started for result in results]
     copies = [for_student(result) for result in results]
-    seen: Sequence[AttemptPart | None] = [None] * len(results)
+    of_student: Sequence[AttemptPart | None] = [None] * len(results)
     if any(copy is not result for copy, result in zip(copies, results, strict=True)):
-        seen = attempts_of(copies, times, counts)
+        of_student = attempts_of(copies, times, counts)
     return tuple(
         AttemptPart(
             sha256=result.submission.sha256,
@@ -44,7 +44,7 @@ def attempts_of(
             max_score=result.max_score,
             counts=index == counts % len(results),
             changes=_changes(results[index - 1], result) if index else (),
-            visible=seen[index],
+            visible=of_student[index],
         )
         for index, result in enumerate(results)
     )
@@ -65,13 +65,13 @@ def with_history(folder: Path, result: Result) -> Result:
             slim = for_class(replaced).model_copy(update={"attempts": ()})
             keep_earlier(file, result_json(slim))
     files = sorted((folder / EARLIER).glob("result-*.json"))
-    for old in files[:-MOST_KEPT]:
-        old.unlink(missing_ok=True)
-    alike = [one for one in _read(files[-MOST_KEPT:]) if _kind(one) == _kind(result)]
+    for surplus in files[:-MOST_KEPT]:
+        surplus.unlink(missing_ok=True)
+    same_checks = [one for one in _read(files[-MOST_KEPT:]) if _kind(one) == _kind(result)]
     earlier = [
-        one
-        for one, following in pairwise([*alike, result])
-        if one.submission.sha256 != following.submission.sha256
+        before
+        for before, after in pairwise([*same_checks, result])
+        if before.submission.sha256 != after.submission.sha256
     ]
     attempts = attempts_of([*earlier, result]) if earlier else ()
     return result.model_copy(update={"attempts": attempts})

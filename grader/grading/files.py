@@ -99,11 +99,15 @@ def claim(folder: Path, *, keep: bool) -> None:
         UsageError: Something of somebody else's is in the place of a folder that would be replaced.
     """
     recordings, mark = folder / RECORDINGS_FOLDER, folder / _MARK
-    foreign = any(recordings.glob("*.mcap")) and not (recordings / SUBMISSION_FILE).is_file()
-    others = [recordings] if foreign else []
+    others = []
+    if any(recordings.glob("*.mcap")) and not (recordings / SUBMISSION_FILE).is_file():
+        others.append(recordings)
     if not ((folder / RESULT_FILE).is_file() or mark.is_file()):
-        others += [folder / name for name in (SOURCE_FOLDER, *([INSTALL_FOLDER] if keep else []))]
-    for other in filter(Path.exists, others):
+        others.append(folder / SOURCE_FOLDER)
+        if keep:
+            others.append(folder / INSTALL_FOLDER)
+    other = next(filter(Path.exists, others), None)
+    if other is not None:
         raise UsageError(f"{other}: does not belong to a report, so it stays; use another folder")
     write_whole(mark, "rosgrade writes its reports here, over those of before.\n")
 

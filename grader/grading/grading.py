@@ -76,8 +76,10 @@ class Grading:
         self.mistakes: tuple[Mistake, ...] = ()
         self._cache = cache
         self._bag_types = _bag_types(loaded)
-        self._with_bags = self._bag_types != () or any(True for _ in _needed(loaded, Bags))
-        self._libraries = (*loaded.assignment.libraries, *([LIBRARY] if _tested(loaded) else ()))
+        self._with_bags = self._bag_types != () or bool(list(_needed(loaded, Bags)))
+        self._libraries = loaded.assignment.libraries
+        if _tested(loaded):
+            self._libraries += (LIBRARY,)
         check_installed(self._libraries)
         self._build_limits = _build_limits(loaded.assignment.build_limits)
         self._stop = threading.Event()
@@ -107,8 +109,8 @@ class Grading:
         def choose_tested(record: SubmissionRecord) -> frozenset[str]:
             self.told.recorded(record, {})
             named = with_chosen_names(self.loaded, replace(record, given=given))
-            found = map(named.submission.package, _tested(named.loaded))
-            return frozenset(package.name for package in found if package)
+            tested = map(named.submission.package, _tested(named.loaded))
+            return frozenset(package.name for package in tested if package is not None)
 
         return Preparation(
             ros=ros,
@@ -150,7 +152,10 @@ class Grading:
     def surroundings(self) -> list[str]:
         """The sandbox that is in force, and what is sourced and not used: a line for each."""
         sandbox = self.runner.sandbox.description if self.runner.sandbox else "none"
-        return [f"sandbox: {sandbox}", *filter(None, [self.runner.ros.notice])]
+        lines = [f"sandbox: {sandbox}"]
+        if self.runner.ros.notice:
+            lines.append(self.runner.ros.notice)
+        return lines
 
     def close(self) -> None:
         """End every build and cell that runs; what is being graded ends as interrupted."""

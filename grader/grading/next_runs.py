@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from grader.assignment.model import Scenario
 from grader.spec.names import NO_NAMES, Names
@@ -60,30 +60,32 @@ def next_runs(rounds: Sequence[Round]) -> tuple[Run, ...]:
     if len(rounds) > MOST_ROUNDS:
         return ()
     last, before = rounds[-1], _last_runs(rounds)
-    wanted = {one.id: Run(one, _names(one, rounds)) for one in last.scenarios}
-    named = [run for name, run in wanted.items() if _is_new(run, before.get(name))]
-    if named:
-        return tuple(sorted(named, key=lambda run: -run.scenario.timeout))
+    runs = {scenario.id: Run(scenario, _names(scenario, rounds)) for scenario in last.scenarios}
+    new = [run for name, run in runs.items() if _is_new(run, before.get(name))]
+    if new:
+        return tuple(sorted(new, key=lambda run: -run.scenario.timeout))
     again = [
-        Run(run.scenario, run.names, "failed on a disturbed machine")
-        for name, run in wanted.items()
+        replace(run, why="failed on a disturbed machine")
+        for name, run in runs.items()
         if name in last.doubtful and name not in last.undecided
     ]
     alone = [
-        Run(run.scenario, run.names, last.undecided[name], alone=True)
-        for name, run in wanted.items()
+        replace(run, why=last.undecided[name], alone=True)
+        for name, run in runs.items()
         if name in last.undecided
     ]
-    return (*(again if not any(run.why for run in last.runs) else ()), *alone)
+    is_repeated = any(run.why for run in last.runs)
+    return tuple(alone if is_repeated else again + alone)
 
 
 def times_run(rounds: Sequence[Round]) -> dict[str, int]:
     """How often each scenario was run since its names are known."""
-    found: Counter[str] = Counter()
+    times: Counter[str] = Counter()
     for one in rounds:
         for run in one.runs:
-            found[run.scenario.id] = 1 + (found[run.scenario.id] if run.why else 0)
-    return dict(found)
+            # A run that only puts names right begins anew.
+            times[run.scenario.id] = times[run.scenario.id] + 1 if run.why else 1
+    return dict(times)
 
 
 def _last_runs(rounds: Sequence[Round]) -> dict[str, Run]:
@@ -92,10 +94,10 @@ def _last_runs(rounds: Sequence[Round]) -> dict[str, Run]:
 
 def _names(scenario: Scenario, rounds: Sequence[Round]) -> Names:
     """All wrong names of a scenario, of any round: a run that puts one right no longer shows it."""
-    found = NO_NAMES
+    names = NO_NAMES
     for one in rounds:
-        found = found | one.names.get(scenario.id, NO_NAMES)
-    return found
+        names = names | one.names.get(scenario.id, NO_NAMES)
+    return names
 
 
 def _is_new(run: Run, before: Run | None) -> bool:

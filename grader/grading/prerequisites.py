@@ -39,7 +39,8 @@ def diagnose() -> Iterator[Part]:
     else:
         where = "wheels in " if installation.source == "wheels" else "sourced from "
         where += ", ".join(map(str, installation.prefixes))
-        where += installation.notice and f"; {installation.notice}"
+        if installation.notice:
+            where += f"; {installation.notice}"
         yield Part("ROS 2", True, f"{installation.distro}, {where}", required=True)
         yield _rmw(installation)
     yield _colcon()
@@ -91,15 +92,15 @@ def _underlays(installation: ros.RosInstallation) -> Iterator[Part]:
 
     store = UnderlayStore(cache_folder(), installation)
     missing = {name for name in SETS if store.missing([packages_of_ros(name)])}
-    there = [*sorted(SETS.keys() - missing)]
-    there += [one.name for one, _ in store.installed() if one.name not in SETS]
+    built = [*sorted(SETS.keys() - missing)]
+    built += [underlay.name for underlay, _ in store.installed() if underlay.name not in SETS]
     remedy = "what an assignment may need besides; `rosgrade underlay add NAME`"
     absent = f"; not here: {', '.join(sorted(missing))} ({remedy})" if missing else ""
-    yield Part("underlays", True, f"{', '.join(there) or 'none'}{absent}")
+    yield Part("underlays", True, f"{', '.join(built) or 'none'}{absent}")
     remedy = remedy_for_cpp(installation)
     yield Part("nodes in C++", not remedy, "can be graded", remedy)
-    found = find_command(installation)
-    yield Part("ros2", found is not None, str(found), REMEDY)
+    command = find_command(installation)
+    yield Part("ros2", command is not None, str(command), REMEDY)
 
 
 def remedy_for_cpp(installation: ros.RosInstallation) -> str:

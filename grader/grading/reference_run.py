@@ -32,11 +32,11 @@ def read_references(loaded: LoadedAssignment) -> dict[str, Replay]:
 
     A scenario that has changed since is left out: its run would mislead.
     """
-    found = _read(loaded.folder / REFERENCE_FILE)
+    runs = _read(loaded.folder / REFERENCE_FILE)
     return {
-        scenario.id: found[scenario.id]["replay"]
+        scenario.id: runs[scenario.id]["replay"]
         for scenario in loaded.assignment.scenarios
-        if scenario.id in found and found[scenario.id]["of"] == scenario_hash(loaded, scenario)
+        if scenario.id in runs and runs[scenario.id]["of"] == scenario_hash(loaded, scenario)
     }
 
 
@@ -47,12 +47,12 @@ def keep_reference(
     name, file = loaded.assignment.id, loaded.folder / REFERENCE_FILE
     if not grade.full_points:
         raise UsageError(f"{name}: the reference does not get full points, so no run is kept")
-    runs = {
-        scenario.id: {"of": scenario_hash(loaded, scenario), "replay": replay}
-        for scenario in loaded.assignment.scenarios
-        if scenario.id in recordings
-        and (replay := make_replay(recordings[scenario.id], scenario)) is not None
-    }
+    runs = {}
+    for scenario in loaded.assignment.scenarios:
+        if scenario.id in recordings:
+            replay = make_replay(recordings[scenario.id], scenario)
+            if replay is not None:
+                runs[scenario.id] = {"of": scenario_hash(loaded, scenario), "replay": replay}
     if not runs:
         return f"{name}: no scenario with a robot, nothing to keep"
     write_whole(file, _packed(runs))

@@ -113,23 +113,24 @@ def regrade(loaded: LoadedAssignment, found: FoundRecordings) -> Graded:
 
 def compare(before: Result, after: Grade) -> list[str]:
     """Say which checks changed, one line each."""
-    old = {check.id: check for check in before.checks}
+    earlier = {check.id: check for check in before.checks}
     lines = []
     for result in after.results:
-        was = old.pop(result.id, None)
-        if was is None:
-            lines.append(f"{result.id}: new, {result.status.value}, {result.points:g} points")
-        elif (was.status, was.points) != (result.status, result.points):
+        check, status = earlier.pop(result.id, None), result.status
+        if check is None:
+            lines.append(f"{result.id}: new, {status.value}, {result.points:g} points")
+        elif (check.status, check.points) != (status, result.points):
             why = result.decisive.finding.observed.partition("\n")[0]
-            judged = Status.ERROR not in (was.status, result.status)
-            points = f", {was.points:g} -> {result.points:g} points" if judged else ""
-            lines.append(f"{result.id}: {was.status.value} -> {result.status.value}{points}: {why}")
-    lines += [f"{name}: no longer in the assignment" for name in old]
+            is_judged = Status.ERROR not in (check.status, status)
+            points = f", {check.points:g} -> {result.points:g} points" if is_judged else ""
+            lines.append(f"{result.id}: {check.status.value} -> {status.value}{points}: {why}")
+    lines += [f"{name}: no longer in the assignment" for name in earlier]
     score = after.score if after.graded else None
     if before.score != score:
-        earlier, now = (
-            "not graded" if points is None else f"{points:g}" for points in (before.score, score)
-        )
         most = f" of {after.max_score:g}" if score is not None else ""
-        lines.append(f"score: {earlier} -> {now}{most}")
+        lines.append(f"score: {_shown(before.score)} -> {_shown(score)}{most}")
     return lines
+
+
+def _shown(score: float | None) -> str:
+    return "not graded" if score is None else f"{score:g}"

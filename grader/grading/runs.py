@@ -44,8 +44,8 @@ class Runs:
         self._recordings: dict[str, Recording] = {}
         self._faults: dict[str, str] = {}
         self._grade: Grade
-        for old in folder.glob("*.mcap"):
-            old.unlink()
+        for recording in folder.glob("*.mcap"):
+            recording.unlink()
         write_whole(folder / SUBMISSION_FILE, to_json(self._record))
         self._tell()
 
@@ -65,29 +65,34 @@ class Runs:
         if grade.loaded.values != self._loaded.values:
             self._support = self._grading.type_support_of(grade.loaded, self._record)
         self._loaded = grade.loaded
-        disturbed = grade.disturbed_scenarios(Status.ERROR)
-        faulty = [name for name, recording in self._recordings.items() if recording.faults]
         return Round(
             scenarios=tuple(filter(self._is_to_run, self._loaded.assignment.scenarios)),
             runs=runs,
             names=grade.names,
-            undecided={
-                name: self._faults.get(name, "too disturbed").partition("\n")[0]
-                for name in (*disturbed, *faulty, *self._faults)
-            },
+            undecided=self._undecided(grade),
             doubtful=grade.disturbed_scenarios(Status.FAILED),
         )
 
+    def _undecided(self, grade: Grade) -> dict[str, str]:
+        """By scenario, why it could not be judged, in one line."""
+        disturbed = grade.disturbed_scenarios(Status.ERROR)
+        faulty = [name for name, recording in self._recordings.items() if recording.faults]
+        return {
+            name: self._faults.get(name, "too disturbed").partition("\n")[0]
+            for name in (*disturbed, *faulty, *self._faults)
+        }
+
     def graded(self, rounds: Sequence[Round]) -> Graded:
         """The grade after all rounds."""
+        every = [run for one in rounds for run in one.runs]
         return Graded(
-            self._grade,
-            self._prepared,
-            self._recordings,
-            {name: self._file(name) for name in self._recordings},
-            times_run(rounds),
-            read_references(self._grading.loaded),
-            tuple(f"{run.scenario.id}, {run.why}" for one in rounds for run in one.runs if run.why),
+            grade=self._grade,
+            prepared=self._prepared,
+            recordings=self._recordings,
+            files={name: self._file(name) for name in self._recordings},
+            runs=times_run(rounds),
+            references=read_references(self._grading.loaded),
+            repeats=tuple(f"{run.scenario.id}, {run.why}" for run in every if run.why),
         )
 
     @property
@@ -146,32 +151,12 @@ class Runs:
         record_bag(order, file)
 
     def _run(self, run: Run) -> Recording:
-        loaded, scenario, grading = self._loaded, run.scenario, self._grading
-        file = self._file(scenario.id)
+        scenario, file = run.scenario, self._file(run.scenario.id)
         try:
             if scenario.bag is not None:
                 self._read_bag(scenario.bag, scenario, file)
-                return read_recording(file)
-            assert self._prepared.install is not None
-            request = RunRequest(
-                loaded.assignment,
-                scenario,
-                self._record,
-                self._prepared.install,
-                seed=scenario_seed(
-                    loaded.assignment.id, scenario.id, self._record.sha256, grading.seed
-                ),
-                worlds=loaded.folder,
-                underlays=self._prepared.underlays,
-                type_support=self._support.prefixes(grading.told.progress),
-                names=run.names,
-                mistakes=grading.mistakes,
-                pauses=any(
-                    bound.parameters.pauses and scenario in loaded.scenarios_of(bound)
-                    for bound in loaded.checks
-                ),
-            )
-            grading.runner.run(request, file, alone=run.alone)
+            else:
+                self._grading.runner.run(self._request(run), file, alone=run.alone)
             return read_recording(file)
         except UsageError as error:
             raise GraderFault(f"the new recording cannot be read: {error}") from error
@@ -179,3 +164,22 @@ class Runs:
             # A full disk, a folder that was removed: it is tried again, and the others go on.
             fault = GraderFault(f"this machine: {str(error)[:_LONGEST_WORDS]}")
             raise machine_fault(error) or fault from error
+
+    def _request(self, run: Run) -> RunRequest:
+        loaded, scenario, grading = self._loaded, run.scenario, self._grading
+        assert self._prepared.install is not None
+        seed = scenario_seed(loaded.assignment.id, scenario.id, self._record.sha256, grading.seed)
+        judging = [bound for bound in loaded.checks if scenario in loaded.scenarios_of(bound)]
+        return RunRequest(
+            loaded.assignment,
+            scenario,
+            self._record,
+            self._prepared.install,
+            seed=seed,
+            worlds=loaded.folder,
+            underlays=self._prepared.underlays,
+            type_support=self._support.prefixes(grading.told.progress),
+            names=run.names,
+            mistakes=grading.mistakes,
+            pauses=any(bound.parameters.pauses for bound in judging),
+        )

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from grader.assignment.interfaces import FOLDER, FOLDERS, write_interfaces
 from grader.assignment.load import LoadedAssignment
+from grader.assignment.model import Package
 from grader.errors import GraderFault
 from grader.grading.own_interfaces import OWN, Definitions, write_packages
 from grader.machine.resources import cache_folder
@@ -32,15 +33,19 @@ def underlays_of(loaded: LoadedAssignment) -> list[Underlay]:
 
 def wanted_underlays(loaded: LoadedAssignment, submission: Path | None = None) -> list[Underlay]:
     """The underlays that it takes to grade a submission, or any submission if none is given."""
-    found, ros = underlays_of(loaded), find()
+    named, ros = underlays_of(loaded), find()
     if submission is not None:
         used = needed_packages(submission, ros)
     else:
-        packages = loaded.assignment.packages
-        in_cpp = (one for one in packages if "ament_cmake" in one.build_types)
-        used = {"rclcpp" for one in in_cpp if not {"rclpy", "rclcpp"}.isdisjoint(one.depends)}
-    listed = frozenset[str]().union(*(one.listed for one in found))
-    return [*found, *map(packages_of_ros, sorted(used - ros.packages - listed))]
+        used = {"rclcpp"} if any(map(_may_be_cpp, loaded.assignment.packages)) else set()
+    listed = {package for underlay in named for package in underlay.listed}
+    return [*named, *map(packages_of_ros, sorted(used - ros.packages - listed))]
+
+
+def _may_be_cpp(package: Package) -> bool:
+    """Whether students may write nodes in C++ in a package."""
+    has_nodes = "rclpy" in package.depends or "rclcpp" in package.depends
+    return has_nodes and "ament_cmake" in package.build_types
 
 
 def missing_underlays(loaded: LoadedAssignment) -> list[str]:
@@ -93,38 +98,58 @@ class TypeSupport:
 
     def _laid(self, *, for_probe: bool, on_build: Say) -> RosInstallation:
         with self._lock:
-            found = self._found.get(for_probe)
+            laid = self._found.get(for_probe)
             # The cache may be emptied while a class is graded, or rosgrade watches.
-            if found is None or not all(path.is_dir() for path in found.underlays):
-                found = self._found[for_probe] = self._built(for_probe, on_build)
-            return found
+            if laid is None or not all(path.is_dir() for path in laid.underlays):
+                laid = self._found[for_probe] = self._built(for_probe, on_build)
+            return laid
 
     def _built(self, for_probe: bool, on_build: Say) -> RosInstallation:
         store = UnderlayStore(self._cache, self._ros, on_build, stop=self._stop)
-        assignment = self._loaded.assignment
         ros = store.lay(underlays_of(self._loaded))
-        handed_in = {package.name for package in assignment.packages}
         with Scratch(FOLDER) as copies:
             for name in FOLDERS:
-                own = self._loaded.folder / name
-                if not own.is_dir():
-                    continue
-                if name == FOLDER and self._loaded.values:
-                    own = copies / FOLDER
-                    write_interfaces(self._loaded.folder, self._loaded.values, own)
-                # What students have to write is not given to them.
-                names = packages_in(own).keys() - (frozenset() if for_probe else handed_in)
-                if names:
-                    ros = on_top(ros, [store.folder_prefix(own, ros, names)])
-            if for_probe and self._own:
-                own = copies / OWN
-                theirs = {name: one for name, one in self._own.items() if name not in ros.packages}
-                write_packages(theirs, own)
-                ros = on_top(ros, [store.folder_prefix(own, ros)] if theirs else [])
-        if for_probe:
-            types = [type for one in assignment.scenarios for type in one.recorded_types.values()]
-            named = _WORD.findall(" ".join([assignment.model_dump_json(), *types]))
-            if any(one.turtles for one in assignment.scenarios):
-                named.append("turtlesim")
-            ros = store.completed(ros, named)
-        return ros
+                if (self._loaded.folder / name).is_dir():
+                    ros = self._with_authors(name, store, ros, copies, for_probe=for_probe)
+            if for_probe:
+                ros = self._with_students(store, ros, copies / OWN)
+        return store.completed(ros, self._named_words()) if for_probe else ros
+
+    def _with_authors(
+        self,
+        name: str,
+        store: UnderlayStore,
+        ros: RosInstallation,
+        copies: Path,
+        *,
+        for_probe: bool,
+    ) -> RosInstallation:
+        """ROS with the packages in one folder beside the assignment on top."""
+        folder = self._loaded.folder / name
+        if name == FOLDER and self._loaded.values:
+            folder = copies / FOLDER
+            write_interfaces(self._loaded.folder, self._loaded.values, folder)
+        names = set(packages_in(folder))
+        if not for_probe:
+            # What students have to write is not given to them.
+            names -= {package.name for package in self._loaded.assignment.packages}
+        return on_top(ros, [store.folder_prefix(folder, ros, names)]) if names else ros
+
+    def _with_students(
+        self, store: UnderlayStore, ros: RosInstallation, folder: Path
+    ) -> RosInstallation:
+        """ROS with the interfaces of the student's own on top, which the probe has to read."""
+        packages = {name: one for name, one in self._own.items() if name not in ros.packages}
+        if not packages:
+            return ros
+        write_packages(packages, folder)
+        return on_top(ros, [store.folder_prefix(folder, ros)])
+
+    def _named_words(self) -> list[str]:
+        """Every word in the assignment: some are packages of types that the probe hears."""
+        assignment = self._loaded.assignment
+        types = [type for one in assignment.scenarios for type in one.recorded_types.values()]
+        words = _WORD.findall(" ".join([assignment.model_dump_json(), *types]))
+        if any(scenario.turtles for scenario in assignment.scenarios):
+            words.append("turtlesim")
+        return words

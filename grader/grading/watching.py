@@ -85,9 +85,7 @@ class Watching:
                     yield Step.BEGAN
                     self._worker.begin()
                     grading = self._start(pool, self._worker.grade)
-                    while not (finished := self._next() is grading) and self._state() == state:
-                        pass
-                    if finished:
+                    if self._is_finished_before_a_change(grading, state):
                         ended, grading = _ended(grading), None
                         yield ended
                         # A save between this look and the copy that was graded counts as one.
@@ -103,6 +101,14 @@ class Watching:
                 if grading is not None:
                     self._cancel(grading)
 
+    def _is_finished_before_a_change(self, grading: Future[Graded], state: tuple[str, str]) -> bool:
+        """Wait until a grading ends, or the files are others than at its beginning."""
+        while True:
+            if self._next() is grading:
+                return True
+            if self._state() != state:
+                return False
+
     def _start(self, pool: ThreadPoolExecutor, work: Callable[[], T]) -> Future[T]:
         future = pool.submit(work)
         future.add_done_callback(self._news.put)
@@ -110,7 +116,8 @@ class Watching:
 
     def _next(self) -> Future[Any] | None:
         news = self._news.get()
-        if news in self._watches and (error := news.exception()):
+        error = news.exception() if news in self._watches else None
+        if error is not None:
             raise GraderFault(f"the files cannot be watched: {error}")
         return news
 

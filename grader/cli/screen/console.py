@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 # The rest is not wanted: `| head`, and a terminal that was closed.
 _UNREAD = frozenset({errno.EPIPE, errno.EIO})
 
+_BROWSER_S = 2.0
+"""A browser that cannot be started is known by then."""
 _Answer = TypeVar("_Answer")
 
 
@@ -110,12 +112,13 @@ def open_page(url: str, shown_url: str = "") -> None:
     import webbrowser
 
     # Without a display only browsers for terminals are found, which would take this terminal.
-    shown = any(os.environ.get(name) for name in ("BROWSER", "DISPLAY", "WAYLAND_DISPLAY"))
-    failed = [sys.platform.startswith("linux") and not shown]
-    if not failed[0]:
-        # Some browsers keep the program that starts them until they are closed: wait 2 s at most.
-        work = threading.Thread(target=lambda: failed.append(not webbrowser.open(url)), daemon=True)
+    has_display = any(os.environ.get(name) for name in ("BROWSER", "DISPLAY", "WAYLAND_DISPLAY"))
+    can_open = has_display or not sys.platform.startswith("linux")
+    opened: list[bool] = []
+    if can_open:
+        # Some browsers keep the program that starts them until they are closed.
+        work = threading.Thread(target=lambda: opened.append(webbrowser.open(url)), daemon=True)
         work.start()
-        work.join(2.0)
-    if any(failed):
+        work.join(_BROWSER_S)
+    if not can_open or opened == [False]:
         print_warning(f"--open: no browser could be started; the page is {shown_url or url}")

@@ -103,20 +103,21 @@ class Progress:
         if self._bars is not None:
             self._show("", work, completed=0, total=total)
         elif not self._quiet:
-            _print(
-                f"{work} {total}" + (f", {already} of them by an earlier run" if already else "")
-            )
+            by_earlier_run = f", {already} of them by an earlier run" if already else ""
+            _print(f"{work} {total}{by_earlier_run}")
 
     def advance(self, name: str, note: str = "", *, fresh: bool = True) -> None:
         """Count one piece of work that is done."""
         self._count += 1
-        self._fresh += fresh
+        if fresh:
+            self._fresh += 1
         rate = self._rate()
         if self._bars is not None:
-            text = f"{self._work}, {self._count} of {self._total}{rate and f', {rate}'}"
+            text = ", ".join(filter(None, (f"{self._work}, {self._count} of {self._total}", rate)))
             self._show("", text, completed=self._count, total=self._total)
         elif note and fresh and not self._quiet:
-            _print(f"{self._count} of {self._total}: {name}: {note}{rate and f' ({rate})'}")
+            in_brackets = f" ({rate})" if rate else ""
+            _print(f"{self._count} of {self._total}: {name}: {note}{in_brackets}")
 
     def narrate(self, scenario: str, event: Mapping[str, Any]) -> None:
         """Tell what the cell of a scenario does."""
