@@ -26,7 +26,7 @@ from grader.spec.name import INTERFACE
 from grader.spec.nearest_name import did_you_mean, nearest_or_all
 from grader.spec.source import Source
 from grader.submission.read.rosdistro import PACKAGES
-from grader.submission.underlay.definition import find_underlay
+from grader.submission.underlay.definition import Underlay, find_underlay
 
 FOLDER = "interfaces"
 """Beside ``assignment.yaml``: our copy of the interface packages that the student writes."""
@@ -57,22 +57,14 @@ class Interfaces:
     @classmethod
     def of(cls, folder: Path, values: Values, underlays: Sequence[str] = ()) -> Interfaces:
         """Look around; without an underlay that is not built here, ROS is as good as not there."""
-        named = [find_underlay(given, folder) for given in underlays]
-        files = [*resources.carried_interfaces().glob(f"*/{_MANIFEST}")]
-        files += sorted(file for name in FOLDERS for file in (folder / name).rglob(_MANIFEST))
-        files += [file for one in named if one.folder for file in one.folder.rglob(_MANIFEST)]
-        try:
-            installation = ros.find()
-            prefixes: Sequence[Path] | None = installation.prefixes
-            if named:
-                from grader.submission.underlay.store import UnderlayStore
-
-                store = UnderlayStore(resources.cache_folder(), installation)
-                prefixes = [*store.fetched(named), *installation.prefixes]
-        except GraderFault:
-            prefixes = None
-        own = {fill_text(file.parent.name, values): file.parent for file in files}
-        return cls(own, prefixes, values)
+        named = [find_underlay(underlay, folder) for underlay in underlays]
+        manifests = [*resources.carried_interfaces().glob(f"*/{_MANIFEST}")]
+        manifests += sorted(file for name in FOLDERS for file in (folder / name).rglob(_MANIFEST))
+        for underlay in named:
+            if underlay.folder:
+                manifests += underlay.folder.rglob(_MANIFEST)
+        own = {fill_text(file.parent.name, values): file.parent for file in manifests}
+        return cls(own, _prefixes(named), values)
 
     def find(self, interface: str) -> str:
         """The text of a definition; KeyError where there is none at hand."""
@@ -90,15 +82,34 @@ class Interfaces:
     @cached_property
     def packages(self) -> set[str]:
         """Every package with interfaces."""
-        indices = (prefix / "share/ament_index/resource_index" for prefix in self.prefixes or ())
-        found = {file.name for index in indices for file in index.glob("rosidl_interfaces/*")}
-        return found | set(self.own)
+        packages = set(self.own)
+        for prefix in self.prefixes or ():
+            index = prefix / "share/ament_index/resource_index/rosidl_interfaces"
+            packages |= {file.name for file in index.glob("*")}
+        return packages
 
     def _files(self, package: str, kind: str) -> Iterator[tuple[str, Path]]:
-        own = [self.own[package]] if package in self.own else []
-        for folder in (*own, *(prefix / "share" / package for prefix in self.prefixes or ())):
+        """Name and file of each interface of a kind, the assignment's own first."""
+        folders = [prefix / "share" / package for prefix in self.prefixes or ()]
+        if package in self.own:
+            folders.insert(0, self.own[package])
+        for folder in folders:
             for file in (folder / kind).glob(f"*.{kind}"):
                 yield fill_text(file.stem, self.values), file
+
+
+def _prefixes(underlays: Sequence[Underlay]) -> Sequence[Path] | None:
+    """The ament prefixes of underlays and of ROS; None where one of them is not installed."""
+    try:
+        installation = ros.find()
+        if not underlays:
+            return installation.prefixes
+        from grader.submission.underlay.store import UnderlayStore
+
+        store = UnderlayStore(resources.cache_folder(), installation)
+        return [*store.fetched(underlays), *installation.prefixes]
+    except GraderFault:
+        return None
 
 
 def write_interfaces(folder: Path, values: Values, target: Path) -> None:
@@ -200,11 +211,13 @@ def field_problems(
 
 def _types(assignment: Assignment, bound: BoundCheck, endpoint: str) -> list[str]:
     """The types that a topic, a service or an action has in the scenarios of a check."""
-    found = []
+    types: dict[str, None] = {}
     for scenario in assignment.judged_by(bound.spec):
-        used = dict(one.exchanged for one in scenario.stimuli if one.exchanged)
-        found.append({**used, **scenario.recorded_types}.get(endpoint))
-    return list(dict.fromkeys(interface for interface in found if interface is not None))
+        exchanged = dict(one.exchanged for one in scenario.stimuli if one.exchanged)
+        type_ = {**exchanged, **scenario.recorded_types}.get(endpoint)
+        if type_ is not None:
+            types[type_] = None
+    return list(types)
 
 
 def _lack(named: NamedFields, message: dict[str, Any]) -> str:
@@ -227,10 +240,10 @@ def _sample(interface: str, find: Find, around: tuple[str, ...]) -> dict[str, An
     """A message of a type, with one value in each of its arrays."""
     if interface in around:
         raise KeyError(interface)
-    found: dict[str, Any] = {}
+    message: dict[str, Any] = {}
     for name, field in fields_of(interface, find(interface)).items():
         value = _ZERO.get(field.type, 0)
         if field.is_message:
             value = _sample(field.type, find, (*around, interface))
-        found[name] = [value] if field.is_array else value
-    return found
+        message[name] = [value] if field.is_array else value
+    return message

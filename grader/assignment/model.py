@@ -206,11 +206,11 @@ class Launch(Model):
         if (self.executable is None) == (self.file is None):
             raise ValueError("give either an 'executable' or a launch 'file'")
         if self.file is not None:
-            given = {"name", "namespace", "parameters", "remap"} & self.model_fields_set
-            if given:
-                listed = ", ".join(sorted(given))
+            of_nodes = {"name", "namespace", "parameters", "remap"} & self.model_fields_set
+            if of_nodes:
+                keys = ", ".join(sorted(of_nodes))
                 raise ValueError(
-                    f"a launch file says itself how its nodes start: leave out {listed}, and give "
+                    f"a launch file says itself how its nodes start: leave out {keys}, and give "
                     "its 'arguments'"
                 )
         return self
@@ -409,8 +409,10 @@ class Scenario(Model):
     def transform_topics(self) -> dict[str, Durability]:
         """The robot's topics of transforms, if the scenario names them; with their durability."""
         tf = self.topics.tf
-        named = self.simulated_robots and "tf" in self.topics.model_fields_set and tf.enabled
-        return {tf.topic: tf.durability, tf.static_topic: "transient_local"} if named else {}
+        is_named = "tf" in self.topics.model_fields_set and tf.enabled
+        if not is_named or not self.simulated_robots:
+            return {}
+        return {tf.topic: tf.durability, tf.static_topic: "transient_local"}
 
     @property
     def camera_topics(self) -> set[str]:
@@ -421,12 +423,13 @@ class Scenario(Model):
     @property
     def simulation(self) -> SimulatorOptions:
         """Everything about rosgrade's simulator but the world and the names of several robots."""
-        own = {key: getattr(self, key) for key in SimulatorOptions.model_fields}
-        return SimulatorOptions(**own)
+        return SimulatorOptions(
+            **{key: getattr(self, key) for key in SimulatorOptions.model_fields}
+        )
 
     @property
     def simulated_robots(self) -> dict[str, SimulatorOptions]:
-        """The robots in its world by their names, which is empty for the only one."""
+        """The robots in its world by name; where there is only one, its name is empty."""
         if self.simulator is not None:
             return {"": self.simulator.options}
         has_robots = self.world is not None and not self.turtles
@@ -440,19 +443,20 @@ class Scenario(Model):
     @property
     def recorded_types(self) -> dict[str, str]:
         """Topic -> type of all that is recorded: `record`, and the robot's topics."""
-        found = {one.topic: one.type for one in self.record}
-        found = commands(self.turtles) | found
+        types = dict.fromkeys(self.transform_topics, TRANSFORMS)
+        types |= commands(self.turtles)
+        types |= {recorded.topic: recorded.type for recorded in self.record}
         if self.bag is not None and self.has_robot:
-            found.setdefault(self.topics.command.topic, self.topics.command.type)
-            found[self.topics.odometry.topic] = ODOMETRY
+            types.setdefault(self.topics.command.topic, self.topics.command.type)
+            types[self.topics.odometry.topic] = ODOMETRY
         for robot in self.simulated_robots.values():
-            found.setdefault(robot.topics.command.topic, robot.topics.command.type)
+            types.setdefault(robot.topics.command.topic, robot.topics.command.type)
             if robot.odometry.enabled:
-                found[robot.topics.odometry.topic] = ODOMETRY
+                types[robot.topics.odometry.topic] = ODOMETRY
             if robot.lidar.enabled:
-                found[robot.topics.scan.topic] = LASER_SCAN
-            found |= {sensor.topic: sensor.interface for sensor in robot.sensors}
-        return {**dict.fromkeys(self.transform_topics, TRANSFORMS), **found}
+                types[robot.topics.scan.topic] = LASER_SCAN
+            types |= {sensor.topic: sensor.interface for sensor in robot.sensors}
+        return types
 
 
 class Counts(str, Enum):
@@ -559,8 +563,8 @@ class CheckSpec(Model):
     @property
     def window(self) -> Window | None:
         """When it looks at a run; None for the whole run."""
-        found = Window(self.after, self.before, self.while_, self.from_, self.to)
-        return found if found != Window() else None
+        window = Window(self.after, self.before, self.while_, self.from_, self.to)
+        return window if window != Window() else None
 
 
 class Level(Model):
@@ -669,4 +673,5 @@ class Assignment(Model):
         """
         if spec.scenarios:
             return tuple(one for one in self.scenarios if one.id in spec.scenarios)
-        return tuple(one for one in self.scenarios if one.bag is None) or self.scenarios
+        runs = tuple(scenario for scenario in self.scenarios if scenario.bag is None)
+        return runs or self.scenarios

@@ -18,6 +18,7 @@ from sim.robot import starting
 from sim.world import World, turtle_names, world_of
 
 _TRIED_SEEDS = range(20)
+"""Enough that a robot which starts in a wall for some random values is found for nearly all."""
 
 
 def read_scenario_world(file: Path, values: dict[str, str]) -> World:
@@ -27,16 +28,15 @@ def read_scenario_world(file: Path, values: dict[str, str]) -> World:
 
 def with_turtles(assignment: Assignment, folder: Path) -> Assignment:
     """The same assignment, whose scenarios know the turtles in their worlds."""
-
-    def known(scenario: Scenario) -> Scenario:
+    scenarios = []
+    for scenario in assignment.scenarios:
         names: tuple[str, ...] = ()
-        # A world that cannot be read is told later.
-        with suppress(AssignmentError, UsageError):
-            names = turtle_names(read_source(folder / str(scenario.world)))
-        return scenario.with_turtles(names) if names else scenario
-
-    worlds = [known(one) if one.world is not None else one for one in assignment.scenarios]
-    return assignment.model_copy(update={"scenarios": tuple(worlds)})
+        if scenario.world is not None:
+            # A world that cannot be read is told later.
+            with suppress(AssignmentError, UsageError):
+                names = turtle_names(read_source(folder / scenario.world))
+        scenarios.append(scenario.with_turtles(names) if names else scenario)
+    return assignment.model_copy(update={"scenarios": tuple(scenarios)})
 
 
 def _scenario_world(world: Source, values: dict[str, str]) -> World:
@@ -93,12 +93,13 @@ def _parameters(
 def _world(source: Source, place: Place, file: str, scenario: Scenario) -> Iterator[Problem]:
     values: dict[str, float] = {}
     try:
-        written = read_source(source.file.parent / file)
+        world_source = read_source(source.file.parent / file)
         for seed in _TRIED_SEEDS if scenario.random else (0,):
             values = draw_values(scenario, seed)
-            world = _scenario_world(written, world_values(scenario, values))
+            world = _scenario_world(world_source, world_values(scenario, values))
             if scenario.simulator is None:
                 starting(world, scenario.simulated_robots)
     except (AssignmentError, UsageError) as error:
         drawn = ", ".join(f"{name} = {value:g}" for name, value in values.items())
-        yield source.problem(place, f"{error}{f' (with {drawn})' if drawn else ''}")
+        with_values = f" (with {drawn})" if drawn else ""
+        yield source.problem(place, f"{error}{with_values}")

@@ -58,9 +58,9 @@ def read_message(
         drawn: Values of the scenario by name, which ``$name`` stands for.
         place: Of the value, for errors.
     """
-    found = _Reader(find, drawn, place).message(value, interface, ())
-    assert isinstance(found, dict)
-    return found
+    message = _Reader(find, drawn, place).message(value, interface, ())
+    assert isinstance(message, dict)
+    return message
 
 
 def _nested(value: Mapping[str, Any]) -> dict[str, Any]:
@@ -70,14 +70,14 @@ def _nested(value: Mapping[str, Any]) -> dict[str, Any]:
         if not _PATH.fullmatch(str(key)):
             raise ValueError(f"{key!r} is not a field: write its path, as in linear.x or data[0]")
         *steps, last = _STEP.findall(str(key))
-        here: Any = root
+        inner: Any = root
         for step in steps:
-            here = here.setdefault(step, _Inner())
-            if not isinstance(here, _Inner):
+            inner = inner.setdefault(step, _Inner())
+            if not isinstance(inner, _Inner):
                 raise ValueError(f"{key!r} is given twice")
-        if last in here:
+        if last in inner:
             raise ValueError(f"{key!r} is given twice")
-        here[last] = item
+        inner[last] = item
     return {name: _plain(item, name) for name, item in root.items()}
 
 
@@ -114,14 +114,14 @@ class _Reader:
             items = _nested(value)
         except ValueError as error:
             raise StimulusError(str(error), (*self.base, *place)) from None
-        found = {}
+        message = {}
         for name, item in items.items():
             if name not in fields:
                 listed = f" It has: {', '.join(fields) or 'none'}."
                 text = f"{where} has no field {name!r}.{did_you_mean(name, fields) or listed}"
                 raise StimulusError(text, (*self.base, *place, name))
-            found[name] = self._field(item, fields[name], (*place, name))
-        return found
+            message[name] = self._field(item, fields[name], (*place, name))
+        return message
 
     def _field(self, value: Any, field: Field, place: Place) -> Any:
         if not field.is_array:
@@ -149,7 +149,7 @@ class _Reader:
         return self._number(value, field.type, place)
 
     def _number(self, value: Any, kind: str, place: Place) -> int | float:
-        number = self._drawn(value, place) if isinstance(value, str) else value
+        number = self._read(value, place) if isinstance(value, str) else value
         if isinstance(number, bool) or not isinstance(number, int | float):
             raise self._misfit(place, "a number", value)
         if kind in FLOATS:
@@ -159,15 +159,17 @@ class _Reader:
             raise self._misfit(place, f"a whole number from {low} to {high} ({kind})", value)
         return int(number)
 
-    def _drawn(self, text: str, place: Place) -> float | int | None:
+    def _read(self, text: str, place: Place) -> float | int | None:
+        """The number that a text stands for: ``$name``, ``30 deg`` or ``1e3``; None for none."""
         if text.startswith("$"):
-            if text[1:] not in self.drawn:
-                advice = did_you_mean(text[1:], self.drawn)
-                message = f"{path(place)}: there is no value {text[1:]!r}.{advice}"
+            name = text[1:]
+            if name not in self.drawn:
+                advice = did_you_mean(name, self.drawn)
+                message = f"{path(place)}: there is no value {name!r}.{advice}"
                 raise StimulusError(message, (*self.base, *place))
-            return self.drawn[text[1:]]
+            return self.drawn[name]
         # A whole number of 64 bits does not survive as a float.
-        for read in (int, lambda given: parse_any(given)[0], float):
+        for read in (int, lambda quantity: parse_any(quantity)[0], float):
             try:
                 return read(text)
             except ValueError:

@@ -33,10 +33,12 @@ def _kind(value: Any) -> str | None:
     """The tag of an entry: the name of the model whose key it has, or nearly has."""
     if isinstance(value, StimulusModel):
         return type(value).__name__
-    keys = [str(key) for key in value] if isinstance(value, dict) else []
-    found = next((key for key in keys if key in _KEYS), None)
-    found = found or next((near for key in keys[:1] if (near := nearest(key, _KEYS))), None)
-    fitting = (one.__name__ for one in _MODELS if one.key == found and one.accepts(value))
+    if not isinstance(value, dict) or not value:
+        return None
+    keys = [str(key) for key in value]
+    known = next((key for key in keys if key in _KEYS), None)
+    meant = known or nearest(keys[0], _KEYS)
+    fitting = (one.__name__ for one in _MODELS if one.key == meant and one.accepts(value))
     return next(fitting, None)
 
 

@@ -46,8 +46,8 @@ class Join(StimulusModel):
         self, preparation: Preparation, scenario: ScenarioOfStimuli
     ) -> Iterator[tuple[Place, str]]:
         """Its name is used already, or the probe itself publishes on its topic."""
-        alike = [one for one in scenario.stimuli if isinstance(one, Join) and one.name == self.name]
-        if alike[0] is not self:
+        joins = [one for one in scenario.stimuli if isinstance(one, Join)]
+        if next(join for join in joins if join.name == self.name) is not self:
             yield ("name",), f"the name {self.name!r} is used twice"
         sent = [one.exchanged for one in scenario.stimuli if Act.PUBLISH in one.provides]
         if self.exchanged in sent:

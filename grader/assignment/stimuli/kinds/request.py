@@ -236,7 +236,7 @@ class SetParameters(StimulusModel):
     def prepared(self, preparation: Preparation) -> SetParameters:
         """The same with its values read."""
         drawn = dict(preparation.drawn)
-        values = {name: _value(name, it, drawn) for name, it in self.set_parameters.items()}
+        values = {name: _value(name, item, drawn) for name, item in self.set_parameters.items()}
         return self.model_copy(update={"set_parameters": values})
 
 
@@ -250,14 +250,15 @@ def _value(name: str, value: Any, drawn: dict[str, float]) -> Any:
     """The value that a parameter is set to, of a type that parameters have."""
     place: Place = ("set_parameters", name)
     try:
-        found = fill_in(value, drawn)
+        filled = fill_in(value, drawn)
     except UsageError as error:
         raise StimulusError(str(error), place) from None
-    types = {type(item) for item in (found if isinstance(found, list) else [found])}
-    if not types <= {bool, int, float, str} or (len(types) != 1 and types != {int, float}):
+    types = {type(item) for item in (filled if isinstance(filled, list) else [filled])}
+    is_of_one_type = len(types) == 1 or types == {int, float}
+    if not types <= {bool, int, float, str} or not is_of_one_type:
         text = f"{name}: expected true or false, a number, a text, or a list of one of these"
         raise StimulusError(text, place)
-    return found
+    return filled
 
 
 @kind

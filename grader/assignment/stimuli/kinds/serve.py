@@ -165,21 +165,21 @@ class Serve(StimulusModel):
                 raise StimulusError(f"the field {to!r} of the goal has no position", place)
             if answer.drive.distance is not None:
                 read({answer.drive.distance: 0.0}, 2, "drive", "distance")
-        found: dict[str, Any] = {}
+        fields: dict[str, Any] = {}
         for key, part in answer.parts.items():
             value = getattr(answer, key)
             if isinstance(value, tuple):
-                found[key] = tuple(read(one, part, key, index) for index, one in enumerate(value))
+                fields[key] = tuple(read(one, part, key, index) for index, one in enumerate(value))
             else:
-                found[key] = read(value, part, key)
-        return answer.model_copy(update=found)
+                fields[key] = read(value, part, key)
+        return answer.model_copy(update=fields)
 
     def mistakes(
         self, preparation: Preparation, scenario: ScenarioOfStimuli
     ) -> Iterator[tuple[Place, str]]:
         """It stands twice, or drives a robot that is not there, or its answers do not fit."""
-        alike = [one for one in scenario.stimuli if isinstance(one, Serve)]
-        if next(one for one in alike if one.serve == self.serve) is not self:
+        servers = [one for one in scenario.stimuli if isinstance(one, Serve)]
+        if next(server for server in servers if server.serve == self.serve) is not self:
             yield ("serve",), f"{self.serve!r} stands twice: give one server several 'answers'"
         for number, answer in enumerate(self.answers):
             drive = getattr(answer, "drive", None)
