@@ -112,15 +112,16 @@ def _build_wheel(sources: Mapping[str, Member], folder: Path, assignments: Itera
 def _runtime_lock(wheel: Path) -> bytes:
     """The part of rosgrade's lock that students need: rosgrade's requirements, ROS, and theirs."""
     (built,) = distributions(path=[str(wheel)])
-    extras = {text: re.search(r"extra == '(\w+)'", text) for text in built.requires or []}
-    kept = {
-        re.sub(r"[._-]+", "-", re.split(r"[^\w.-]", text)[0]).lower()
-        for text, extra in extras.items()
-        if extra is None or extra[1] == "ros"
-    }
+    needed = set()
+    for requirement in built.requires or []:
+        extra = re.search(r"extra == '(\w+)'", requirement)
+        if extra is None or extra[1] == "ros":
+            name = re.split(r"[^\w.-]", requirement)[0]
+            needed.add(re.sub(r"[._-]+", "-", name).lower())
     entries = read_lock((resources.root() / _LOCK).read_text(encoding="utf-8"))
-    before = 0
-    while len(kept) > before:
-        before = len(kept)
-        kept |= {entry.name for entry in entries if entry.parents & kept}
-    return "".join(entry.text for entry in entries if entry.name in kept).encode()
+    count = 0
+    # What is needed by something that is needed, until there is no more of it.
+    while len(needed) > count:
+        count = len(needed)
+        needed |= {entry.name for entry in entries if entry.parents & needed}
+    return "".join(entry.text for entry in entries if entry.name in needed).encode()

@@ -68,9 +68,12 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "interfaces": contract.Interface,
     },
     "stimuli": {
-        heading: found
-        for one in stimulus_models()
-        for heading, found in {one.heading or one.key: one, **one.nested_models}.items()
+        heading: described
+        for stimulus in stimulus_models()
+        for heading, described in {
+            stimulus.heading or stimulus.key: stimulus,
+            **stimulus.nested_models,
+        }.items()
     },
     "robot": {
         "robot": description.RobotOptions,
@@ -168,8 +171,8 @@ _BOUNDS = {
 def assignment_markdown() -> dict[str, str]:
     """The description of ``assignment.yaml``, its parts, ``mutants.yaml`` and worlds, by page."""
     quantities = [
-        (one.value, ", ".join(f"`{unit}`" for unit in units), f"`{_EXAMPLES[one]}`")
-        for one, units in UNITS.items()
+        (dimension.value, ", ".join(f"`{unit}`" for unit in units), f"`{_EXAMPLES[dimension]}`")
+        for dimension, units in UNITS.items()
     ]
     folder = resources.assignments()
     example = folder / "timed_publisher" / "assignment.yaml"
@@ -194,13 +197,17 @@ def checks_markdown() -> dict[str, str]:
     for check in CATALOGUE.values():
         pages.setdefault(check.family, []).append(("", check))
     for folder in sorted(resources.assignments().glob(f"*/{FOLDER}")):
-        found = lesson_checks(folder.parent).values()
-        pages.setdefault("lessons", []).extend((folder.parent.name, check) for check in found)
+        lesson = folder.parent
+        of_lesson = [(lesson.name, check) for check in lesson_checks(lesson).values()]
+        pages.setdefault("lessons", []).extend(of_lesson)
     written = {"checks.md": _rendered("checks.md", pages=pages, anchor=_anchor)}
     for family, entries in pages.items():
+        about = None
+        if family in families():
+            about = inspect.getdoc(import_module(f"grader.checks.{family}"))
         written[f"checks/{family}.md"] = _rendered(
             "checks-family.md",
-            about=family in families() and inspect.getdoc(import_module(f"grader.checks.{family}")),
+            about=about,
             entries=entries,
             check_markdown=check_markdown,
             concepts=concepts(),
@@ -210,9 +217,12 @@ def checks_markdown() -> dict[str, str]:
 
 def explanations_markdown() -> dict[str, str]:
     """What rosgrade can tell a student: causes by symptom, and what is seen at once."""
-    # What others are derived from is seen by no check.
-    found = {one: entries for one, entries in explanations().items() if not one.__subclasses__()}
-    symptoms = [(_sentence(symptom), entries) for symptom, entries in found.items()]
+    symptoms = [
+        (_sentence(symptom), entries)
+        for symptom, entries in explanations().items()
+        # What others are derived from is seen by no check.
+        if not symptom.__subclasses__()
+    ]
     symptoms.sort(key=lambda item: item[0])
     errors = [item for item in symptoms if len(item[1]) > _MOST_ENTRIES]
     others = [item for item in symptoms if item not in errors]
@@ -248,22 +258,27 @@ def check_markdown(check: Check) -> str:
     return _rendered("check.md", check=check, text=text, fields=table).rstrip("\n")
 
 
-def _class_section(one: type) -> str:
-    documentation = re.sub(r":\w+:`", "`", inspect.getdoc(one) or "")
+def _class_section(described: type) -> str:
+    """A class: its docstring, and a table of its attributes, properties and methods."""
+    documentation = re.sub(r":\w+:`", "`", inspect.getdoc(described) or "")
     text, _, attributes = documentation.partition("\nAttributes:\n")
     entries = re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", attributes, re.MULTILINE)
     rows = [(f"`{name}`", " ".join(words.split())) for name, words in entries]
-    for name, member in vars(one).items():
+    for name, member in vars(described).items():
         meaning = inspect.getdoc(member)
         if meaning and isinstance(member, _READABLE) and not name.startswith("_"):
-            call = ""
-            if isinstance(member, FunctionType):
-                names = [each for each in inspect.signature(member).parameters if each != "self"]
-                call = f"({', '.join(names)})"
+            call = _call(member) if isinstance(member, FunctionType) else ""
             rows.append((f"`{name}{call}`", meaning.partition("\n")[0]))
-    table = [_outside_code(_table(("name", "meaning"), rows).replace("``", "`"))] if rows else []
-    text = _outside_code(text.strip().replace("``", "`"))
-    return "\n\n".join([f"## {one.__name__}", text, *table])
+    parts = [f"## {described.__name__}", _outside_code(text.strip().replace("``", "`"))]
+    if rows:
+        parts.append(_outside_code(_table(("name", "meaning"), rows).replace("``", "`")))
+    return "\n\n".join(parts)
+
+
+def _call(method: FunctionType) -> str:
+    """How a method is called: ``(topic, at_least)``."""
+    names = [name for name in inspect.signature(method).parameters if name != "self"]
+    return f"({', '.join(names)})"
 
 
 def _anchor(heading: str) -> str:
@@ -278,19 +293,19 @@ def _outside_code(text: str) -> str:
     return "`".join(parts)
 
 
-def _fields_table(one: type[BaseModel]) -> str:
-    schema = one.model_json_schema(by_alias=True)
+def _fields_table(described: type[BaseModel]) -> str:
+    schema = described.model_json_schema(by_alias=True)
     definitions = schema.get("$defs", {})
     # A model that holds itself is among its own definitions.
     schema = definitions.get(str(schema.get("$ref", "")).rpartition("/")[2], schema)
     required = schema.get("required", [])
-    fields = {field.alias or name: field for name, field in one.model_fields.items()}
+    fields = {field.alias or name: field for name, field in described.model_fields.items()}
     rows = []
     properties = schema.get("properties", {}).items()
-    for key, found in sorted(properties, key=lambda item: item[0] not in required):
-        default = "required" if key in required else _default(found, fields[key].default)
-        meaning = _outside_code(str(found.get("description", "")).replace("\n", " "))
-        rows.append((f"`{key}`", _value(found, definitions), default, meaning))
+    for key, value in sorted(properties, key=lambda item: item[0] not in required):
+        default = "required" if key in required else _default(value, fields[key].default)
+        meaning = _outside_code(str(value.get("description", "")).replace("\n", " "))
+        rows.append((f"`{key}`", _value(value, definitions), default, meaning))
     return _table(("key", "value", "default", "meaning"), rows)
 
 
@@ -324,8 +339,8 @@ def _value(schema: Mapping[str, Any], definitions: Mapping[str, Any]) -> str:
 
 
 def _bounds(schema: Mapping[str, Any]) -> str:
-    found = [f"{word} {schema[key]:g}" for key, word in _BOUNDS.items() if key in schema]
-    return f", {' and '.join(found)}" if found else ""
+    bounds = [f"{word} {schema[key]:g}" for key, word in _BOUNDS.items() if key in schema]
+    return f", {' and '.join(bounds)}" if bounds else ""
 
 
 def _default(schema: Mapping[str, Any], value: Any) -> str:
@@ -334,21 +349,27 @@ def _default(schema: Mapping[str, Any], value: Any) -> str:
     if default in (None, "", [], {}):
         return ""
     dimensions = [form.get("x-dimension") for form in (schema, *schema.get("anyOf", ()))]
-    found = next(filter(None, dimensions), None)
+    dimension = next(filter(None, dimensions), None)
     text = str(default)
     if isinstance(value, Pose):
         text = f"[{value.x_m:g}, {value.y_m:g}, {value.yaw_rad:g} rad]"
     elif isinstance(value, TimeTolerance):
         text = str(value)
-    elif found is not None:
-        forms = [f"{default / factor:g} {unit}" for unit, factor in UNITS[Dimension(found)].items()]
-        is_time = Dimension(found) is Dimension.TIME
-        text = format_duration(default) if is_time else min(forms, key=len)
+    elif dimension is not None:
+        text = _quantity(default, Dimension(dimension))
     elif isinstance(default, bool):
         text = text.lower()
-    elif isinstance(default, list) and all(isinstance(one, str) for one in default):
+    elif isinstance(default, list) and all(isinstance(item, str) for item in default):
         text = f"[{', '.join(default)}]"
     return f"`{text}`"
+
+
+def _quantity(value: float, dimension: Dimension) -> str:
+    """A quantity in the unit in which it is shortest: ``300 ms``."""
+    if dimension is Dimension.TIME:
+        return format_duration(value)
+    forms = [f"{value / factor:g} {unit}" for unit, factor in UNITS[dimension].items()]
+    return min(forms, key=len)
 
 
 def _table(header: tuple[str, ...], rows: Any) -> str:

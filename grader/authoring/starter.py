@@ -162,17 +162,16 @@ def _node_name(assignment: Assignment, package: Package, program: Program) -> st
     Without a contract, that which a visible check asks of a program that is launched alone.
     """
     if assignment.contract is not None:
-        said = assignment.contract.programs[package.name, program.executable].node
-        return program.module if said == ANY else said.rpartition("/")[2]
-    every = {scenario.id for scenario in assignment.scenarios}
-    alone = {
-        scenario.id
+        node = assignment.contract.programs[package.name, program.executable].node
+        return program.module if node == ANY else node.rpartition("/")[2]
+    launched = {
+        scenario.id: [(one.package or package.name, one.executable) for one in scenario.launch]
         for scenario in assignment.scenarios
-        if [(one.package or package.name, one.executable) for one in scenario.launch]
-        == [(package.name, program.executable)]
     }
     for spec in _visible(assignment, "node.exists"):
-        if alone and (set(spec.scenarios) or every) <= alone:
+        judged = [launched[scenario] for scenario in spec.scenarios or launched]
+        is_alone = all(programs == [(package.name, program.executable)] for programs in judged)
+        if judged and is_alone:
             return str(spec.with_["name"]).rpartition("/")[2]
     return program.module
 
@@ -188,11 +187,11 @@ def _interfaces(assignment: Assignment, package: Package) -> tuple[InterfaceName
     """The interfaces of a package: the contract's, or without one those that checks name."""
     contract = assignment.contract
     if contract is not None:
-        said = [f"{package.name}/{name}" for name in contract.packages[package.name].interfaces]
+        names = [f"{package.name}/{name}" for name in contract.packages[package.name].interfaces]
     else:
-        said = [str(one.with_["interface"]) for one in _visible(assignment, "interface.")]
-    found = map(InterfaceName.of, dict.fromkeys(said))
-    return tuple(one for one in found if one.package == package.name)
+        names = [str(spec.with_["interface"]) for spec in _visible(assignment, "interface.")]
+    interfaces = map(InterfaceName.of, dict.fromkeys(names))
+    return tuple(interface for interface in interfaces if interface.package == package.name)
 
 
 def rendered(name: str, **values: object) -> str:
@@ -204,7 +203,7 @@ def rendered(name: str, **values: object) -> str:
 def _environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    made = Environment(
+    templates = Environment(
         loader=FileSystemLoader(resources.templates()),
         # Only XML needs escapes.
         autoescape=lambda name: bool(name) and str(name).endswith(".xml.j2"),
@@ -213,5 +212,5 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    made.filters["quoted"] = repr
-    return made
+    templates.filters["quoted"] = repr
+    return templates

@@ -25,12 +25,12 @@ _CUT = "# Made by rosgrade: this copy lacks the hidden checks, which run at grad
 def grading_files(loaded: LoadedAssignment) -> dict[str, bytes]:
     """The files that grading needs, by path: all but its solution and its mutants."""
     solutions = {name for one in LANGUAGES for name in (one.mutants, one.reference)}
-    found = {path.relative_to(loaded.folder): path for path in files_in(loaded.folder)}
-    return {
-        inside.as_posix(): path.read_bytes()
-        for inside, path in found.items()
-        if inside.parts[0] not in solutions
-    }
+    files = {}
+    for path in files_in(loaded.folder):
+        inside = path.relative_to(loaded.folder)
+        if inside.parts[0] not in solutions:
+            files[inside.as_posix()] = path.read_bytes()
+    return files
 
 
 def visible_files(loaded: LoadedAssignment) -> dict[str, bytes]:
@@ -76,11 +76,11 @@ def _visible_data(loaded: LoadedAssignment, part: LoadedAssignment) -> dict[str,
     scenarios = expanded_with(loaded.source, loaded.values).read(Assignment).scenarios
     # Those of a contract come first, and none of them is hidden.
     written = data.get("checks") or []
-    bounds = loaded.checks[len(loaded.checks) - len(written) :]
+    authors = loaded.checks[len(loaded.checks) - len(written) :]
     kept = {
         "checks": [
             entry
-            for entry, bound in zip(written, bounds, strict=True)
+            for entry, bound in zip(written, authors, strict=True)
             if bound.spec.visibility is Visibility.VISIBLE
         ],
         "scenarios": [
@@ -95,10 +95,14 @@ def _visible_data(loaded: LoadedAssignment, part: LoadedAssignment) -> dict[str,
 
 def _names(data: Any, path: str, loaded: LoadedAssignment) -> bool:
     """Whether a text in the YAML names a file, or a check that the file defines."""
-    own = lesson_checks(loaded.folder) if path.startswith(f"{FOLDER}/") else {}
-    module = path.removeprefix(f"{FOLDER}/").removesuffix(".py")
-    defined = {
-        name for name, one in own.items() if one.judge.__module__.rpartition(".")[2] == module
-    }
     texts = json.dumps(data, ensure_ascii=False, default=str)
-    return path in texts or any(f'"{name}"' in texts for name in defined)
+    if path in texts:
+        return True
+    if not path.startswith(f"{FOLDER}/"):
+        return False
+    module = path.removeprefix(f"{FOLDER}/").removesuffix(".py")
+    for name, check in lesson_checks(loaded.folder).items():
+        is_defined_there = check.judge.__module__.rpartition(".")[2] == module
+        if is_defined_there and f'"{name}"' in texts:
+            return True
+    return False

@@ -95,29 +95,18 @@ class TrialResult:
 def trials(loaded: LoadedAssignment, language: Language = PYTHON) -> tuple[Trial, ...]:
     """The trials of an assignment: its reference, its variants, its mutants, its starter."""
     mutants = load_mutants(loaded.assignment, loaded.folder, language=language)
-    changes = [*mutants.variants, *mutants.mutants]
-    return (
-        Trial(Role.REFERENCE, "reference", "the reference solution", None),
-        *(
-            Trial(
-                Role.MUTANT if isinstance(change, Mutant) else Role.VARIANT,
-                change.id,
-                change.title,
-                change,
-            )
-            for change in changes
-            if not change.skip_reason
-        ),
-        *(
-            Trial(Role.MUTANT, one.mutant.id, one.mutant.title, one.mutant, True, one.mistakes)
-            for one in with_standard_mutants(loaded, mutants)
-        ),
-        *(
-            [Trial(Role.STARTER, "starter", "the starter package, untouched", None)]
-            if loaded.assignment.packages
-            else []
-        ),
-    )
+    every = [Trial(Role.REFERENCE, "reference", "the reference solution", None)]
+    for change in (*mutants.variants, *mutants.mutants):
+        if not change.skip_reason:
+            role = Role.MUTANT if isinstance(change, Mutant) else Role.VARIANT
+            every.append(Trial(role, change.id, change.title, change))
+    for standard in with_standard_mutants(loaded, mutants):
+        mutant = standard.mutant
+        mistakes = standard.mistakes
+        every.append(Trial(Role.MUTANT, mutant.id, mutant.title, mutant, True, mistakes))
+    if loaded.assignment.packages:
+        every.append(Trial(Role.STARTER, "starter", "the starter package, untouched", None))
+    return tuple(every)
 
 
 @dataclass(frozen=True)
@@ -138,6 +127,25 @@ class Setup:
 
 def run_trial(trial: Trial, setup: Setup, folder: Path) -> TrialResult:
     """Grade one trial."""
+    graded = grade(_handed_in(trial, setup, folder), setup.grading.imposing(trial.mistakes))
+    setup.on_graded(graded)
+    wrong = _wrong(trial, setup.loaded, graded.grade)
+    statuses = {result.id: result.status for result in graded.grade.results}
+    return TrialResult(
+        trial=trial,
+        wrong=wrong,
+        lost=tuple(check for check, status in statuses.items() if status is Status.FAILED),
+        graded=graded.grade.graded,
+        repeated=any(count > 1 for count in graded.runs.values()),
+        grade=grade_json(make_result(graded.grade, graded.recordings, RunFacts("", 0.0))),
+        findings=tuple(
+            line for check in wrong if check in statuses for line in _findings(graded, check)
+        ),
+    )
+
+
+def _handed_in(trial: Trial, setup: Setup, folder: Path) -> HandedIn:
+    """The submission of a trial, which is written first unless it is the reference itself."""
     loaded, submission = setup.loaded, folder / "submissions" / trial.id
     if trial.role is Role.STARTER:
         write_starter(loaded, submission, cpp=setup.language is CPP)
@@ -151,36 +159,27 @@ def run_trial(trial: Trial, setup: Setup, folder: Path) -> TrialResult:
         for name, variable in loaded.assignment.variables.items()
         if variable.match is None
     }
-    handed_in = HandedIn(submission, folder / "graded" / trial.id, given=given)
-    graded = grade(handed_in, setup.grading.imposing(trial.mistakes))
-    setup.on_graded(graded)
-    actual = {result.id: result.status for result in graded.grade.results}
+    return HandedIn(submission, folder / "graded" / trial.id, given=given)
+
+
+def _wrong(trial: Trial, loaded: LoadedAssignment, grade: Grade) -> dict[str, str]:
+    """What ended otherwise than it must, by its check."""
+    actual = {result.id: result.status for result in grade.results}
     if trial.role is Role.STARTER:
-        wrong = _wrong_with_starter(graded.grade)
-    elif trial.change is None:
-        wrong = deviations(dict.fromkeys(actual, Status.PASSED), actual)
-    else:
-        put_right = [result.id for result in graded.grade.results if result.put_right]
-        expected = expected_statuses(loaded.assignment, trial.change, put_right)
-        for result in graded.grade.results:
-            # Where the node does not declare a parameter, a check may fail by that, or may not.
-            if result.status is Status.SKIPPED and set(result.waits_for) <= expected.keys():
-                lost = all(expected[root] is Status.FAILED for root in result.waits_for)
-                expected[result.id] = Status.SKIPPED if lost else expected[result.id]
-        wrong = deviations(expected, actual)
-        if trial.is_derived and not any(status is Status.FAILED for status in actual.values()):
-            wrong = {trial.id: f"changes nothing here: write `derived: {{{trial.id}: false}}`"}
-    return TrialResult(
-        trial=trial,
-        wrong=wrong,
-        lost=tuple(name for name, status in actual.items() if status is Status.FAILED),
-        graded=graded.grade.graded,
-        repeated=any(count > 1 for count in graded.runs.values()),
-        grade=grade_json(make_result(graded.grade, graded.recordings, RunFacts("", 0.0))),
-        findings=tuple(
-            line for check in wrong if check in actual for line in _findings(graded, check)
-        ),
-    )
+        return _wrong_with_starter(grade)
+    if trial.change is None:
+        return deviations(dict.fromkeys(actual, Status.PASSED), actual)
+    if trial.is_derived and Status.FAILED not in actual.values():
+        return {trial.id: f"changes nothing here: write `derived: {{{trial.id}: false}}`"}
+    put_right = [result.id for result in grade.results if result.put_right]
+    expected = expected_statuses(loaded.assignment, trial.change, put_right)
+    for result in grade.results:
+        if result.status is not Status.SKIPPED:
+            continue
+        # Where the node does not declare a parameter, a check may fail by that, or may not.
+        if all(expected.get(check) is Status.FAILED for check in result.waits_for):
+            expected[result.id] = Status.SKIPPED
+    return deviations(expected, actual)
 
 
 def _wrong_with_starter(grade: Grade) -> dict[str, str]:
@@ -199,13 +198,13 @@ def _wrong_with_starter(grade: Grade) -> dict[str, str]:
 
 def _findings(graded: Graded, check: str) -> Iterator[str]:
     for item in graded.grade.result(check).findings:
-        place, taken = "", ""
         recording = graded.recordings.get(item.scenario or "")
-        if recording is not None:
-            place = f" in {item.scenario}"
-            stolen_s = recording.stolen_s(recording.launched_ns, recording.end_ns)
-            taken = f" (the machine took {format_duration(stolen_s)} from the run)"
-        yield f"{check}{place}: {item.finding.observed}{taken}"
+        if recording is None:
+            yield f"{check}: {item.finding.observed}"
+            continue
+        stolen_s = recording.stolen_s(recording.launched_ns, recording.end_ns)
+        taken = f"the machine took {format_duration(stolen_s)} from the run"
+        yield f"{check} in {item.scenario}: {item.finding.observed} ({taken})"
 
 
 def selftest(
@@ -217,12 +216,7 @@ def selftest(
         def work(trial: Trial) -> TrialResult:
             result = run_trial(trial, setup, folder)
             if keep is not None and result.wrong:
-                shutil.rmtree(keep / trial.id, ignore_errors=True)
-                recordings = folder / "graded" / trial.id / RECORDINGS_FOLDER
-                parts = {"submissions": folder / "submissions" / trial.id, "recordings": recordings}
-                for part, made in parts.items():
-                    if made.is_dir():
-                        shutil.copytree(made, keep / trial.id / part, symlinks=True)
+                _keep(trial, folder, keep / trial.id)
             return result
 
         with ThreadPoolExecutor(max_workers=jobs) as pool:
@@ -235,6 +229,18 @@ def selftest(
                     future.cancel()
                 setup.grading.close()
                 raise
+
+
+def _keep(trial: Trial, folder: Path, target: Path) -> None:
+    """Keep a submission and its recordings, for the author to look at."""
+    shutil.rmtree(target, ignore_errors=True)
+    parts = {
+        "submissions": folder / "submissions" / trial.id,
+        "recordings": folder / "graded" / trial.id / RECORDINGS_FOLDER,
+    }
+    for name, part in parts.items():
+        if part.is_dir():
+            shutil.copytree(part, target / name, symlinks=True)
 
 
 @dataclass(frozen=True)
@@ -261,13 +267,13 @@ class MutationScore:
 
 def mutation_score(results: list[TrialResult]) -> MutationScore:
     """Count the results of one assignment."""
-    mutants = [r for r in results if r.trial.role is Role.MUTANT]
-    right = [r for r in results if r.trial.role in {Role.REFERENCE, Role.VARIANT}]
+    mutants = [result for result in results if result.trial.role is Role.MUTANT]
+    right = [one for one in results if one.trial.role in {Role.REFERENCE, Role.VARIANT}]
     return MutationScore(
-        killed=sum(not r.wrong for r in mutants),
+        killed=len([result for result in mutants if not result.wrong]),
         mutants=len(mutants),
-        derived=sum(r.trial.is_derived for r in mutants),
-        accepted=sum(not r.wrong for r in right),
+        derived=len([result for result in mutants if result.trial.is_derived]),
+        accepted=len([result for result in right if not result.wrong]),
         right=len(right),
-        perfect=not any(r.wrong for r in results),
+        perfect=not any(result.wrong for result in results),
     )
