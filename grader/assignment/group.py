@@ -38,12 +38,12 @@ def ungrouped(source: Source) -> Source:
     }
     if not grouped:
         return source
-    flat = _Flat(Rewriting(source))
-    made = {key: [*flat.entries(key, entries)] for key, entries in grouped.items()}
-    if flat.problems:
-        problems = [source.problem(place, text) for place, text in flat.problems]
+    flattening = _Flattening(Rewriting(source))
+    flat = {key: [*flattening.entries(key, entries)] for key, entries in grouped.items()}
+    if flattening.mistakes:
+        problems = [source.problem(place, text) for place, text in flattening.mistakes]
         raise AssignmentError(source.file, in_order(problems))
-    return flat.written.document({**source.data, **made})
+    return flattening.rewriting.document({**source.data, **flat})
 
 
 def keys_of(key: str) -> tuple[str, ...]:
@@ -56,24 +56,24 @@ def _is_group(key: str, entry: Any) -> bool:
 
 
 @dataclass
-class _Flat:
-    """The members of all groups, each with what its group says."""
+class _Flattening:
+    """Puts the members of groups in their places, and collects what is wrong in the groups."""
 
-    written: Rewriting
-    problems: list[tuple[Place, str]] = field(default_factory=list)
+    rewriting: Rewriting
+    mistakes: list[tuple[Place, str]] = field(default_factory=list)
 
-    def entries(self, key: str, written: list[Any]) -> Iterator[Any]:
+    def entries(self, key: str, entries: list[Any]) -> Iterator[Any]:
         """The entries of a list, with members in the places of groups."""
-        self.written.empty(key)
+        self.rewriting.empty(key)
         count = 0
-        for index, entry in enumerate(written):
+        for index, entry in enumerate(entries):
             origin: Place = (key, index)
             if not _is_group(key, entry):
-                self.written.moved(entry, origin, (key, count))
+                self.rewriting.moved(entry, origin, (key, count))
                 yield entry
                 count += 1
                 continue
-            self.problems += _mistakes(key, entry, origin)
+            self.mistakes += _mistakes(key, entry, origin)
             members = entry[key] if isinstance(entry[key], list) else ()
             for number, member in enumerate(members):
                 inside = (*origin, key, number)
@@ -82,7 +82,7 @@ class _Flat:
 
     def _member(self, group: dict[str, Any], member: Any, origin: Place, place: Place) -> Any:
         """A member with what its group says; ``origin`` is where it is written."""
-        self.written.moved(member, origin, place)
+        self.rewriting.moved(member, origin, place)
         if not isinstance(member, dict):
             return member
         key, above = str(place[0]), origin[:2]
@@ -95,7 +95,7 @@ class _Flat:
         own_id, points = member.get("id"), group.get(_POINTS)
         if isinstance(points, dict) and isinstance(own_id, str) and own_id in points:
             whole[_POINTS] = points[own_id]
-            self.written.moved(whole[_POINTS], (*above, _POINTS, own_id), (*place, _POINTS))
+            self.rewriting.moved(whole[_POINTS], (*above, _POINTS, own_id), (*place, _POINTS))
         return {name: whole[name] for name in (*keys_of(key), *whole) if name in whole}
 
     def _joined(
@@ -103,9 +103,10 @@ class _Flat:
     ) -> dict[str, Any]:
         """The keys of both: a member's own count, and `null` takes one of the group away."""
         for name in shared.keys() - own.keys():
-            self.written.moved(shared[name], (*above, name), (*place, name))
-        taken = {name for name in shared if name in own and own[name] is None}
-        return {name: one for name, one in {**shared, **own}.items() if name not in taken}
+            self.rewriting.moved(shared[name], (*above, name), (*place, name))
+        taken_away = {name for name in shared if name in own and own[name] is None}
+        both = {**shared, **own}
+        return {name: value for name, value in both.items() if name not in taken_away}
 
 
 def _mistakes(key: str, group: dict[str, Any], place: Place) -> Iterator[tuple[Place, str]]:

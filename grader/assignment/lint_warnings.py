@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Assignment, Visibility
 from grader.assignment.mutant import Mutant
+from grader.checks.check import Parameters
 from grader.spec.nearest_name import did_you_mean
 from grader.submission.read.dependencies import is_known, meant
 from sim.turtles.interfaces import published
@@ -28,22 +29,25 @@ def lint_warnings(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) ->
 
 def _unknown_topics(loaded: LoadedAssignment) -> Iterator[str]:
     for bound in loaded.checks:
-        named = [getattr(bound.parameters, key, None) for key in ("topic", "publishes")]
-        # A topic that must stay free need not be there; one with a nearly equal name is misspelt.
-        stated = "topics" in bound.parameters.model_fields_set
-        kept_free = getattr(bound.parameters, "topics", ()) if stated else ()
         for scenario in loaded.scenarios_of(bound):
             exchanged = {one.exchanged[0] for one in scenario.stimuli if one.exchanged}
             known = {*scenario.recorded_types, *scenario.camera_topics, *exchanged}
             known |= {*published(scenario.turtles)}
-            suspects = [name for name in named if isinstance(name, str)]
-            suspects += [name for name in kept_free if did_you_mean(name, known)]
-            for topic in suspects:
+            for topic in _topics(bound.parameters, known):
                 if topic not in known:
                     yield (
                         f"the check {bound.spec.id!r} is about {topic!r}, which the scenario "
                         f"{scenario.id!r} neither records nor sends.{did_you_mean(topic, known)}"
                     )
+
+
+def _topics(parameters: Parameters, known: Collection[str]) -> list[str]:
+    """The topics that should be there by what a check names."""
+    topics = [getattr(parameters, key, None) for key in ("topic", "publishes")]
+    if "topics" in parameters.model_fields_set:
+        # A topic that must stay free need not be there; one with a nearly equal name is misspelt.
+        topics += [name for name in getattr(parameters, "topics", ()) if did_you_mean(name, known)]
+    return [topic for topic in topics if isinstance(topic, str)]
 
 
 def _dependencies(assignment: Assignment) -> Iterator[str]:
@@ -62,13 +66,16 @@ def _dependencies(assignment: Assignment) -> Iterator[str]:
 
 def _shown_runs(loaded: LoadedAssignment) -> Iterator[str]:
     """Scenarios that only hidden checks name, but that a visible check without names judges."""
-    visible = [b for b in loaded.checks if b.spec.visibility is Visibility.VISIBLE]
-    hidden = [b for b in loaded.checks if b.spec.visibility is not Visibility.VISIBLE]
-    named = {scenario for bound in visible for scenario in bound.spec.scenarios}
-    meant = {scenario for bound in hidden for scenario in bound.spec.scenarios} - named
+    visible, named_by_visible, named_by_hidden = [], set[str](), set[str]()
+    for bound in loaded.checks:
+        if bound.spec.visibility is Visibility.VISIBLE:
+            visible.append(bound)
+            named_by_visible.update(bound.spec.scenarios)
+        else:
+            named_by_hidden.update(bound.spec.scenarios)
     for bound in visible:
         for scenario in loaded.scenarios_of(bound):
-            if scenario.id in meant:
+            if scenario.id in named_by_hidden - named_by_visible:
                 yield (
                     f"students see the run of the scenario {scenario.id!r}, although only hidden "
                     f"checks name it: the visible check {bound.spec.id!r} names no scenarios, so "

@@ -142,15 +142,16 @@ def _collect(
 ) -> Roster:
     students: dict[str, Student] = {}
     problems: list[str] = []
-    for number, cells in rows:
+    for line, cells in rows:
+        # Canvas writes a row of the most points below its header.
         if not any(cells) or cells[0].casefold().startswith("points possible"):
             continue
         values = {field: cells[column] for field, column in columns.items() if column < len(cells)}
-        student = Student(number, **values, columns=dict(zip(header, cells, strict=False)))
+        student = Student(line, **values, columns=dict(zip(header, cells, strict=False)))
         if not student.key:
-            problems.append(f"row {number}: has no name")
+            problems.append(f"row {line}: has no name")
             continue
-        known = students.setdefault(comparable_name(student.key), student)
-        if known is not student:
-            problems.append(f"row {number}: {student.key} is in row {known.row} already")
+        first = students.setdefault(comparable_name(student.key), student)
+        if first is not student:
+            problems.append(f"row {line}: {student.key} is in row {first.row} already")
     return Roster(tuple(students.values()), tuple(problems))

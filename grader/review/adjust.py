@@ -36,19 +36,23 @@ def adjusted(
     """
     written = review.of(result.submission.sha256)
     manual = [
-        _scored(one, written.manual.get(one.item or ""), review.key)
-        for one in result.adjustments
-        if one.kind == "manual"
+        _scored(item, written.manual.get(item.item or ""), review.key)
+        for item in result.adjustments
+        if item.kind == "manual"
     ]
-    comments = [CommentPart(**one.model_dump()) for one in written.comments]
+    comments = [CommentPart(**comment.model_dump()) for comment in written.comments]
     for earlier in review.others_than(written, before):
-        comments += [CommentPart(**one.model_dump(), earlier=True) for one in earlier.comments]
-    causes = written.causes
-    checks = (one.model_copy(update={"cause": causes.get(one.id, "")}) for one in result.checks)
+        for comment in earlier.comments:
+            comments.append(CommentPart(**comment.model_dump(), earlier=True))
+    checks = [
+        check.model_copy(update={"cause": written.causes.get(check.id, "")})
+        for check in result.checks
+    ]
     result = result.model_copy(update={"checks": tuple(checks)})
     points = (*manual, *_forgiven(result, of_class), *_given(result, written.given))
     if still_open(result.checks):
-        graded = not still_open(result.checks, [one.check for one in written.given if one.instead])
+        judged_by_person = [given.check for given in written.given if given.instead]
+        graded = not still_open(result.checks, judged_by_person)
         score = total(check.points for check in result.checks) if graded else None
         result = result.model_copy(update={"graded": graded, "score": score})
     return result.model_copy(update={"adjustments": points, "comments": tuple(comments)})
@@ -56,11 +60,12 @@ def adjusted(
 
 def _given(result: Result, given: Collection[Given]) -> Iterator[AdjustmentPart]:
     titles = {check.id: check.title for check in result.checks}
-    left = {check.id for check in still_open(result.checks)}
-    for one in given:
-        title = titles.get(one.check or "", "Points by a person")
-        if one.check in left or not one.instead:
-            yield AdjustmentPart(kind="given", title=title, **one.model_dump())
+    unjudged = {check.id for check in still_open(result.checks)}
+    for points in given:
+        title = titles.get(points.check or "", "Points by a person")
+        # What stands for a judgement counts only as long as there is none.
+        if points.check in unjudged or not points.instead:
+            yield AdjustmentPart(kind="given", title=title, **points.model_dump())
 
 
 def _scored(item: AdjustmentPart, score: ManualScore | None, key: str) -> AdjustmentPart:
@@ -75,16 +80,16 @@ def _scored(item: AdjustmentPart, score: ManualScore | None, key: str) -> Adjust
 
 
 def _forgiven(result: Result, of_class: ClassReview) -> Iterator[AdjustmentPart]:
-    known = {(one.check, one.cause): one for one in of_class.forgiven}
+    forgiven = {(one.check, one.cause): one for one in of_class.forgiven}
     for check in result.of(Status.FAILED):
-        found = known.get((check.id, cause(check)))
-        if found is not None:
+        of_check = forgiven.get((check.id, cause(check)))
+        if of_check is not None:
             lost = total((check.max_points, -check.points))
             yield AdjustmentPart(
                 kind="forgiven",
                 title=check.title,
-                points=points_for(lost, found.share),
-                reason=found.reason,
-                by=found.by,
+                points=points_for(lost, of_check.share),
+                reason=of_check.reason,
+                by=of_check.by,
                 check=check.id,
             )

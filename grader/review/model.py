@@ -66,31 +66,35 @@ class StudentReview(AttemptReview):
 
     def of(self, attempt: str) -> AttemptReview:
         """What is written about an attempt, by its hash."""
-        written = sorted((self, *self.others), key=lambda one: not one.attempt)
-        found = (one for one in written if attempt.startswith(one.attempt))
-        return next(found, AttemptReview())
+        # What is about every attempt counts only where nothing is about this one.
+        reviews = sorted((self, *self.others), key=lambda review: not review.attempt)
+        fitting = (review for review in reviews if attempt.startswith(review.attempt))
+        return next(fitting, AttemptReview())
 
     def others_than(self, shown: AttemptReview, before: Collection[str]) -> list[AttemptReview]:
         """What is written about the attempts before, by their hashes, first to last."""
-        found = {id(one): one for one in map(self.of, before) if one.attempt and _is_written(one)}
-        found.pop(id(shown), None)
-        # What was about every attempt is in each that something was written about since.
-        return [
-            one.model_copy(
-                update={"comments": tuple(x for x in one.comments if x not in shown.comments)}
-            )
-            for one in found.values()
-        ]
+        reviews: list[AttemptReview] = []
+        for review in map(self.of, before):
+            is_known = any(review is other for other in (shown, *reviews))
+            if review.attempt and _is_written(review) and not is_known:
+                reviews.append(review)
+        others = []
+        for review in reviews:
+            # What was about every attempt is in each that something was written about since.
+            comments = [one for one in review.comments if one not in shown.comments]
+            others.append(review.model_copy(update={"comments": tuple(comments)}))
+        return others
 
     def about(self, attempt: str, **update: object) -> StudentReview:
         """The review with another text about one attempt; what is about others stays beside it."""
-        now = self.of(attempt)
-        changed = AttemptReview(**_content(now) | {"attempt": attempt[:_LONG_ENOUGH]} | update)
-        others = tuple(one for one in self.others if one is not now or not one.attempt)
-        if any(one is now for one in self.others):
-            return self.model_copy(update={"others": (*others, changed)})
+        before = self.of(attempt)
+        changed = AttemptReview(**_content(before) | {"attempt": attempt[:_LONG_ENOUGH]} | update)
         # What is about every attempt stays so for the others.
-        if (now is not self or not self.attempt) and _is_written(self):
+        others = tuple(one for one in self.others if one is not before or not one.attempt)
+        if any(one is before for one in self.others):
+            return self.model_copy(update={"others": (*others, changed)})
+        is_about_others = before is not self or not self.attempt
+        if is_about_others and _is_written(self):
             others = (*others, AttemptReview(**_content(self)))
         return self.model_copy(update={**dict(changed), "others": others})
 

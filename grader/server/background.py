@@ -99,18 +99,18 @@ class Background:
             self.problem = ""
         except Exception as error:
             # Also that of a check of the assignment's own; what was written down is safe.
-            self.problem = f"The reports are not up to date: {_said(error)}"
+            self.problem = f"The reports are not up to date: {_words(error)}"
 
     def _run_again(self, again: Again) -> None:
         try:
             before = self._ledger.result(again.key)
-            said = "" if self._ended else self._batch_again(again.key)
+            errors = "" if self._ended else self._batch_again(again.key)
             # Its exit code is also that of other submissions, and of a machine without a sandbox.
             after = self._ledger.result(again.key)
             if after is None or (before is not None and after.started == before.started):
-                again.problem = said.strip().removeprefix("rosgrade: error: ") or _NOT_RUN
+                again.problem = errors.strip().removeprefix("rosgrade: error: ") or _NOT_RUN
         except Exception as error:
-            again.problem = _said(error)
+            again.problem = _words(error)
         again.running = False
 
     def _batch_again(self, key: str) -> str:
@@ -135,9 +135,9 @@ class Background:
                 if write:
                     write_regraded(judging.rows, self._ledger)
         except Exception as error:
-            judging.problem = _said(error)
+            judging.problem = _words(error)
         judging.running = False
 
 
-def _said(error: Exception) -> str:
+def _words(error: Exception) -> str:
     return str(error) if isinstance(error, RosgradeError) else f"{type(error).__name__}: {error}"

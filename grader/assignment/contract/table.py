@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from grader.assignment.contract.model import Connection, Contract, Declared, Program
+from grader.assignment.contract.model import Connection, Contract, Declared, Program, Publication
 from grader.assignment.contract.spot import ANY, period_of, rate_words
 from grader.assignment.model import Assignment
 from grader.findings.fields import each_field, wanted_words
@@ -36,10 +36,13 @@ def with_table(text: str, assignment: Assignment) -> str:
     if assignment.contract is None or MARKER not in text:
         return text
     lines = "\n".join(f"| {row} |" for row in rows(assignment.contract))
-    free = [one.whole(str(one.example)) for one in assignment.variables.values() if one.is_free]
-    shown = ", ".join(code(name) for name in dict.fromkeys(free) if code(name) in lines)
-    said = f"These names are examples, and yours to choose: {shown}.\n\n" if shown else ""
-    return text.replace(MARKER, f"{said}{_HEAD}\n{lines}")
+    variables = assignment.variables.values()
+    free = dict.fromkeys(one.whole(str(one.example)) for one in variables if one.is_free)
+    examples = ", ".join(code(name) for name in free if code(name) in lines)
+    table = f"{_HEAD}\n{lines}"
+    if examples:
+        table = f"These names are examples, and yours to choose: {examples}.\n\n{table}"
+    return text.replace(MARKER, table)
 
 
 def rows(contract: Contract) -> Iterator[Row]:
@@ -58,32 +61,17 @@ def _program(executable: str, program: Program, place: Place) -> Iterator[Row]:
     yield Row("executable", f"`{executable}`", place, ("executable", "starts"))
     if program.node != ANY:
         yield Row("node", f"`{program.node}`", place, ("node",))
-    for key, said, prefix in (
-        ("subscribes", program.subscribes, "subscribed_"),
-        ("publishes", program.publishes, ""),
-    ):
-        for topic, part in said.items():
-            first = "topic" if key == "publishes" else "subscribes"
-            facts = (first, *(f"{prefix}{name}" for name in ("type", "qos", "depth")))
-            yield Row(key, _connection(topic, part), (*place, key, topic), facts)
-    for topic, part in program.publishes.items():
-        here = (*place, "publishes", topic)
+    for topic, subscription in program.subscribes.items():
+        facts = ("subscribes", "subscribed_type", "subscribed_qos", "subscribed_depth")
+        text = _connection(topic, subscription)
+        yield Row("subscribes", text, (*place, "subscribes", topic), facts)
+    for topic, publication in program.publishes.items():
+        facts = ("topic", "type", "qos", "depth")
+        text = _connection(topic, publication)
+        yield Row("publishes", text, (*place, "publishes", topic), facts)
+    for topic, publication in program.publishes.items():
         on = f" on `{topic}`" if len(program.publishes) > 1 else ""
-        if part.value:
-            fields = listing(
-                f"`{name}` {wanted_words(one)}" for name, one in each_field(part.value)
-            )
-            rest = "" if "rest" in part.value else "; all other fields keep their default"
-            yield Row(f"message{on}", f"{fields}{rest}", here, ("sent", "values"))
-        if part.count:
-            often = "exactly once" if part.count == 1 else f"exactly {part.count} times"
-            yield Row(f"how often{on}", often, here, ("once",))
-        if part.period is not None:
-            by = ", from the callback of a timer" if part.timer else ""
-            often = f"every {period_of(part)['period']}{by}"
-            yield Row(f"how often{on}", often, here, ("period", "timer"))
-        if part.rate:
-            yield Row(f"how often{on}", rate_words(part), here, ("rate",))
+        yield from _messages(publication, on, (*place, "publishes", topic))
     for key, label, fact in (
         ("serves", "offers the service", "service"),
         ("actions", "offers the action", "action"),
@@ -100,8 +88,8 @@ def _program(executable: str, program: Program, place: Place) -> Iterator[Row]:
     if program.does_not_subscribe:
         topics = codes(program.does_not_subscribe)
         yield Row("does not subscribe to", topics, place, ("not_subscribed",))
-    ends = f", and ends within {program.ends} of it" if program.ends else ""
     if program.alive:
+        ends = f", and ends within {program.ends} of it" if program.ends else ""
         yield Row("runs", f"until Ctrl+C{ends}", place, ("alive", "ends"))
     if program.responsive:
         limits = [
@@ -111,6 +99,23 @@ def _program(executable: str, program: Program, place: Place) -> Iterator[Row]:
         ]
         answers = ", ".join(limits) or "while its callbacks run"
         yield Row("answers services", answers, place, ("responsive",))
+
+
+def _messages(publication: Publication, on: str, place: Place) -> Iterator[Row]:
+    """What is in the messages of a topic, and how often they come."""
+    if publication.value:
+        fields = [f"`{name}` {wanted_words(one)}" for name, one in each_field(publication.value)]
+        rest = "" if "rest" in publication.value else "; all other fields keep their default"
+        yield Row(f"message{on}", f"{listing(fields)}{rest}", place, ("sent", "values"))
+    if publication.count:
+        times = "once" if publication.count == 1 else f"{publication.count} times"
+        yield Row(f"how often{on}", f"exactly {times}", place, ("once",))
+    if publication.period is not None:
+        by_timer = ", from the callback of a timer" if publication.timer else ""
+        often = f"every {period_of(publication)['period']}{by_timer}"
+        yield Row(f"how often{on}", often, place, ("period", "timer"))
+    if publication.rate:
+        yield Row(f"how often{on}", rate_words(publication), place, ("rate",))
 
 
 def _declared(part: Declared) -> Iterator[str]:
@@ -127,11 +132,12 @@ def _declared(part: Declared) -> Iterator[str]:
 
 
 def _connection(topic: str, part: Connection) -> str:
-    qos = [value.replace("_", " ") for value in part.qos.values()]
-    queue = [f"queue size {part.depth}"] if part.depth else []
-    return ", ".join(
-        [f"`{topic}`", f"type `{part.type}`", *filter(None, [" and ".join(qos)]), *queue]
-    )
+    facts = [f"`{topic}`", f"type `{part.type}`"]
+    if part.qos:
+        facts.append(" and ".join(value.replace("_", " ") for value in part.qos.values()))
+    if part.depth:
+        facts.append(f"queue size {part.depth}")
+    return ", ".join(facts)
 
 
 def _written(value: Any) -> str:
