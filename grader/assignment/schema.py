@@ -63,29 +63,33 @@ def assignment_schema(catalogue: Mapping[str, Check] = CATALOGUE) -> dict[str, A
 
 def _with_groups(key: str, reference: Mapping[str, Any], schema: Any) -> dict[str, Any]:
     """An entry of a list, or a group; what its members need may stand in the group."""
-    name = reference["$ref"].rpartition("/")[2]
-    entry = schema["$defs"][name]
-    shared = {one: value for one, value in entry["properties"].items() if one not in OF_EACH}
+    model = reference["$ref"].rpartition("/")[2]
+    entry = schema["$defs"][model]
+    properties = entry["properties"]
+    shared = {name: value for name, value in properties.items() if name not in OF_EACH}
+    of_member = {name: value for name, value in properties.items() if name in OF_EACH}
     if "points" in shared:
-        each = {"type": "object", "additionalProperties": shared["points"]}
-        shared["points"] = {**each, "description": "Points of the checks, by their ids."}
-    own = {one: value for one, value in entry["properties"].items() if one in OF_EACH}
-    schema["$defs"][f"{name}InGroup"] = {
+        shared["points"] = {
+            "type": "object",
+            "additionalProperties": shared["points"],
+            "description": "Points of the checks, by their ids.",
+        }
+    schema["$defs"][f"{model}InGroup"] = {
         "type": "object",
         "description": entry["description"],
-        "properties": {**own, **_or_null(entry["properties"], besides=own)},
+        "properties": {**of_member, **_or_null(properties, besides=of_member)},
         "additionalProperties": False,
         "required": ["id"],
     }
-    members = {"type": "array", "minItems": 1, "items": {"$ref": f"#/$defs/{name}InGroup"}}
-    schema["$defs"][f"{name}Group"] = {
+    members = {"type": "array", "minItems": 1, "items": {"$ref": f"#/$defs/{model}InGroup"}}
+    schema["$defs"][f"{model}Group"] = {
         "type": "object",
         "description": f"What several {key} have in common, and these {key}.",
         "properties": {**shared, key: {**members, "description": f"The {key} of the group."}},
         "additionalProperties": False,
         "required": [key],
     }
-    group = {"$ref": f"#/$defs/{name}Group"}
+    group = {"$ref": f"#/$defs/{model}Group"}
     return {"if": {"required": [key]}, "then": group, "else": dict(reference)}
 
 

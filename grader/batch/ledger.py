@@ -172,9 +172,11 @@ class Ledger:
     def around(cls, folder: Path) -> Ledger | None:
         """The batch that a folder is, or that a report lies in; None for a report of its own."""
         resolved = folder.resolve()
-        # The report itself or its recordings.
-        near = (resolved, *resolved.parents[1:3])
-        return next((cls(out) for out in near if (out / BATCH_FILE).is_file()), None)
+        # OUT/submissions/KEY is a report, OUT/submissions/KEY/recordings holds its recordings.
+        for out in (resolved, *resolved.parents[1:3]):
+            if (out / BATCH_FILE).is_file():
+                return cls(out)
+        return None
 
     def folder(self, key: str) -> Path:
         """Folder of a row's result."""
@@ -243,19 +245,23 @@ class Ledger:
         taken_from: TakenFrom | None = None,
     ) -> None:
         """Write the assignment and the rows; what is known of earlier ones stays."""
-        names = [one.name for one in fields(Entry)]
+        columns = [field.name for field in fields(Entry)]
         before: dict[str, None] = {}
         with suppress(UsageError):
             earlier = self.read()
             before = dict.fromkeys((*earlier.before, earlier.sha256))
             taken_from = taken_from or earlier.taken_from
         before.pop(assignment_sha256, None)
-        used = {"id": assignment, "sha256": assignment_sha256, "location": location}
         data = {
-            "assignment": {**used, "before": list(before)},
+            "assignment": {
+                "id": assignment,
+                "sha256": assignment_sha256,
+                "location": location,
+                "before": list(before),
+            },
             "course": course,
-            "taken_from": taken_from and asdict(taken_from),
-            "rows": [{one: getattr(entry, one) for one in names} for entry in entries],
+            "taken_from": asdict(taken_from) if taken_from is not None else None,
+            "rows": [{name: getattr(entry, name) for name in columns} for entry in entries],
         }
         write_whole(self.out / BATCH_FILE, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
 
@@ -266,15 +272,15 @@ class Ledger:
             data = json.loads(file.read_text(encoding="utf-8"))
             entries = tuple(Entry(**row) for row in data["rows"])
             assignment = data["assignment"]
-            taken = data.get("taken_from")
+            taken_from = data.get("taken_from")
             return BatchRows(
-                str(assignment["id"]),
-                assignment.get("location"),
-                entries,
-                data.get("course"),
-                assignment["sha256"],
-                tuple(assignment.get("before", ())),
-                TakenFrom(**taken) if taken else None,
+                assignment=str(assignment["id"]),
+                location=assignment.get("location"),
+                entries=entries,
+                course=data.get("course"),
+                sha256=assignment["sha256"],
+                before=tuple(assignment.get("before", ())),
+                taken_from=TakenFrom(**taken_from) if taken_from else None,
             )
         except FileNotFoundError as error:
             raise UsageError(f"{self.out}: is not the folder of a batch") from error

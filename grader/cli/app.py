@@ -62,8 +62,8 @@ class _Commands(TyperGroup):
             return None
         module, function = _COMMANDS[cmd_name].split(".")
         source = ast.parse(Path(__file__).with_name(f"{module}.py").read_bytes())
-        found = (one for one in source.body if isinstance(one, ast.FunctionDef))
-        docs = {one.name: ast.get_docstring(one) for one in found}
+        functions = [node for node in source.body if isinstance(node, ast.FunctionDef)]
+        docs = {node.name: ast.get_docstring(node) for node in functions}
         return TyperCommand(cmd_name, help=docs[function], rich_markup_mode=None)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:

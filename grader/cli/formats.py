@@ -90,8 +90,8 @@ class Formats(_Files):  # type: ignore[misc]
     @property
     def files(self) -> dict[str, Path]:
         """Format -> file, of those that were asked for."""
-        wanted = {name: getattr(self, name) for name in _FILES}
-        return {name: file for name, file in wanted.items() if file}
+        files = {name: getattr(self, name) for name in _FILES}
+        return {name: file for name, file in files.items() if file is not None}
 
     @contextmanager
     def grading(self) -> Iterator[None]:
@@ -117,13 +117,13 @@ class Formats(_Files):  # type: ignore[misc]
 
     def write(self, result: Result, submission: Path | None = None) -> None:
         """Write everything that was asked for."""
-        own: dict[str, dict[str, Any]] = {
+        arguments: dict[str, dict[str, Any]] = {
             "junit": {"xunit1": self.junit_family is JunitFamily.XUNIT1},
             "gradescope": {"metadata": self.gradescope_metadata},
         }
         for name, file in self.files.items():
             module = import_module(f"{formats.__name__}.{name}")
-            write_whole(file, module.render(result, **own.get(name, {})))
+            write_whole(file, module.render(result, **arguments.get(name, {})))
         if self.github:
             _tell_github(result, submission, os.environ)
         if self.classroom50:

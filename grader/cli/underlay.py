@@ -65,16 +65,16 @@ def add(
     that need such a package get it; .repos files and folders only where the assignment names them
     in `underlays`. After an interruption, the command continues where it stopped.
     """
-    found = [find_underlay(given) for given in what or ()]
+    underlays = [find_underlay(name) for name in what or ()]
     if assignment is not None:
-        found += wanted_underlays(load_assignment(assignment), submission)
-    elif not found:
+        underlays += wanted_underlays(load_assignment(assignment), submission)
+    elif not underlays:
         raise UsageError("name what to add, such as `rosgrade underlay add rclcpp`, or --for ID")
     progress, installation, began_s = Progress(quiet), ros.find(), time.monotonic()
     with progress.shown():
         place = chosen_sandbox(sandbox, progress)
         store = UnderlayStore(cache_folder(), installation, progress.say, place)
-        built = store.add(found, wait)
+        built = store.add(underlays, wait)
     if built:
         say(f"Built in {time.monotonic() - began_s:.0f} s: {', '.join(built)}")
     command = write_command(installation, store)
@@ -89,16 +89,19 @@ def list_command() -> None:
     store = UnderlayStore(cache_folder(), installation)
     table = Table("UNDERLAY", "HERE", "PACKAGES", box=None, pad_edge=False)
     for name, packages in SETS.items():
-        lacks = bool(store.missing([packages_of_ros(name)]))
-        state = "no" if lacks else "in ROS" if installation.packages >= {*packages} else "built"
+        if store.missing([packages_of_ros(name)]):
+            state = "no"
+        else:
+            state = "in ROS" if installation.packages.issuperset(packages) else "built"
         table.add_row(name, state, " ".join(packages))
-    listed = {name for packages in SETS.values() for name in packages}
-    kept = [one for one, _ in store.installed() if one.name not in listed]
-    names = Counter(one.name for one in kept)
-    for one in kept:
+    of_sets = {name for packages in SETS.values() for name in packages}
+    others = [underlay for underlay, _ in store.installed() if underlay.name not in of_sets]
+    counts = Counter(underlay.name for underlay in others)
+    for underlay in others:
         # Those of one name are told apart by where they are defined.
-        name = one.places[0] if names[one.name] > 1 and one.places else one.name
-        table.add_row(name, "built", one.version or " ".join(one.packages))
+        is_unique = counts[underlay.name] == 1 or not underlay.places
+        name = underlay.name if is_unique else underlay.places[0]
+        table.add_row(name, "built", underlay.version or " ".join(underlay.packages))
     output_console().print(table)
 
 
