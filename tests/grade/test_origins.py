@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from grader.checks.executor.executor import Timer
+from grader.checks.executor.timer import Timer
 from grader.checks.messages.messages import Count
 from grader.checks.motion.drive import KeepsDriving
 from grader.checks.qos.qos import Depth

@@ -1,7 +1,8 @@
-"""Checks of the executor: whether callbacks block it, and whether a timer calls what publishes."""
+"""The check of the executor: whether callbacks keep it from answering."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
@@ -11,45 +12,26 @@ from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Doubt
 from grader.checks.node.node import target_nodes
 from grader.diagnosis.explanation import mistaken
-from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
-from grader.diagnosis.process.not_called import (
-    Uncalled,
-    at_its_place,
-    left_s,
-    never_spun,
-)
+from grader.diagnosis.process.not_called import Uncalled, at_its_place, left_s, never_spun
 from grader.diagnosis.process.process_exit import ended_early, why_ended, why_it_exited
 from grader.diagnosis.process.standing import slow_callback, where_it_stands
-from grader.diagnosis.undeclared import why_undeclared
-from grader.findings.finding import (
-    Evidence,
-    Finding,
-    Plot,
-    Verdict,
-    evidence_at,
-    first_seen,
-    moment,
-    nodes_seen,
-)
-from grader.findings.words import SPIN_NODE, code, codes, counted, worded
-from grader.measure import callback_runs, declarations
+from grader.findings.finding import Evidence, Finding, Plot, Verdict, moment, nodes_seen
+from grader.findings.words import code, codes, counted, worded
+from grader.measure import declarations
 from grader.measure.declarations import was_held_up
-from grader.measure.paused import paused, publishers
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.model import NS, Call, Kind, Recording
-from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
 
+# Of two calls, one late one is half of them.
 _FORGIVING_FROM = 3
 _MOST_MOMENTS = 5
+# In this time the graph tells which services a node has, several times over.
 _LONG_NS = NS
+# Longer than the tracer holds a publisher; a process could declare any time.
 _MOST_HELD_NS = 3 * NS
-"""Longer than the tracer holds a publisher; a process could declare any time."""
-# How the tracer names a callback that is None: create_rate() makes a timer that calls nothing.
-_NOTHING = "NoneType"
-_CALLED_NOTHING = "rosgrade let the executor call nothing"
 
 
 class Responsive(Parameters):
@@ -72,17 +54,19 @@ class Responsive(Parameters):
 
 
 @dataclass(frozen=True)
-class _Answers:
-    """Calls to one node, and those of them that were not answered in time."""
+class _JudgedCalls:
+    """The calls to one node that count, and those of them that were not answered in time."""
 
     node: str
     judged: list[Call]
     late: list[Call]
 
-    def enough(self, late: int) -> bool:
-        """Whether so many late calls are allowed: a tenth, or one of a few."""
-        number = len(self.judged)
-        return late <= max(number // 10, number >= _FORGIVING_FROM)
+    @property
+    def allowed_late(self) -> int:
+        """How many may be late: a tenth, and one at least unless there are only a few."""
+        if len(self.judged) < _FORGIVING_FROM:
+            return 0
+        return max(1, len(self.judged) // 10)
 
 
 @check("executor.responsive", Subject.RECORDING, Responsive, concept="executors")
@@ -100,146 +84,168 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
     timer.
     """
     stop_if(why_no_node(recording))
-    names = [one.name for one in target_nodes(recording) or recording.student_nodes]
-    groups = [_answers(recording, name, parameters) for name in dict.fromkeys(names)]
-    groups = [group for group in groups if group.judged]
-    if not groups:
-        return _unasked(recording, names, parameters)
-    bad = [group for group in groups if not group.enough(len(group.late))]
-    if not bad:
-        stop_if(_why_mostly_late(recording, parameters, groups))
-        summary = _summary(groups, parameters)
-        return Finding.as_asked(summary, _evidence(recording, groups))
-    # Of the late calls, those that were late for another reason than what the host took.
-    own = [sum(_own_s(recording, call) > parameters.within for call in one.late) for one in bad]
-    if all(one.enough(late) for one, late in zip(bad, own, strict=True)):
-        return Finding.undecided(
-            f"{_summary(bad, parameters)}, but the machine took the time from the process"
-        )
-    worst = max(bad, key=lambda group: len(group.late) / len(group.judged))
-    return _why_late(recording, worst, parameters)
+    nodes = target_nodes(recording) or recording.student_nodes
+    names = list(dict.fromkeys(node.name for node in nodes))
+    by_node = [_judged_calls(recording, name, parameters.within) for name in names]
+    by_node = [calls for calls in by_node if calls.judged]
+    if not by_node:
+        return _judged_by_declarations(recording, names)
+    too_late = [calls for calls in by_node if len(calls.late) > calls.allowed_late]
+    if not too_late:
+        stop_if(_why_typically_late(recording, parameters.typically, by_node))
+        return Finding.as_asked(_summary(by_node, parameters), _evidence(recording, by_node))
+    if all(_machine_made_late(recording, calls, parameters.within) for calls in too_late):
+        return _machine_took_the_time(_summary(too_late, parameters))
+    worst = max(too_late, key=lambda calls: len(calls.late) / len(calls.judged))
+    return _why_late(recording, worst, _summary([worst], parameters))
 
 
-def _answers(recording: Recording, node: str, parameters: Responsive) -> _Answers:
-    within_ns = int(parameters.within * NS)
-    begin_ns = _working_from(recording, node)
+def _judged_calls(recording: Recording, node: str, within_s: float) -> _JudgedCalls:
+    since_ns = _working_since_ns(recording, node)
+    until_ns = recording.stop_ns - int(within_s * NS)
+    services = {service.name for service in recording.services if service.node == node}
+    # A service of this name that only another node has answers in this node's place.
+    elsewhere = {service.name for service in recording.services} - services
     judged, late = [], []
-    own = {item.name for item in recording.services if item.node == node}
-    others = {item.name for item in recording.services if item.node != node} - own
-    for call in recording.calls:
-        # An answer in its place, by a service of another node's, says nothing of this one.
-        if call.service not in executor_services(node) or call.service in others:
+    for call in _calls_to(recording, node):
+        if call.service in elsewhere:
             continue
-        answered = call.answered_ns is not None and _wait_s(recording, call) <= parameters.within
-        # An answer in time is one, however late or early it was asked for.
-        if answered or begin_ns <= call.requested_ns <= recording.stop_ns - within_ns:
+        is_in_time = call.answered_ns is not None and _wait_s(recording, call) <= within_s
+        # An answer in time proves that the executor spins, whenever it was asked for.
+        if is_in_time or since_ns <= call.requested_ns <= until_ns:
             judged.append(call)
-            late += [] if answered else [call]
-    return _Answers(node, judged, late)
+            if not is_in_time:
+                late.append(call)
+    return _JudgedCalls(node, judged, late)
 
 
-def _working_from(recording: Recording, node: str) -> int:
+def _calls_to(recording: Recording, node: str) -> list[Call]:
+    return [call for call in recording.calls if call.service in executor_services(node)]
+
+
+def _working_since_ns(recording: Recording, node: str) -> int:
     """When a node began to publish, or when it was left to itself if it publishes nothing."""
-    topics = {
-        item.topic for item in recording.student_endpoints(Kind.PUBLISHER) if item.node == node
-    }
-    stamps = [recording.on(topic)[0].received_ns for topic in topics if recording.on(topic)]
-    if stamps:
-        return min(stamps)
-    appeared = [item.appeared_ns for item in recording.student_nodes if item.name == node]
-    begin_ns = min(appeared or [recording.launched_ns])
+    first_message_ns = _first_message_ns(recording, node)
+    if first_message_ns is not None:
+        return first_message_ns
+    appeared_ns = min(
+        (item.appeared_ns for item in recording.student_nodes if item.name == node),
+        default=recording.launched_ns,
+    )
     process = declarations.process_of(recording, node)
     if process is None:
-        return begin_ns
-    # Before an executor spins the constructor may wait for something. A node that never answers
-    # does not spin, even if its process declares that it does.
-    spun = [item.time_ns for item in recording.declared("spin") if item.process == process.name]
-    answered = [
-        call.answered_ns
-        for call in recording.calls
-        if call.service in executor_services(node) and call.answered_ns is not None
+        return appeared_ns
+    since_ns = max(appeared_ns, _spinning_since_ns(recording, node, process.name))
+    return max(since_ns, _held_until_ns(recording, process.name, since_ns))
+
+
+def _first_message_ns(recording: Recording, node: str) -> int | None:
+    topics = {
+        publisher.topic
+        for publisher in recording.student_endpoints(Kind.PUBLISHER)
+        if publisher.node == node
+    }
+    received_ns = (recording.on(topic)[0].received_ns for topic in topics if recording.on(topic))
+    return min(received_ns, default=None)
+
+
+def _spinning_since_ns(recording: Recording, node: str, process: str) -> int:
+    """When an executor began to spin, or answered; 0 where nothing proves that it did.
+
+    Before that, the constructor may wait for something. A node that never answers does not spin,
+    even if its process declares that it does.
+    """
+    spun_ns = [item.time_ns for item in recording.declared("spin") if item.process == process]
+    answered_ns = [
+        call.answered_ns for call in _calls_to(recording, node) if call.answered_ns is not None
     ]
-    if spun and answered:
-        begin_ns = max(begin_ns, min(*spun, *answered))
-    # The tracer held its first publisher until it had matched; one of another type never does.
-    held = [item.time_ns for item in recording.declared("held") if item.process == process.name]
-    return max([begin_ns, *(time_ns for time_ns in held if time_ns < begin_ns + _MOST_HELD_NS)])
+    if not spun_ns or not answered_ns:
+        return 0
+    return min(spun_ns + answered_ns)
+
+
+def _held_until_ns(recording: Recording, process: str, since_ns: int) -> int:
+    """Until when the tracer held a publisher that was not yet matched; 0 if it held none."""
+    held_ns = (item.time_ns for item in recording.declared("held") if item.process == process)
+    return max((time_ns for time_ns in held_ns if time_ns < since_ns + _MOST_HELD_NS), default=0)
+
+
+def _answered_or_end_ns(recording: Recording, call: Call) -> int:
+    return call.answered_ns or recording.stop_ns
 
 
 def _wait_s(recording: Recording, call: Call) -> float:
-    return ((call.answered_ns or recording.stop_ns) - call.requested_ns) / NS
+    return (_answered_or_end_ns(recording, call) - call.requested_ns) / NS
 
 
-def _own_s(recording: Recording, call: Call) -> float:
+def _own_wait_s(recording: Recording, call: Call) -> float:
     """How long a call waited, without what the machine took meanwhile."""
-    return left_s(recording, call.requested_ns, call.answered_ns or recording.stop_ns)
+    return left_s(recording, call.requested_ns, _answered_or_end_ns(recording, call))
 
 
-def _why_mostly_late(
-    recording: Recording, parameters: Responsive, groups: list[_Answers]
+def _machine_made_late(recording: Recording, calls: _JudgedCalls, within_s: float) -> bool:
+    """Whether few enough calls would be late if the machine had taken no time."""
+    late = [call for call in calls.late if _own_wait_s(recording, call) > within_s]
+    return len(late) <= calls.allowed_late
+
+
+def _machine_took_the_time(observed: str) -> Finding:
+    return Finding.undecided(f"{observed}, but the machine took the time from the process")
+
+
+def _why_typically_late(
+    recording: Recording, allowed_s: float | None, by_node: Sequence[_JudgedCalls]
 ) -> Finding | None:
-    """Why a node answers in time, but mostly late; or None."""
-    allowed_s = parameters.typically
-    for group in groups:
-        median_s = median(_wait_s(recording, call) for call in group.judged)
-        if allowed_s is None or median_s <= allowed_s:
+    """Why the median of a node's answer times is too long, or None."""
+    if allowed_s is None:
+        return None
+    for calls in by_node:
+        median_s = median(_wait_s(recording, call) for call in calls.judged)
+        if median_s <= allowed_s:
             continue
-        observed = f"{code(group.node)} answered after {format_duration(median_s)} (median)"
-        if median(_own_s(recording, call) for call in group.judged) <= allowed_s:
-            return Finding.undecided(f"{observed}, but the machine took the time from the process")
-        late = [call for call in group.judged if _wait_s(recording, call) > allowed_s]
-        shown = _evidence(recording, [_Answers(group.node, group.judged, late)])
-        seen = f"{observed}: callbacks keep the executor busy most of the time"
-        cause = mistaken("busy", seen, shown)
+        observed = f"{code(calls.node)} answered after {format_duration(median_s)} (median)"
+        if median(_own_wait_s(recording, call) for call in calls.judged) <= allowed_s:
+            return _machine_took_the_time(observed)
+        late = [call for call in calls.judged if _wait_s(recording, call) > allowed_s]
+        cause = mistaken(
+            "busy",
+            f"{observed}: callbacks keep the executor busy most of the time",
+            _evidence(recording, [replace(calls, late=late)]),
+        )
         return at_its_place(cause, observed, slow_callback(recording))
     return None
 
 
-def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> Finding:
+def _why_late(recording: Recording, calls: _JudgedCalls, summary: str) -> Finding:
     """Why a node does not answer, or too late."""
-    process = declarations.process_of(recording, group.node)
-    seen = _summary([group], parameters)
+    process = declarations.process_of(recording, calls.node)
     if process is not None and ended_early(recording, process):
-        return why_it_exited(recording, process).after(seen)
-    number = sum(len(found) for found in recording.messages.values())
-    meanwhile = f" while {counted(number, 'message was', 'messages were')} published"
-    seen += meanwhile if number else ""
-    evidence = _evidence(recording, [group])
+        return why_it_exited(recording, process).after(summary)
+    observed = summary
+    published = sum(map(len, recording.messages.values()))
+    if published:
+        observed += f" while {counted(published, 'message was', 'messages were')} published"
     processes = () if process is None else (process,)
-    stop_if(never_spun(Uncalled(recording, seen, (group.node,), processes)))
-    name = process.name if process else None
-    stand = where_it_stands(recording, name) if name else None
-    stand = stand or slow_callback(recording, name)
-    cause = mistaken("blocked", f"{seen}: something blocks the executor", evidence)
-    return at_its_place(cause, seen, stand)
+    not_spun = never_spun(Uncalled(recording, observed, (calls.node,), processes))
+    if not_spun is not None:
+        return not_spun
+    stand = None if process is None else where_it_stands(recording, process.name)
+    if stand is None:
+        stand = slow_callback(recording, None if process is None else process.name)
+    blocked = f"{observed}: something blocks the executor"
+    cause = mistaken("blocked", blocked, _evidence(recording, [calls]))
+    return at_its_place(cause, observed, stand)
 
 
-def _unasked(recording: Recording, names: list[str], parameters: Responsive) -> Finding:
+def _judged_by_declarations(recording: Recording, names: Sequence[str]) -> Finding:
     """The finding where no call counts, from what the process declared."""
-    stop_if(why_ended(recording))
-    # In this time the graph tells which services a node has, several times over.
-    seen = {
-        item.name
-        for item in recording.student_nodes
-        if recording.stop_ns - item.appeared_ns > _LONG_NS
-    }
-    offered = {(service.node, service.name) for service in recording.services}
-    lacking = [
-        name
-        for name in names
-        if name in seen and offered.isdisjoint((name, one) for one in executor_services(name))
-    ]
-    if lacking:
+    ended = why_ended(recording)
+    if ended is not None:
+        return ended
+    without_services = _without_services(recording, names)
+    if without_services:
         # Only declarations would be left, and a process can declare anything.
-        busy, library = was_held_up(recording), worded("rclpy", "rclcpp")
-        found = mistaken(
-            "no_services",
-            f"{codes(lacking)} has none of the services "
-            f"{codes(EXECUTOR_SERVICES, 'and')} that {library} makes for every node: "
-            "nothing shows from outside whether its executor spins",
-            Evidence(moments=nodes_seen(recording)),
-        )
-        return replace(found, verdict=Verdict.MACHINE) if busy else found
+        return _no_services(recording, without_services)
     if declarations.declares(recording, "spin") and declarations.declares(recording, "timer"):
         return Finding.as_asked(
             f"{codes(names)} answered no call that could be judged; the process declared a timer "
@@ -251,17 +257,44 @@ def _unasked(recording: Recording, names: list[str], parameters: Responsive) -> 
     )
 
 
-def _summary(groups: list[_Answers], parameters: Responsive) -> str:
+def _without_services(recording: Recording, names: Iterable[str]) -> list[str]:
+    """Nodes that were there for long, and had none of the services that every node has."""
+    long_there = {
+        node.name
+        for node in recording.student_nodes
+        if recording.stop_ns - node.appeared_ns > _LONG_NS
+    }
+    offered = {(service.node, service.name) for service in recording.services}
+    return [
+        name
+        for name in names
+        if name in long_there
+        and not any((name, service) in offered for service in executor_services(name))
+    ]
+
+
+def _no_services(recording: Recording, nodes: Sequence[str]) -> Finding:
+    library = worded("rclpy", "rclcpp")
+    cause = mistaken(
+        "no_services",
+        f"{codes(nodes)} has none of the services {codes(EXECUTOR_SERVICES, 'and')} that "
+        f"{library} makes for every node: nothing shows from outside whether its executor spins",
+        Evidence(moments=nodes_seen(recording)),
+    )
+    return replace(cause, verdict=Verdict.MACHINE) if was_held_up(recording) else cause
+
+
+def _summary(by_node: Iterable[_JudgedCalls], parameters: Responsive) -> str:
     return "; ".join(
-        f"{code(group.node)} answered {len(group.judged) - len(group.late)} of "
-        f"{counted(len(group.judged), 'call')} within {format_duration(parameters.within)}"
-        for group in groups
+        f"{code(calls.node)} answered {len(calls.judged) - len(calls.late)} of "
+        f"{counted(len(calls.judged), 'call')} within {format_duration(parameters.within)}"
+        for calls in by_node
     )
 
 
-def _evidence(recording: Recording, groups: list[_Answers]) -> Evidence:
-    late = [call for group in groups for call in group.late]
-    answered = [call for group in groups for call in group.judged if call.answered_ns is not None]
+def _evidence(recording: Recording, by_node: Sequence[_JudgedCalls]) -> Evidence:
+    late = [call for calls in by_node for call in calls.late]
+    answered = [call for calls in by_node for call in calls.judged if call.answered_ns is not None]
     plot = Plot(
         title="Time until the service answered",
         x_label="time since launch (s)",
@@ -276,112 +309,3 @@ def _evidence(recording: Recording, groups: list[_Answers]) -> Evidence:
         ),
         plots=(plot,) if answered else (),
     )
-
-
-class Timer(Parameters):
-    """Parameters of executor.timer."""
-
-    about = ("timer", "publisher")
-    doubt = Doubt.ANSWER_MISSED
-    pauses = True
-
-    asks = "a timer whose callback publishes on `{self.topic}`"
-
-    topic: TopicName = Field(description="Topic on which the callback of a timer publishes.")
-
-
-@check("executor.timer", Subject.RECORDING, Timer, concept="timers")
-def timer(recording: Recording, parameters: Timer) -> Finding:
-    """The process has a timer.
-
-    A thread that sleeps and publishes looks like a timer. So, for a moment after the run, the
-    executors find nothing ready and call no callback. If a message is published in this moment, it
-    does not come from a callback, whatever the process declares. The process must also have
-    declared its publisher and a timer with a callback, of any period.
-    """
-    messages = recording.on(parameters.topic)
-    if not messages:
-        return why_silent(recording, parameters.topic)
-    if not declarations.declares(recording, "publisher", topic=parameters.topic):
-        return why_undeclared(recording, f"the publisher on {code(parameters.topic)}")
-    timers = declarations.timers(recording)
-    calling = [item for item in timers if item.callback != _NOTHING]
-    number = f"{counted(len(messages), 'message was', 'messages were')} published"
-    if calling and recording.pauses:
-        stop_if(_why_uncalled(recording, parameters.topic))
-    if declarations.not_in_callback(recording, parameters.topic):
-        observed = f"{number}, outside of every callback: a thread or a loop calls publish()"
-    elif calling:
-        name = f", which calls {code(calling[0].callback)}" if calling[0].callback else ""
-        rest = f", and nothing was published while {_CALLED_NOTHING}"
-        seen = rest if recording.pauses and publishers(recording, parameters.topic) else ""
-        return Finding.as_asked(
-            f"the process declared a timer of {format_duration(calling[0].period_s)}{name}{seen}",
-            evidence_at(recording, "timer created", calling[0].declared_ns),
-        )
-    elif declarations.timer_of_zero(recording):
-        return Finding.as_asked("the process declared a timer")
-    else:
-        rate = " but that of a rate, which calls nothing" if timers else ""
-        observed = (
-            f"{number}, but the process declared no timer{rate}: something else calls publish(), "
-            "such as a thread or a loop"
-        )
-    evidence = Evidence(moments=first_seen(recording, messages))
-    return mistaken("no_timer", observed, evidence)
-
-
-def _why_uncalled(recording: Recording, topic: str) -> Finding | None:
-    """Why it is no timer that publishes, from what came while no executor called anything."""
-    found = paused(recording, topic)
-    if found is None:
-        return _why_not_paused(recording, topic)
-    if not found.uncalled_ns:
-        if found.covers(recording, topic) or callback_runs.publishes(recording, topic):
-            return None
-        return Finding.ours(
-            f"the messages on {code(topic)} are too far apart to see in the pause after the run "
-            "whether a callback publishes them",
-            disturbed=was_held_up(recording),
-        )
-    number = counted(len(found.uncalled_ns), "message was", "messages were")
-    observed = f"{number} published outside of every callback, while {_CALLED_NOTHING}"
-    if found.is_doubtful(recording):
-        return Finding.undecided(f"{observed}, but the machine held messages up")
-    label = "published outside of every callback"
-    shown = evidence_at(recording, label, found.uncalled_ns[0])
-    return mistaken("no_timer", f"{observed}: a thread or a loop calls publish()", shown)
-
-
-def _why_not_paused(recording: Recording, topic: str) -> Finding | None:
-    """Why a process that publishes did not pause, where that is not right."""
-    publish = {
-        one.process
-        for one in recording.declared("publisher")
-        if one.data.get("topic") == topic and not declarations.is_compiled(recording, one.process)
-    }
-    has_ended = not publishers(recording, topic)
-    seen = (
-        "the program ended"
-        if has_ended
-        else "after the run no executor of the process waited for work when it was asked to"
-    )
-    # An executor of another kind may call callbacks as well.
-    uncalled = [
-        one
-        for one in recording.processes
-        if one.name in publish and not declarations.declares(recording, "ran", one.name)
-    ]
-    stop_if(never_spun(Uncalled(recording, seen, (), uncalled)))
-    if has_ended:
-        if callback_runs.publishes(recording, topic):
-            return None
-        return Finding.ours(
-            f"{seen} before it could be judged whether a callback publishes",
-            f"Let {SPIN_NODE} run until Ctrl+C ends it.",
-        )
-    if not declarations.declares(recording, "spin"):
-        return Finding.ours(f"{seen}: rosgrade does not know its kind")
-    shown = Evidence(moments=first_seen(recording, recording.on(topic)))
-    found = mistaken("never_waits", seen, shown)
-    return found.doubted(was_held_up(recording))
