@@ -12,12 +12,9 @@ from grader.diagnosis.motion.off_course import why_off_course
 from grader.findings.finding import Finding, evidence_at
 from grader.findings.words import metres, percent
 from grader.measure.motion.floor_line import distance_m, followed_m, length_m
-from grader.measure.motion.track import over_time
+from grader.measure.motion.track import STRIDE, over_time
 from grader.recording.model import Recording
 from grader.spec.quantity import PositiveLength, Ratio
-
-# A step lasts for 10 ms.
-_STRIDE = 5
 
 
 class FollowsLine(RobotParameters):
@@ -51,7 +48,7 @@ def follows_line(recording: Recording, parameters: FollowsLine) -> Finding:
     lines, within_m = moved_in(recording).lines, parameters.distance
     if parameters.line >= len(lines):
         return Finding.ours(f"the world has no line {parameters.line}: it has {len(lines)}")
-    line, truth = lines[parameters.line], recording.truth[::_STRIDE]
+    line, truth = lines[parameters.line], recording.truth[::STRIDE]
     plot = over_time(
         recording,
         "Distance to the line",
@@ -59,20 +56,30 @@ def follows_line(recording: Recording, parameters: FollowsLine) -> Finding:
         lambda step: distance_m(line, step),
         (0.0, within_m),
     )
-    away, whole_m = [distance_m(line, step) for step in truth], length_m(line)
-    left = next((number for number, far_m in enumerate(away) if far_m > within_m), None)
-    gone = list(followed_m(line, truth[:left], within_m))
-    done_m = gone[-1] if gone else 0.0
-    seen = f"it followed {metres(done_m)} of {metres(whole_m)}, at most "
-    seen += f"{metres(max(away[:left], default=0.0))} off the line"
-    last = truth[-1 if left is None else left]
-    label = "the run ended" if left is None else "it left the line"
-    evidence = evidence_at(recording, label, last.time_ns, plot)
+    off_m = [distance_m(line, step) for step in truth]
+    # Index of the step at which it left the line; None if it never did.
+    left = next((index for index, far_m in enumerate(off_m) if far_m > within_m), None)
+    whole_m = length_m(line)
+    done_m = max(followed_m(line, truth[:left], within_m), default=0.0)
+    farthest_m = max(off_m[:left], default=0.0)
+    seen = (
+        f"it followed {metres(done_m)} of {metres(whole_m)}, at most {metres(farthest_m)} off "
+        "the line"
+    )
+    if left is None:
+        evidence = evidence_at(recording, "the run ended", truth[-1].time_ns, plot)
+    else:
+        evidence = evidence_at(recording, "it left the line", truth[left].time_ns, plot)
     if done_m >= parameters.share * whole_m:
         return Finding.as_asked(seen, evidence)
-    if deeper := why_off_course(recording):
+    deeper = why_off_course(recording)
+    if deeper is not None:
         return deeper
     if left is None:
         return mistaken("line_not_followed", seen, evidence)
-    seen = f"it left the line after {metres(done_m)} of {metres(whole_m)}, and was up to "
-    return mistaken("leaves_line", f"{seen}{metres(max(away))} from it", evidence)
+    return mistaken(
+        "leaves_line",
+        f"it left the line after {metres(done_m)} of {metres(whole_m)}, and was up to "
+        f"{metres(max(off_m))} from it",
+        evidence,
+    )

@@ -14,7 +14,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from grader.assignment.model import Assignment, Visibility
 from grader.assignment.random_values import fixed_values
-from grader.checks.motion.route import Place
+from grader.checks.motion.place import Place
 from grader.findings.reference import Goal, GoalPose, UnknownValue
 from grader.findings.words import counted, listing, metres
 from grader.measure.motion.ground import ahead
@@ -53,9 +53,8 @@ def targets(
                 pose = _GOAL.validate_python(check.with_["goal"]).pose(values)
                 found.setdefault((pose, "goal"), Target(pose, radius_m))
             for number, place in enumerate(_PLACES.validate_python(check.with_.get("places", ()))):
-                x_m, y_m = (place[0] + place[-2]) / 2.0, (place[1] + place[-1]) / 2.0
-                zone = place[2:] and place
-                one = Target(Pose(x_m, y_m, 0.0), radius_m, str(number + 1), zone)
+                pose = Pose(place.middle.x_m, place.middle.y_m, 0.0)
+                one = Target(pose, radius_m, str(number + 1), place.bounds)
                 found.setdefault((one.pose, one.label), one)
     return tuple(found.values())
 
