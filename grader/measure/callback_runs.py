@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 from grader.findings.finding import Span
 from grader.recording.model import NS, Recording
@@ -12,7 +13,7 @@ from grader.recording.model import NS, Recording
 Event = tuple[str, bool, int]
 """A callback, whether it is its start, and when."""
 
-# Clocks of one machine may step by so much: what overlaps does so wherever each run is moved by it.
+# Clocks of one machine may step by so much: runs overlap only if they still do when moved by it.
 _SLACK_NS = 1_000_000
 _MOST_SPANS = 400
 
@@ -80,15 +81,15 @@ def timed(recording: Recording) -> list[Run]:
 def publishes(recording: Recording, topic: str) -> bool:
     """Whether most of the timed runs of one callback published on a topic.
 
-    Of short runs only some are told.
+    Of short runs the process declares only some.
     """
-    stamps_ns = sorted(one.stamp_ns for one in recording.on(topic))
-    within: dict[tuple[str, str], list[bool]] = {}
+    stamps_ns = sorted(message.stamp_ns for message in recording.on(topic))
+    published: dict[tuple[str, str], list[bool]] = {}
     for run in timed(recording):
         if run.end_ns is not None and run.end_ns < recording.stop_ns:
-            number = bisect_right(stamps_ns, run.end_ns) - bisect_left(stamps_ns, run.begin_ns)
-            within.setdefault((run.callback, run.serves), []).append(number > 0)
-    return any(2 * sum(found) > len(found) for found in within.values())
+            first, end = bisect_left(stamps_ns, run.begin_ns), bisect_right(stamps_ns, run.end_ns)
+            published.setdefault((run.callback, run.serves), []).append(end > first)
+    return any(2 * sum(in_each) > len(in_each) for in_each in published.values())
 
 
 @dataclass(frozen=True)
@@ -107,28 +108,24 @@ def overlaps(runs: Iterable[Run], least_s: float = 0.0) -> Iterator[Overlap]:
         least_s: How long they must overlap; beyond what clocks may be off.
     """
     active: list[Run] = []
-    for run in sorted(runs, key=lambda item: item.begin_ns):
-        active = [item for item in active if (item.end_ns or 0) > run.begin_ns]
-        for item in active:
-            ends_ns = item.end_ns or 0, run.end_ns or 0
-            both_ns = min(ends_ns) - run.begin_ns
-            certain_ns = min(ends_ns[0] - run.begin_ns, ends_ns[1] - item.begin_ns)
+    for later in sorted(runs, key=lambda run: run.begin_ns):
+        active = [run for run in active if (run.end_ns or 0) > later.begin_ns]
+        for earlier in active:
+            earlier_end_ns, later_end_ns = earlier.end_ns or 0, later.end_ns or 0
+            both_ns = min(earlier_end_ns, later_end_ns) - later.begin_ns
+            # By so much the later run may be moved before they no longer overlap.
+            certain_ns = min(earlier_end_ns - later.begin_ns, later_end_ns - earlier.begin_ns)
             if certain_ns > _SLACK_NS and both_ns >= least_s * NS:
-                yield Overlap(item, run, both_ns / NS)
-        active.append(run)
+                yield Overlap(earlier, later, both_ns / NS)
+        active.append(later)
 
 
 def spans(recording: Recording, runs: Iterable[Run], wrong: Iterable[Run] = ()) -> tuple[Span, ...]:
     """Runs as bars to draw; a run without an end lasts until the end of the observation."""
     marked = set(wrong)
-    return tuple(
-        Span(
-            run.callback,
-            recording.since_launch_s(run.begin_ns),
-            recording.since_launch_s(
-                run.end_ns if run.end_ns is not None else max(recording.stop_ns, run.begin_ns)
-            ),
-            wrong=run in marked,
-        )
-        for run in tuple(runs)[:_MOST_SPANS]
-    )
+    bars = []
+    for run in islice(runs, _MOST_SPANS):
+        end_ns = max(recording.stop_ns, run.begin_ns) if run.end_ns is None else run.end_ns
+        begin_s, end_s = recording.since_launch_s(run.begin_ns), recording.since_launch_s(end_ns)
+        bars.append(Span(run.callback, begin_s, end_s, wrong=run in marked))
+    return tuple(bars)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
@@ -18,13 +19,13 @@ from grader.findings.finding import Evidence, Finding, endpoints_seen, evidence_
 from grader.findings.value import FieldPath
 from grader.findings.words import code, codes, counted
 from grader.measure.printed import Echo, Wanted, echoes, quote, wanted_values
-from grader.recording.model import NS, Kind, Recording
+from grader.recording.model import NS, Kind, Message, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
 
+# What the machine holds up so long before a gap still keeps messages waiting in it.
 _BACKLOG_NS = NS
-"""What the machine holds up so long before keeps later messages waiting."""
 _SHOWN = 5
 _SENT = {
     "any": "",
@@ -85,6 +86,13 @@ class Follows(Parameters):
             asked += f", and never longer than {format_duration(self.every)} without one"
         return asked
 
+    def counts(self, recording: Recording, message: Message) -> bool:
+        """Whether a message must be logged, by when it was published."""
+        if self.sent == "any":
+            return True
+        is_before = message.stamp_ns < recording.launched_ns
+        return is_before if self.sent == "before_launch" else not is_before
+
     def named_fields(self) -> Iterator[NamedFields]:
         """The fields whose numbers are logged."""
         for number, field in enumerate(self.fields):
@@ -102,78 +110,89 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     from a callback or from a timer.
     """
     carried = recording.carried(parameters.topic)
-    own = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
-    if parameters.own:
-        stop_if(None if carried else why_silent(recording, parameters.topic))
-    elif own:
+    own_publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
+    if parameters.own and not carried:
+        return why_silent(recording, parameters.topic)
+    if own_publishers and not parameters.own:
         return mistaken(
             "echoed_sensor",
             f"the node itself publishes on {code(parameters.topic)}, so its log shows nothing of "
             "what it was sent",
-            Evidence(moments=endpoints_seen(recording, own)),
+            Evidence(moments=endpoints_seen(recording, own_publishers)),
         )
-    messages = [
-        message
-        for message in carried
-        if parameters.sent == "any"
-        or (parameters.sent == "before_launch") == (message.stamp_ns < recording.launched_ns)
-    ]
+    messages = [message for message in carried if parameters.counts(recording, message)]
     ready_ns = recording.matched_ns or recording.launched_ns
     within_ns = round(parameters.within * NS)
     sooner_ns = within_ns if parameters.own else 0
     wanted = wanted_values(messages, parameters.fields, ready_ns, sooner_ns)
-    found = echoes(recording, wanted, parameters.decimals, within_ns)
-    if len(found) < parameters.at_least:
+    logged = echoes(recording, wanted, parameters.decimals, within_ns)
+    if len(logged) < parameters.at_least:
         symptom = NotLogged(
             recording,
             parameters.topic,
             wanted,
-            found,
+            logged,
             needed=parameters.at_least,
             decimals=parameters.decimals,
             within_ns=within_ns,
             own=parameters.own,
         )
         return cause_of(symptom)
-    stop_if(_too_seldom(recording, parameters, wanted, found))
-    lines = [line for echo in found for line in echo.lines]
-    number, last = counted(len(messages), "message"), lines[-1]
-    label, log = f"logged a message on {parameters.topic}", (one.text for one in lines[:_SHOWN])
-    return Finding.as_asked(
-        f"log lines follow {len(found)} of {number}: {quote(last.text)}",
-        evidence_at(recording, label, last.time_ns, log=log),
+    stop_if(_why_too_seldom(recording, parameters, wanted, logged))
+    lines = [line for echo in logged for line in echo.lines]
+    shown = evidence_at(
+        recording,
+        f"logged a message on {parameters.topic}",
+        lines[-1].time_ns,
+        log=(line.text for line in lines[:_SHOWN]),
     )
+    number = counted(len(messages), "message")
+    last = quote(lines[-1].text)
+    return Finding.as_asked(f"log lines follow {len(logged)} of {number}: {last}", shown)
 
 
-def _too_seldom(
-    recording: Recording, parameters: Follows, wanted: Sequence[Wanted], found: Sequence[Echo]
+def _why_too_seldom(
+    recording: Recording, parameters: Follows, wanted: Sequence[Wanted], logged: Sequence[Echo]
 ) -> Finding | None:
     """Why there was no line for too long while messages came, or None."""
     if parameters.every is None:
         return None
-    begin_ns, end_ns = wanted[0].due_ns, wanted[-1].due_ns
-    written = sorted(min(echo.lines[-1].time_ns, end_ns) for echo in found)
-    gaps = list(pairwise([begin_ns, *written, end_ns]))
-    gap = max(gaps, key=lambda one: _own_s(recording, one))
-    excused = _own_s(recording, gap) <= parameters.every
-    if excused:
-        gap = max(gaps, key=lambda one: one[1] - one[0])
-    gap_s = (gap[1] - gap[0]) / NS
-    if gap_s <= parameters.every:
+    gaps = list(_gaps(recording, wanted, logged))
+    # The machine makes a gap longer, so the one that is too long without its time decides.
+    longest = max(gaps, key=lambda gap: gap.own_s)
+    machine_may_explain = longest.own_s <= parameters.every
+    if machine_may_explain:
+        longest = max(gaps, key=lambda gap: gap.seconds)
+    if longest.seconds <= parameters.every:
         return None
-    begin_s = recording.since_launch_s(gap[0])
-    observed = f"no such line for {format_duration(gap_s)}, from {begin_s:.2f} s after launch on"
-    if excused:
+    begin_s = recording.since_launch_s(longest.begin_ns)
+    observed = (
+        f"no such line for {format_duration(longest.seconds)}, from {begin_s:.2f} s after launch on"
+    )
+    if machine_may_explain:
         return Finding.undecided(f"{observed}, but the machine took the time from the process")
     observed += f", although messages came on {code(parameters.topic)}"
     kind = Kind.PUBLISHER if parameters.own else Kind.SUBSCRIPTION
     nodes = {item.node for item in recording.student_endpoints(kind, parameters.topic)}
-    shown = evidence_at(recording, "no line from here on", gap[0])
     slow = slow_callbacks(Uncalled(recording, observed, nodes))
+    shown = evidence_at(recording, "no line from here on", longest.begin_ns)
     return slow or mistaken("seldom", observed, shown)
 
 
-def _own_s(recording: Recording, gap: tuple[int, int]) -> float:
-    """How long a gap is without what the machine took in it, and shortly before."""
-    begin_ns, end_ns = gap
-    return (end_ns - begin_ns) / NS - recording.stolen_s(begin_ns - _BACKLOG_NS, end_ns)
+@dataclass(frozen=True)
+class _Gap:
+    """A time without a line; ``own_s`` is its length without what the machine took."""
+
+    begin_ns: int
+    seconds: float
+    own_s: float
+
+
+def _gaps(recording: Recording, wanted: Sequence[Wanted], logged: Sequence[Echo]) -> Iterator[_Gap]:
+    """The times from line to line while messages came."""
+    first_ns, last_ns = wanted[0].due_ns, wanted[-1].due_ns
+    written_ns = sorted(min(echo.lines[-1].time_ns, last_ns) for echo in logged)
+    for begin_ns, end_ns in pairwise([first_ns, *written_ns, last_ns]):
+        seconds = (end_ns - begin_ns) / NS
+        stolen_s = recording.stolen_s(begin_ns - _BACKLOG_NS, end_ns)
+        yield _Gap(begin_ns, seconds, seconds - stolen_s)
