@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -157,49 +157,69 @@ def echoes(
     Args:
         within_ns: How soon after its message a line must have come.
     """
-    lines = output_lines(recording)
-    times = [line.time_ns for line in lines]
-    printed = [numbers(line.text) for line in lines]
+    output = _Output(output_lines(recording), decimals)
     found: list[Echo] = []
-    used: set[int] = set()
-    free = number = 0
+    number = 0
     while number < len(wanted):
-        item = wanted[number]
-        number += 1
-        begin_ns = item.begin_ns
-        end_ns = item.due_ns + within_ns
+        first = wanted[number]
+        end_ns = first.due_ns + within_ns
         if forgive:
-            end_ns = recording.own_end_ns(begin_ns, (end_ns - begin_ns) / NS)
-        missing = set(item.values)
+            end_ns = recording.own_end_ns(first.begin_ns, (end_ns - first.begin_ns) / NS)
+        serving = output.serving(first, end_ns)
+        if not serving:
+            number += 1
+            continue
+        values, written_ns = output.numbers[serving[-1]], output.times_ns[serving[-1]]
+        following = wanted[number : number + len(values)]
+        published = [item for item in following if item.begin_ns <= written_ns]
+        listed = _listed(values, published, decimals)
+        lines = output.taken(first, serving)
+        found += [Echo(item, lines) for item in published[:listed]]
+        number += listed
+    return tuple(found)
+
+
+class _Output:
+    """The lines of a run, and which of them serve a message already."""
+
+    def __init__(self, lines: Sequence[LogLine], decimals: int) -> None:
+        self.times_ns = [line.time_ns for line in lines]
+        self.numbers = [numbers(line.text) for line in lines]
+        self._lines = tuple(lines)
+        self._decimals = decimals
+        self._used: set[int] = set()
+        self._free = 0
+
+    def serving(self, wanted: Wanted, end_ns: int) -> list[int]:
+        """Indices of the next free lines that show all values of a message, or none."""
+        missing = set(wanted.values)
         serving: list[int] = []
-        begin = bisect_left(times, begin_ns)
-        for index in range(begin, len(lines)):
-            if times[index] > end_ns:
-                break
-            if index in used:
+        begin = bisect_left(self.times_ns, wanted.begin_ns)
+        for index in range(begin, bisect_right(self.times_ns, end_ns)):
+            if index in self._used:
                 continue
-            here = missing & shown(printed[index], item, decimals)
+            here = missing & shown(self.numbers[index], wanted, self._decimals)
             if not here:
                 continue
             missing -= here
             serving.append(index)
             if missing:
                 continue
-            texts = "\n".join(logged_text(lines[one].text) for one in serving)
-            if exchanged(texts, item.values, decimals):
-                missing, serving = set(item.values), []
-            else:
-                used.update(serving)
-                # Lines before it belong to it, such as a title, if they come after all others.
-                first = max(begin, free) if serving[0] >= free else serving[0]
-                served, free = lines[first : index + 1], max(free, index + 1)
-                others = wanted[number : number + len(printed[index]) - 1]
-                before = [one for one in others if one.begin_ns <= times[index]]
-                listed = _listed(printed[index], [item, *before], decimals)
-                found += [Echo(one, served) for one in [item, *before][:listed]]
-                number += listed - 1
-                break
-    return tuple(found)
+            text = "\n".join(logged_text(self._lines[line].text) for line in serving)
+            if not exchanged(text, wanted.values, self._decimals):
+                return serving
+            missing, serving = set(wanted.values), []
+        return []
+
+    def taken(self, wanted: Wanted, serving: Sequence[int]) -> tuple[LogLine, ...]:
+        """Take lines for a message, with those before them that belong to it, such as a title."""
+        self._used.update(serving)
+        first, end = serving[0], serving[-1] + 1
+        # Only of lines that come after all others is it known that nothing else stands before.
+        if first >= self._free:
+            first = max(bisect_left(self.times_ns, wanted.begin_ns), self._free)
+        self._free = max(self._free, end)
+        return self._lines[first:end]
 
 
 def _listed(printed: Sequence[float], wanted: Sequence[Wanted], decimals: int) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from enum import Enum
+from itertools import takewhile
 
 from pydantic import Field
 
@@ -18,6 +19,7 @@ from grader.recording.model import Recording
 from grader.spec.quantity import PositiveLength
 
 _KILL = "/kill"
+# Where the assignment does not say how near, this is near enough to have come for it.
 _NEAR_M = 0.5
 _MARGIN_M = 0.2
 """Of two that are nearly as near, either is the nearest."""
@@ -60,47 +62,44 @@ def catches(recording: Recording, parameters: Catches) -> Finding:
     """
     stop_if(why_no_turtles(recording))
     jumps = [
-        one
-        for one in recording.turtles
-        if one.kind == "teleported" and one.turtle == parameters.turtle
+        event
+        for event in recording.turtles
+        if event.kind == "teleported" and event.turtle == parameters.turtle
     ]
     if jumps and not parameters.teleports:
         shown = evidence_at(recording, "teleported", jumps[0].time_ns)
         return mistaken("turtle_teleported", f"{code(parameters.turtle)} was teleported", shown)
     hunt = Hunt(recording, parameters.turtle, parameters.prey)
-    caught, evidence = hunt.catches, _evidence(recording, hunt.catches)
-    wrong = next((n for n, one in enumerate(caught) if not _is_right(one, n, parameters)), None)
-    credit = (len(caught) if wrong is None else wrong) / len(parameters.prey)
-    if wrong is not None:
-        found = _mistake(caught[wrong], wrong, parameters, evidence)
-    elif len(caught) < len(parameters.prey):
-        found = _missing(hunt, parameters, evidence)
-    else:
-        return Finding.as_asked(f"{codes(one.name for one in caught)} in this order", evidence)
-    return replace(found, credit=credit)
+    catches, prey = hunt.catches, parameters.prey
+    evidence = _evidence(recording, catches)
+    right = list(takewhile(lambda one: _is_right(*one, parameters), enumerate(catches)))
+    credit = len(right) / len(prey)
+    if len(right) < len(catches):
+        number = len(right)
+        return replace(_mistake(catches[number], number, parameters, evidence), credit=credit)
+    if len(catches) < len(prey):
+        return replace(_missing(hunt, parameters, evidence), credit=credit)
+    return Finding.as_asked(f"{codes(one.name for one in catches)} in this order", evidence)
 
 
 def _evidence(recording: Recording, caught: tuple[Catch, ...]) -> Evidence:
     return Evidence(tuple(moment(recording, f"{one.name} killed", one.time_ns) for one in caught))
 
 
-def _is_right(one: Catch, number: int, asked: Catches) -> bool:
+def _is_right(number: int, one: Catch, asked: Catches) -> bool:
     if _is_far(one, asked):
         return False
     if asked.order is Order.LISTED:
         return one.name == asked.prey[number]
-    return asked.order is Order.ANY or not _has_nearer(one)
+    return asked.order is Order.ANY or not _had_nearer(one)
 
 
 def _is_far(one: Catch, asked: Catches) -> bool:
     return asked.within is not None and (one.distance_m is None or one.distance_m > asked.within)
 
 
-def _is_near(away_m: float | None, asked: Catches) -> bool:
-    return away_m is not None and away_m <= (asked.within or _NEAR_M)
-
-
-def _has_nearer(one: Catch) -> bool:
+def _had_nearer(one: Catch) -> bool:
+    """Whether another turtle was nearer when the hunt for this one began."""
     if one.nearest is None or one.begin_m is None:
         return False
     return one.begin_m > one.nearest[1] + _MARGIN_M
@@ -135,14 +134,15 @@ def _missing(hunt: Hunt, asked: Catches, evidence: Evidence) -> Finding:
         return mistaken("turtle_not_spawned", seen, evidence)
     end_ns = recording.truth[-1].time_ns
     seen = f"{number} killed; not {codes(left, 'or')}"
-    asked_kills = recording.asked_of(_KILL)
-    if len(asked_kills) > len(caught):
-        named = code(asked_kills[-1].fields["name"])
-        times = counted(len(asked_kills), "request")
+    requests = recording.asked_of(_KILL)
+    if len(requests) > len(caught):
+        named = code(requests[-1].fields["name"])
+        times = counted(len(requests), "request")
         seen = f"{seen}, in {times} to {code(_KILL)}, the last with the name {named}"
         return mistaken("turtle_not_killed", seen, evidence)
-    reached = [name for name in left if _is_near(hunt.distance_m(name, end_ns), asked)]
-    if reached:
-        near = f"{seen}, although {code(asked.turtle)} was at {code(reached[0])} at the end"
-        return mistaken("turtle_not_killed", near, evidence)
+    for name in left:
+        away_m = hunt.distance_m(name, end_ns)
+        if away_m is not None and away_m <= (asked.within or _NEAR_M):
+            near = f"{seen}, although {code(asked.turtle)} was at {code(name)} at the end"
+            return mistaken("turtle_not_killed", near, evidence)
     return astray(recording, seen, asked.turtle, evidence=evidence)

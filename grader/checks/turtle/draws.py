@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from operator import itemgetter
 
 from pydantic import Field
 
@@ -11,7 +13,7 @@ from grader.checks.turtle.turtle_check import TurtleParameters, astray
 from grader.diagnosis.explanation import mistaken
 from grader.findings.finding import Finding, evidence_at
 from grader.findings.words import code, counted, metres, percent, point
-from grader.measure.turtle.drawing import distances_m, sampled
+from grader.measure.turtle.drawing import Line, distances_m, sampled
 from grader.recording.model import Recording
 from grader.spec.quantity import PositiveLength
 from sim.coordinates import Point
@@ -50,30 +52,29 @@ def draws(recording: Recording, parameters: Draws) -> Finding:
         shown = evidence_at(recording, "teleported", jump.times_ns[0])
         service = code(f"/{parameters.turtle}/set_pen")
         return mistaken("turtle_jumped", seen, shown, service=service)
-    corners = [*parameters.figure, *parameters.figure[: parameters.closed]]
-    wanted, paths = sampled(corners), [line.points for line in lines]
-    missing = [one for one in distances_m(wanted, paths) if one > parameters.tolerance]
-    share = 1.0 - len(missing) / len(wanted)
-    worst = max(
-        (
-            (off_m, place, line)
-            for line in lines
-            for places in [sampled(line.points)]
-            for off_m, place in zip(distances_m(places, [corners]), places, strict=True)
-        ),
-        key=lambda one: one[0],
-    )
-    off_m, place, line = worst
+    corners = [*parameters.figure]
+    if parameters.closed:
+        corners.append(parameters.figure[0])
+    wanted = sampled(corners)
+    distances = distances_m(wanted, [line.points for line in lines])
+    missing = sum(off_m > parameters.tolerance for off_m in distances)
+    share = 1.0 - missing / len(wanted)
+    off_m, place, line = max((_farthest(line, corners) for line in lines), key=itemgetter(0))
     evidence = evidence_at(recording, f"the line with {point(*place)} begins", line.times_ns[0])
-    length_m = sum(one.length_m for one in lines)
+    length_m = sum(line.length_m for line in lines)
     seen = f"{metres(length_m)} in {counted(len(lines), 'line')}"
-    if not missing and off_m <= parameters.tolerance:
-        return Finding.as_asked(f"{seen}, at most {metres(off_m)} off", evidence)
     if off_m > parameters.tolerance:
         seen += f": at {point(*place)} it is {metres(off_m)} off the figure"
-        mistake = "turtle_off_figure"
-    else:
-        seen += f", which are {percent(round(share, 2))} of the figure"
-        mistake = "turtle_part_only"
-    found = astray(recording, seen, parameters.turtle, mistake, evidence)
-    return replace(found, credit=share if off_m <= parameters.tolerance else 0.0)
+        return astray(recording, seen, parameters.turtle, "turtle_off_figure", evidence)
+    if not missing:
+        return Finding.as_asked(f"{seen}, at most {metres(off_m)} off", evidence)
+    seen += f", which are {percent(round(share, 2))} of the figure"
+    partial = astray(recording, seen, parameters.turtle, "turtle_part_only", evidence)
+    return replace(partial, credit=share)
+
+
+def _farthest(line: Line, corners: Sequence[Point]) -> tuple[float, Point, Line]:
+    """How far a line is from the figure, and where."""
+    places = sampled(line.points)
+    off_m, place = max(zip(distances_m(places, [corners]), places, strict=True), key=itemgetter(0))
+    return off_m, place, line

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from grader.recording.model import NS, Recording
@@ -18,7 +18,10 @@ SAMPLE_M = 0.02
 CORNER_M = 0.1
 """A turn within so little way is one corner."""
 _LEAST_CORNER_RAD = math.radians(25.0)
+# Where a line turns by less it goes straight on: no corner begins there.
+_LEAST_TURN_RAD = math.radians(2.0)
 _STRAIGHT_RAD = 1e-9
+# A step of the turtles lasts 16 ms: what comes later than this does not follow on the last one.
 _GAP_NS = NS // 10
 
 
@@ -45,38 +48,46 @@ class Line:
         return sum(math.dist(a, b) for a, b in pairwise(self.points))
 
 
+@dataclass(frozen=True)
+class _Pen:
+    colour: Colour = (0, 0, 0)
+    width: int = 0
+    is_down: bool = False
+
+
 @dataclass
-class _Pencil:
+class _Turtle:
     """A turtle that draws: where it is, its pen, and the line that it has begun."""
 
-    turtle: str
-    at: Point | None
+    name: str
+    place: Point | None
     time_ns: int
-    pen: tuple[Colour, int, bool] = ((0, 0, 0), 0, False)
+    pen: _Pen = _Pen()
     points: list[Point] = field(default_factory=list)
     times_ns: list[int] = field(default_factory=list)
 
     def go(self, to: Point, time_ns: int) -> None:
-        """Draw on to a point; before a window begins its way is not known."""
+        """Draw on to a point."""
         if time_ns - self.time_ns > _GAP_NS:
-            self.at = None
+            # Here a window begins, and the way before it is not known.
+            self.place = None
         self.time_ns = time_ns
-        if self.at is not None and self.at != to and self.pen[2]:
+        if self.place is not None and self.place != to and self.pen.is_down:
             if not self.points:
-                self.points, self.times_ns = [self.at], [time_ns]
+                self.points, self.times_ns = [self.place], [time_ns]
             if len(self.points) > 1 and _is_straight(self.points[-2], self.points[-1], to):
                 del self.points[-1], self.times_ns[-1]
             self.points.append(to)
             self.times_ns.append(time_ns)
-        self.at = to
+        self.place = to
 
-    def end(self, *, is_jump: bool = False) -> Iterable[Line]:
-        """Lift it; the line that it has drawn, if any."""
-        if self.points:
-            colour, width, _ = self.pen
-            points, times_ns = tuple(self.points), tuple(self.times_ns)
-            self.points, self.times_ns = [], []
-            yield Line(self.turtle, colour, width, points, times_ns, is_jump)
+    def finished(self, *, is_jump: bool = False) -> list[Line]:
+        """Lift the pen: the line that it has drawn, or none."""
+        points, times_ns = tuple(self.points), tuple(self.times_ns)
+        self.points, self.times_ns = [], []
+        if not points:
+            return []
+        return [Line(self.name, self.pen.colour, self.pen.width, points, times_ns, is_jump)]
 
 
 def _is_straight(first: Point, second: Point, third: Point) -> bool:
@@ -90,36 +101,37 @@ def _is_straight(first: Point, second: Point, third: Point) -> bool:
 def drawn(recording: Recording) -> tuple[Line, ...]:
     """The lines on the canvas at the end, in the order in which they were begun."""
     lines: list[Line] = []
-    pencils: dict[str, _Pencil] = {}
+    turtles: dict[str, _Turtle] = {}
     for item in _in_order(recording):
         if isinstance(item, Truth):
-            if (pencil := pencils.get(item.robot)) is not None:
-                pencil.go((item.x_m, item.y_m), item.time_ns)
+            if item.robot in turtles:
+                turtles[item.robot].go((item.x_m, item.y_m), item.time_ns)
         elif item.kind in ("cleared", "reset"):
-            for pencil in pencils.values():
-                _ = [*pencil.end()]
             lines.clear()
+            for turtle in turtles.values():
+                turtle.finished()
             if item.kind == "reset":
-                pencils.clear()
+                turtles.clear()
         elif item.turtle:
-            lines += _happened(item, pencils)
-    for pencil in pencils.values():
-        lines += pencil.end()
+            lines += _lines_ended_by(item, turtles)
+    for turtle in turtles.values():
+        lines += turtle.finished()
     return tuple(sorted(lines, key=lambda line: line.times_ns[0]))
 
 
-def _happened(event: TurtleEvent, pencils: dict[str, _Pencil]) -> list[Line]:
-    """What an event does to a turtle that draws; the lines that it ends."""
-    place, pencil = (event.x_m, event.y_m), pencils.get(event.turtle)
-    if pencil is None or event.kind in ("placed", "spawned"):
-        pencil = pencils[event.turtle] = _Pencil(event.turtle, place, event.time_ns)
-    lines = [*pencil.end()]
+def _lines_ended_by(event: TurtleEvent, turtles: dict[str, _Turtle]) -> list[Line]:
+    """Let an event happen to its turtle."""
+    place = (event.x_m, event.y_m)
+    if event.turtle not in turtles or event.kind in ("placed", "spawned"):
+        turtles[event.turtle] = _Turtle(event.turtle, place, event.time_ns)
+    turtle = turtles[event.turtle]
+    lines = turtle.finished()
     if event.kind == "teleported":
-        pencil.go(place, event.time_ns)
-        lines += pencil.end(is_jump=True)
+        turtle.go(place, event.time_ns)
+        lines += turtle.finished(is_jump=True)
     elif event.kind == "killed":
-        del pencils[event.turtle]
-    pencil.pen = (event.colour, event.width, event.is_down)
+        del turtles[event.turtle]
+    turtle.pen = _Pen(event.colour, event.width, event.is_down)
     return lines
 
 
@@ -172,40 +184,49 @@ def corners(lines: Sequence[Line], closed_m: float) -> list[Corner]:
     Args:
         closed_m: A drawing whose ends are so near each other has a corner there too.
     """
+    found: list[Corner] = []
+    bend: list[Corner] = []
+    for turn in _turns(_way(lines, closed_m)):
+        if bend and math.dist(bend[0].place, turn.place) > CORNER_M:
+            found += _corner(bend)
+            bend = []
+        if bend or abs(turn.angle_rad) > _LEAST_TURN_RAD:
+            bend.append(turn)
+    return found + _corner(bend)
+
+
+def _way(lines: Sequence[Line], closed_m: float) -> list[tuple[Point, int]]:
+    """The points of all lines in order, with their times; a closed way begins again at its end."""
     way: list[tuple[Point, int]] = []
     for line in lines:
         for point, time_ns in zip(line.points, line.times_ns, strict=True):
             if not way or math.dist(way[-1][0], point) > SAMPLE_M:
                 way.append((point, time_ns))
-    if len(way) < 3:
-        return []
-    if math.dist(way[0][0], way[-1][0]) < closed_m:
-        # The end that is not quite at the beginning would make a corner of its own.
-        while len(way) > 3 and math.dist(way[0][0], way[-1][0]) < closed_m:
-            del way[-1]
-        way += way[:2]
-    turns = [
-        (_turn_rad(a[0], b[0], c[0]), b) for a, b, c in zip(way, way[1:], way[2:], strict=False)
-    ]
-    found: list[Corner] = []
-    group: list[tuple[float, tuple[Point, int]]] = []
-    for turn in turns:
-        if group and math.dist(group[0][1][0], turn[1][0]) > CORNER_M:
-            found += _corner(group)
-            group = []
-        if group or abs(turn[0]) > math.radians(2.0):
-            group.append(turn)
-    return [*found, *_corner(group)]
+    if len(way) < 3 or math.dist(way[0][0], way[-1][0]) >= closed_m:
+        return way
+    # The end that is not quite at the beginning would make a corner of its own.
+    while len(way) > 3 and math.dist(way[0][0], way[-1][0]) < closed_m:
+        del way[-1]
+    return way + way[:2]
 
 
-def _corner(group: Sequence[tuple[float, tuple[Point, int]]]) -> list[Corner]:
-    angle_rad = sum(turn for turn, _ in group)
+def _turns(way: Sequence[tuple[Point, int]]) -> Iterator[Corner]:
+    """How far the way turns at each of its points."""
+    for (before, _), (place, time_ns), (after, _) in zip(way, way[1:], way[2:], strict=False):
+        angle_rad = math.remainder(
+            _bearing_rad(place, after) - _bearing_rad(before, place), math.tau
+        )
+        yield Corner(place, angle_rad, time_ns)
+
+
+def _bearing_rad(begin: Point, end: Point) -> float:
+    return math.atan2(end[1] - begin[1], end[0] - begin[0])
+
+
+def _corner(bend: Sequence[Corner]) -> list[Corner]:
+    """The corner that the turns of a bend make together, where it turns the most; or none."""
+    angle_rad = sum(turn.angle_rad for turn in bend)
     if abs(angle_rad) < _LEAST_CORNER_RAD:
         return []
-    place, time_ns = max(group, key=lambda one: abs(one[0]))[1]
-    return [Corner(place, angle_rad, time_ns)]
-
-
-def _turn_rad(a: Point, b: Point, c: Point) -> float:
-    first, second = math.atan2(b[1] - a[1], b[0] - a[0]), math.atan2(c[1] - b[1], c[0] - b[0])
-    return math.remainder(second - first, math.tau)
+    sharpest = max(bend, key=lambda turn: abs(turn.angle_rad))
+    return [replace(sharpest, angle_rad=angle_rad)]

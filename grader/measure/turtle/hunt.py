@@ -56,11 +56,9 @@ class Hunt:
 
     def distance_m(self, name: str, time_ns: int) -> float | None:
         """How far a turtle was from the hunter at the end of the last step before a time."""
-        places = [self._at(one, time_ns) for one in (self.hunter, name)]
-        if None in places:
+        hunter, prey = self._at(self.hunter, time_ns), self._at(name, time_ns)
+        if hunter is None or prey is None:
             return None
-        hunter, prey = places
-        assert hunter is not None and prey is not None
         return math.hypot(prey.x_m - hunter.x_m, prey.y_m - hunter.y_m)
 
     def _at(self, name: str, time_ns: int) -> Truth | None:
@@ -72,17 +70,21 @@ class Hunt:
     def catches(self) -> tuple[Catch, ...]:
         """What was caught, in order."""
         # The first hunt begins when all prey is there; who waits for it chooses then.
-        firsts = [self.ways[one][0].time_ns for one in self.prey if one in self.ways]
-        begin_ns = max(firsts, default=0) + 1
-        left, found = set(self.prey), []
+        first_ns = [self.ways[name][0].time_ns for name in self.prey if name in self.ways]
+        begin_ns = max(first_ns, default=0) + 1
+        alive = sorted(set(self.prey))
+        caught = []
         for event in self.killed:
-            begin_ns = min(begin_ns, event.time_ns)
-            choice = {one: self.distance_m(one, begin_ns) for one in sorted(left)}
-            known = {one: away_m for one, away_m in choice.items() if away_m is not None}
-            nearest = min(known.items(), key=lambda pair: pair[1], default=None)
-            distance_m = self.distance_m(event.turtle, event.time_ns)
             name = event.turtle
-            found.append(Catch(name, event.time_ns, distance_m, nearest, known.get(name)))
-            left.discard(name)
+            begin_ns = min(begin_ns, event.time_ns)
+            away_m = {
+                other: distance_m
+                for other in alive
+                if (distance_m := self.distance_m(other, begin_ns)) is not None
+            }
+            nearest = min(away_m.items(), key=lambda pair: pair[1], default=None)
+            distance_m = self.distance_m(name, event.time_ns)
+            caught.append(Catch(name, event.time_ns, distance_m, nearest, away_m.get(name)))
+            alive.remove(name)
             begin_ns = event.time_ns
-        return tuple(found)
+        return tuple(caught)
