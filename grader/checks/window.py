@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -60,8 +60,8 @@ class Phase(Parameters):
 
     @model_validator(mode="after")
     def _one_thing(self) -> Phase:
-        given = [self.message, self.lifecycle, self.robot, self.log]
-        if len(given) - given.count(None) != 1:
+        kinds = [self.message, self.lifecycle, self.robot, self.log]
+        if sum(kind is not None for kind in kinds) != 1:
             raise ValueError("give one of: message, lifecycle, robot, log")
         if (self.node is None) != (self.lifecycle is None):
             raise ValueError("'lifecycle' and 'node' go together")
@@ -83,8 +83,10 @@ class Phase(Parameters):
             return f"{code(self.message)} has {words(self.fields) if self.fields else 'a message'}"
         if self.log is not None:
             return f"“{self.log}” is written"
+        if self.robot == "touches":
+            return "the robot touches something"
         if self.robot is not None:
-            return f"the robot {self.robot}" + " something" * (self.robot == "touches")
+            return f"the robot {self.robot}"
         return f"{code(str(self.node))} is {self.lifecycle}"
 
     def intervals(self, recording: Recording) -> list[Interval]:
@@ -92,10 +94,12 @@ class Phase(Parameters):
         found: list[Interval] = []
         begin_ns = None
         for time_ns, is_so in [*self._samples(recording), (recording.stop_ns + 1, False)]:
-            if begin_ns is not None and not is_so:
+            if is_so and begin_ns is None:
+                begin_ns = time_ns
+            elif not is_so and begin_ns is not None:
                 found.append((begin_ns, time_ns))
-            begin_ns = (time_ns if begin_ns is None else begin_ns) if is_so else None
-        return [one for one in found if one[0] < one[1]]
+                begin_ns = None
+        return _not_empty(found)
 
     def _samples(self, recording: Recording) -> Iterator[tuple[int, bool]]:
         """Times with whether it is so from then on, oldest first."""
@@ -140,36 +144,52 @@ class Window:
 
     def __str__(self) -> str:
         """Say it in words."""
-        times = [f"from {format_duration(self.from_s)}"] if self.from_s else []
-        times += [f"to {format_duration(self.to_s)}"] if self.to_s is not None else []
+        times = []
+        if self.from_s:
+            times.append(f"from {format_duration(self.from_s)}")
+        if self.to_s is not None:
+            times.append(f"to {format_duration(self.to_s)}")
         phases = [f"{key} {phase.asked_for}" for key, phase in self.phases.items()]
-        return ", ".join(filter(None, [" ".join(times), *phases]))
+        return ", ".join([" ".join(times), *phases] if times else phases)
 
     def intervals(self, recording: Recording) -> list[Interval]:
         """Its times in a run, none of them empty."""
-        begin_ns, end_ns = recording.matched_ns or recording.launched_ns, recording.stop_ns + 1
-        found = [(begin_ns, end_ns)]
+        end_ns = recording.stop_ns + 1
+        found = [(recording.matched_ns or recording.launched_ns, end_ns)]
         if self.after is not None:
-            found = [(begin, end_ns) for begin, _ in self.after.intervals(recording)[:1]]
+            found = [(begin_ns, end_ns) for begin_ns, _ in self.after.intervals(recording)[:1]]
         if self.before is not None:
-            then = self.before.intervals(recording)
-            found = [
-                (begin, min([max(one[0], begin) for one in then if one[1] > begin] + [end]))
-                for begin, end in found
-            ]
+            found = _cut_off(found, self.before.intervals(recording))
         if self.while_ is not None:
-            found = [
-                (max(begin, one[0]), min(end, one[1]))
-                for begin, end in found
-                for one in self.while_.intervals(recording)
-            ]
-        from_ns, to_ns = round(self.from_s * NS), round((self.to_s or 0.0) * NS)
-        found = [
-            (begin + from_ns, end if self.to_s is None else min(end, begin + to_ns))
-            for begin, end in found
-            if begin < end
-        ]
+            during = self.while_.intervals(recording)
+            found = [_common(one, other) for one in found for other in during]
+        found = [self._part(one) for one in _not_empty(found)]
         if self.after is None and self.while_ is None and not self.from_s:
             # What was published before the first match belongs to the beginning.
-            found = [(0, end) for _, end in found]
-        return [one for one in found if one[0] < one[1]]
+            found = [(0, part_end_ns) for _, part_end_ns in found]
+        return _not_empty(found)
+
+    def _part(self, interval: Interval) -> Interval:
+        """The part of an interval between ``from_s`` and ``to_s``."""
+        begin_ns, end_ns = interval
+        if self.to_s is not None:
+            end_ns = min(end_ns, begin_ns + round(self.to_s * NS))
+        return begin_ns + round(self.from_s * NS), end_ns
+
+
+def _not_empty(intervals: Sequence[Interval]) -> list[Interval]:
+    return [(begin_ns, end_ns) for begin_ns, end_ns in intervals if begin_ns < end_ns]
+
+
+def _common(one: Interval, other: Interval) -> Interval:
+    """The time that is in both; if there is none, it ends before it begins."""
+    return max(one[0], other[0]), min(one[1], other[1])
+
+
+def _cut_off(intervals: Sequence[Interval], others: Sequence[Interval]) -> list[Interval]:
+    """Each interval until the first of the others that is not over when it begins."""
+    found = []
+    for begin_ns, end_ns in intervals:
+        later_ns = (max(begin_ns, start) for start, stop in others if stop > begin_ns)
+        found.append((begin_ns, min([*later_ns, end_ns])))
+    return found
