@@ -45,11 +45,19 @@ def is_static(topic: str) -> bool:
 
 def sent(recording: Recording, topics: Iterable[str]) -> Iterator[Sent]:
     """The transforms on some topics, in the order of their publishing on each."""
-    for message in (one for topic in topics for one in recording.on(topic)):
-        for one in message.value["transforms"] if message.type == TRANSFORMS else ():
-            names = (one["header"]["frame_id"], one["child_frame_id"])
-            parent, child = (name[:_LONGEST_NAME] for name in names)
-            yield Sent(parent, child, one["transform"], stamp_of(one) or 0, message)
+    for topic in topics:
+        for message in recording.on(topic):
+            if message.type == TRANSFORMS:
+                yield from _transforms_in(message)
+
+
+def _transforms_in(message: Message) -> Iterator[Sent]:
+    for item in message.value["transforms"]:
+        parent, child = item["header"]["frame_id"], item["child_frame_id"]
+        stamp_ns = stamp_of(item) or 0
+        yield Sent(
+            parent[:_LONGEST_NAME], child[:_LONGEST_NAME], item["transform"], stamp_ns, message
+        )
 
 
 def stamp_of(message: Mapping[str, Any]) -> int | None:
@@ -70,13 +78,13 @@ def quaternion(roll: float, pitch: float, yaw: float) -> dict[str, float]:
 def roots(transforms: Sequence[Sent]) -> list[str]:
     """Where the ways from all frames to their parents end; of a circle, one of its frames."""
     parents = {one.child: one.parent for one in reversed(transforms)}
-    found: dict[str, str] = {}
+    root_of: dict[str, str] = {}
     for start in (name for one in transforms for name in (one.parent, one.child)):
-        frame, way = start, {start: None}
-        while frame in parents and frame not in found:
+        frame, way = start, [start]
+        while frame in parents and frame not in root_of:
             frame = parents[frame]
             if frame in way:
                 break
-            way[frame] = None
-        found |= dict.fromkeys(way, found.get(frame, frame))
-    return list(dict.fromkeys(found.values()))
+            way.append(frame)
+        root_of |= dict.fromkeys(way, root_of.get(frame, frame))
+    return list(dict.fromkeys(root_of.values()))

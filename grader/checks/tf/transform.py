@@ -6,10 +6,10 @@ The transforms between two frames are judged as the messages of a topic of their
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field
 
@@ -42,6 +42,8 @@ from grader.spec.unit import format_duration
 from sim.coordinates import Position, RollPitchYaw
 
 _RATE_TOLERANCE = 0.2
+# The true pose is judged as if it had come on a topic.
+_TRUTH = "/truth"
 _Number = Literal["x", "y", "z", "roll", "pitch", "yaw"]
 _ANGLES = ("roll", "pitch", "yaw")
 _POSE: dict[_Number, str] = {
@@ -67,18 +69,21 @@ class EdgeParameters(Parameters):
         The check ends here if there is none, or tf2 cannot use one.
         """
         symptom = NoTransform(recording, self.topic, self.parent, self.child)
-        unheard = refused_by_tf2(symptom) or overwritten(symptom)
-        stop_if(unheard if symptom.wanted else cause_of(symptom))
-        first_ns = _first_with(recording)
-        for one in symptom.wanted:
+        transforms = symptom.wanted
+        if not transforms:
+            stop_if(cause_of(symptom))
+        stop_if(refused_by_tf2(symptom) or overwritten(symptom))
+        published_ns = _published_ns(recording)
+        for transform in transforms:
             # What came later, such as what is made of this transform, is no source of its stamp.
-            is_known = first_ns.get(one.stamp_ns, math.inf) <= one.message.stamp_ns
-            known = (one.stamp_ns,) if is_known else ()
-            stop_if(explain(BadTransform(recording, one, known)))
+            source_ns = published_ns.get(transform.stamp_ns, math.inf)
+            is_known = source_ns <= transform.message.stamp_ns
+            known = (transform.stamp_ns,) if is_known else ()
+            stop_if(explain(BadTransform(recording, transform, known)))
         # Others may have come between: these are numbered anew.
         own = (
-            replace(one.message, value=one.value, sequence=number)
-            for number, one in enumerate(symptom.wanted, start=1)
+            replace(transform.message, value=transform.value, sequence=number)
+            for number, transform in enumerate(transforms, start=1)
         )
         return replace(recording, messages={**recording.messages, self.topic: tuple(own)})
 
@@ -88,11 +93,14 @@ class EdgeParameters(Parameters):
         return f"{edge(self.parent, self.child)} on {code(self.topic)}"
 
 
-def _first_with(recording: Recording) -> dict[int | None, int]:
-    """When the first message of each stamp was published, by the stamp."""
-    heard = (*recording.messages.values(), *recording.sent.values())
-    latest = sorted((one for items in heard for one in items), key=lambda one: -one.stamp_ns)
-    return {stamp_of(one.value): one.stamp_ns for one in latest}
+def _published_ns(recording: Recording) -> dict[int | None, int]:
+    """When the first message with each stamp in its header was published, by that stamp."""
+    streams = (*recording.messages.values(), *recording.sent.values())
+    found: dict[int | None, int] = {}
+    for message in (message for stream in streams for message in stream):
+        stamp_ns = stamp_of(message.value)
+        found[stamp_ns] = min(found.get(stamp_ns, message.stamp_ns), message.stamp_ns)
+    return found
 
 
 class Static(EdgeParameters):
@@ -151,8 +159,11 @@ def broadcast(recording: Recording, parameters: Broadcast) -> Finding:
     which the node may have made the transform. The rate is judged as by timing.rate.
     """
     alone = parameters.alone(recording)
-    low, high = (parameters.rate * (1.0 + part) for part in (-_RATE_TOLERANCE, _RATE_TOLERANCE))
-    wanted = timing.Rate.model_construct(topic=parameters.topic, at_least=low, at_most=high)
+    wanted = timing.Rate.model_construct(
+        topic=parameters.topic,
+        at_least=parameters.rate * (1.0 - _RATE_TOLERANCE),
+        at_most=parameters.rate * (1.0 + _RATE_TOLERANCE),
+    )
     found = timing.rate.judge(alone, wanted)
     first, *others = alone.on(parameters.topic)
     if found.credit and parameters.moving and all(one.value == first.value for one in others):
@@ -201,13 +212,13 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
 
     It is judged as by messages.follows, so the pose must change in each of the fields.
     """
-    alone, source = parameters.alone(recording), parameters.source or "/truth"
-    truth = tuple(
-        Message(source, "", _odometry(one), one.time_ns, one.time_ns, number)
-        for number, one in enumerate(recording.truth, start=1)
-    )
+    alone, source = parameters.alone(recording), parameters.source or _TRUTH
     if parameters.source is None:
-        alone = replace(alone, messages={**alone.messages, source: truth})
+        truth = tuple(
+            Message(_TRUTH, "", _odometry(step), step.time_ns, step.time_ns, number)
+            for number, step in enumerate(recording.truth, start=1)
+        )
+        alone = replace(alone, messages={**alone.messages, _TRUTH: truth})
     names = {
         name: f"{name}(rotation)" if name in _ANGLES else f"translation.{name}"
         for name in parameters.fields
@@ -231,33 +242,43 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
 
 def _why_other_stamp(recording: Recording, parameters: Follows) -> Finding | None:
     """Why the stamps are not those of the source; None if they are."""
-    symptom = NoTransform(recording, parameters.topic, parameters.parent, parameters.child)
+    transforms = NoTransform(
+        recording, parameters.topic, parameters.parent, parameters.child
+    ).wanted
     sources = recording.on(parameters.source or "")
-    stamps = {stamp_of(one.value): one for one in sources}
-    # Of a message that was lost, or came after the last one, no stamp is known.
-    unknown = sum(lost(a, b) for a, b in pairwise(sources))
-    judged = [one for one in symptom.wanted if one.message.stamp_ns < sources[-1].stamp_ns]
-    wrong = []
-    for one in judged:
-        source, sent_ns = stamps.get(one.stamp_ns), one.message.stamp_ns
-        made_ns = sent_ns if source is None else source.stamp_ns
-        old_s = (sent_ns - made_ns) / NS - recording.stolen_s(made_ns, sent_ns)
-        if source is None or old_s > parameters.within:
-            wrong.append(one)
+    by_stamp = {stamp_of(message.value): message for message in sources}
+    judged = [one for one in transforms if one.message.stamp_ns < sources[-1].stamp_ns]
+    wrong = [
+        one
+        for one in judged
+        if not _is_young(recording, one, by_stamp.get(one.stamp_ns), parameters.within)
+    ]
+    # Of a message that was lost no stamp is known.
+    unknown = sum(lost(before, after) for before, after in pairwise(sources))
     if len(wrong) <= unknown:
         return None
-    one, source = wrong[0], sources[0]
-    for message in sources:
-        if message.stamp_ns <= one.message.stamp_ns:
-            source = message
-    off_s = (one.stamp_ns - (stamp_of(source.value) or 0)) / NS
+    first = wrong[0]
+    earlier = [message for message in sources if message.stamp_ns <= first.message.stamp_ns]
+    source = earlier[-1] if earlier else sources[0]
+    off_s = (first.stamp_ns - (stamp_of(source.value) or 0)) / NS
     return mistaken(
         "other_stamp",
         f"{len(wrong)} of {counted(len(judged), 'transform')} have another stamp than the message "
         f"on {code(source.topic)}; the first one is {format_duration(abs(off_s))} "
         f"{'later' if off_s > 0.0 else 'earlier'}",
-        when_sent(recording, one, "has another stamp"),
+        when_sent(recording, first, "has another stamp"),
     )
+
+
+def _is_young(
+    recording: Recording, transform: Sent, source: Message | None, within_s: float
+) -> bool:
+    """Whether a transform was sent soon after the message that has its stamp."""
+    if source is None:
+        return False
+    sent_ns = transform.message.stamp_ns
+    age_s = (sent_ns - source.stamp_ns) / NS
+    return age_s - recording.stolen_s(source.stamp_ns, sent_ns) <= within_s
 
 
 def _odometry(one: Truth) -> dict[str, Any]:
@@ -292,41 +313,54 @@ def tree(recording: Recording, parameters: Tree) -> Finding:
 
     Judged by all transforms of the run, also the transforms of the simulated robot.
     """
-    there = list(sent(recording, (parameters.topic, parameters.static_topic)))
-    if not there:
-        stop_if(why_silent(recording, parameters.topic))
-    for seen, mistake, one in _faults(parameters, there):
-        stop_if(
-            why_crashed(recording) or mistaken(mistake, seen, when_sent(recording, one, "sent"))
-        )
-    frames = {name for one in there for name in (one.parent, one.child)}
-    seen = f"{counted(len(frames), 'frame')} below {codes(roots(there))}"
-    return Finding.as_asked(seen, when_sent(recording, there[0], "sent"))
+    transforms = list(sent(recording, (parameters.topic, parameters.static_topic)))
+    if not transforms:
+        return why_silent(recording, parameters.topic)
+    fault = next(_faults(parameters, transforms), None)
+    if fault is not None:
+        shown = when_sent(recording, fault.transform, "sent")
+        return why_crashed(recording) or mistaken(fault.mistake, fault.words, shown)
+    frames = {name for one in transforms for name in (one.parent, one.child)}
+    seen = f"{counted(len(frames), 'frame')} below {codes(roots(transforms))}"
+    return Finding.as_asked(seen, when_sent(recording, transforms[0], "sent"))
 
 
-def _faults(parameters: Tree, there: Sequence[Sent]) -> Iterator[tuple[str, str, Sent]]:
+class _Fault(NamedTuple):
     """What is wrong with the tree, in words, and a transform that shows it."""
-    parents, found = {one.child: one.parent for one in reversed(there)}, roots(there)
-    for one in there:
-        name, topic = code(one.child), one.message.topic
+
+    words: str
+    mistake: str
+    transform: Sent
+
+
+def _faults(parameters: Tree, transforms: Sequence[Sent]) -> Iterator[_Fault]:
+    # Of each frame the first parent.
+    parents = {one.child: one.parent for one in reversed(transforms)}
+    for one in transforms:
+        name, topic, static = code(one.child), one.message.topic, parameters.static
         if one.parent != parents[one.child]:
             both = codes((parents[one.child], one.parent))
-            yield f"the frame {name} has two parents, {both}", "two_parents", one
+            yield _Fault(f"the frame {name} has two parents, {both}", "two_parents", one)
         if one.parent.startswith("/") or one.child.startswith("/"):
-            slash = f"{edge(one.parent, one.child)} has a slash in front of a name"
-            yield slash, "slash", one
-        static = parameters.static
+            words = f"{edge(one.parent, one.child)} has a slash in front of a name"
+            yield _Fault(words, "slash", one)
         if static is not None and is_static(topic) != (one.child in static):
-            other = f"the transform of the frame {name} is on {code(topic)}"
-            yield other, "other_kind", one
-    mistake = "no_tree"
-    circle = [name for name in found if name in parents]
-    missing = [name for name in parameters.frames if name not in {*parents, *found}]
+            words = f"the transform of the frame {name} is on {code(topic)}"
+            yield _Fault(words, "other_kind", one)
+    for words in _why_no_tree(parameters, parents, roots(transforms)):
+        yield _Fault(words, "no_tree", transforms[0])
+
+
+def _why_no_tree(
+    parameters: Tree, parents: Mapping[str, str], roots: Sequence[str]
+) -> Iterator[str]:
+    circle = [name for name in roots if name in parents]
     if circle:
-        yield f"{codes(circle)} is above itself: a circle of frames", mistake, there[0]
-    if len(found) > 1:
-        yield f"{len(found)} trees, with the roots {codes(found)}", mistake, there[0]
+        yield f"{codes(circle)} is above itself: a circle of frames"
+    if len(roots) > 1:
+        yield f"{len(roots)} trees, with the roots {codes(roots)}"
+    missing = [name for name in parameters.frames if name not in {*parents, *roots}]
     if missing:
-        yield f"no frame {codes(missing, last='or')}", mistake, there[0]
-    if parameters.root not in (None, *found):
-        yield f"the root is {codes(found)}", mistake, there[0]
+        yield f"no frame {codes(missing, last='or')}"
+    if parameters.root not in (None, *roots):
+        yield f"the root is {codes(roots)}"

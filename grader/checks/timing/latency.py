@@ -38,9 +38,11 @@ def answers_to(
     free = 0
     for message in sent:
         first = max(free, bisect_left(stamps, message.stamp_ns))
-        in_time = first < len(stamps) and stamps[first] <= message.stamp_ns + within_ns
-        found.append(answers[first] if in_time else None)
-        free = first + 1 if in_time else free
+        if first < len(stamps) and stamps[first] <= message.stamp_ns + within_ns:
+            found.append(answers[first])
+            free = first + 1
+        else:
+            found.append(None)
     return found
 
 
@@ -101,17 +103,17 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
     if not sent:
         return why_not_sent(recording, parameters.stimulus)
     within_ns = round(parameters.within * NS)
-    found = answers_to(sent, answers, within_ns)
-    waits = [(a.stamp_ns, b.stamp_ns) for a, b in zip(sent, found, strict=True) if b is not None]
-    times = [(end_ns - begin_ns) / NS for begin_ns, end_ns in waits]
-    missing = [a.stamp_ns for a, b in zip(sent, found, strict=True) if b is None]
-    figures = _figures(times)
+    answered = list(zip(sent, answers_to(sent, answers, within_ns), strict=True))
+    waits = [(one.stamp_ns, answer.stamp_ns) for one, answer in answered if answer is not None]
+    missing = [one.stamp_ns for one, answer in answered if answer is None]
+    times_s = [(end_ns - begin_ns) / NS for begin_ns, end_ns in waits]
+    figures = _figures(times_s)
     evidence = _evidence(recording, parameters, waits, missing)
     is_missing = len(missing) > parameters.unanswered
-    if not is_missing and not parameters.is_too_slow(times):
+    if not is_missing and not parameters.is_too_slow(times_s):
         return Finding.as_asked(figures, evidence)
     observed = (
-        f"{len(missing)} of {counted(len(found), 'message')} on {code(parameters.stimulus)} "
+        f"{len(missing)} of {counted(len(sent), 'message')} on {code(parameters.stimulus)} "
         f"had no answer within {format_duration(parameters.within)}"
     )
     if is_missing:
@@ -125,12 +127,13 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
         return Finding.held_up(figures, stolen_s)
     if not is_missing:
         return mistaken("slow_answer", figures, evidence)
-    observed += f"; of the others {figures}" if times else ""
+    if waits:
+        observed += f"; of the others {figures}"
     return mistaken("missing_answer", observed, evidence)
 
 
 def _excused(
-    recording: Recording, sent: Sequence[int], answers: Sequence[Message], within_ns: int
+    recording: Recording, sent_ns: Sequence[int], answers: Sequence[Message], within_ns: int
 ) -> set[int]:
     """Those of the sent messages whose answer may be late, or not there, because of the machine.
 
@@ -138,13 +141,14 @@ def _excused(
     that the next message came before this one was taken out of its queue.
     """
     found = set()
-    for at, next_ns in zip_longest(sent, sent[1:], fillvalue=recording.stop_ns):
-        limit_ns = at + within_ns
-        stolen_ns = round(recording.stolen_s(at, limit_ns) * NS)
-        latest_ns = recording.own_end_ns(at, within_ns / NS)
-        late = any(limit_ns < one.stamp_ns <= latest_ns for one in answers)
-        if stolen_ns and (late or stolen_ns >= min(next_ns, recording.stop_ns - within_ns) - at):
-            found.add(at)
+    for time_ns, next_ns in zip_longest(sent_ns, sent_ns[1:], fillvalue=recording.stop_ns):
+        limit_ns = time_ns + within_ns
+        stolen_ns = round(recording.stolen_s(time_ns, limit_ns) * NS)
+        latest_ns = recording.own_end_ns(time_ns, within_ns / NS)
+        is_late = any(limit_ns < answer.stamp_ns <= latest_ns for answer in answers)
+        in_queue_ns = min(next_ns, recording.stop_ns - within_ns) - time_ns
+        if stolen_ns and (is_late or stolen_ns >= in_queue_ns):
+            found.add(time_ns)
     return found
 
 

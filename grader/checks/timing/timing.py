@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from statistics import median
 
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.need import Recorded
+from grader.checks.timing.source_stamps import why_not_believed
 from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.diagnosis.explanation import cause_of, mistaken
 from grader.diagnosis.no_messages import why_few
@@ -41,18 +41,6 @@ _MS = 1e3
 _SAME = 0.05
 # One message may be late or left out; after so many periods they have stopped.
 _ENDED_PERIODS = 3.0
-
-# Arrivals and source timestamps may differ so much in their medians, or in a single message.
-_RELATIVE = 0.20
-_ABSOLUTE_S = 0.020
-_CLOCK_SLACK_NS = 50_000_000
-# Fewer arrivals have no meaningful median.
-_FEWEST = 3
-# Single messages may be lost on their way, and are sent again.
-_MOST_LATE, _LATE_SHARE = 3, 0.2
-_AROUND_NS = NS // 10
-# Middleware that stamps every message.
-_STAMPING = "rmw_fastrtps_cpp"
 
 
 class Period(Parameters):
@@ -109,7 +97,7 @@ def period(recording: Recording, parameters: Period) -> Finding:
     messages = recording.on(parameters.topic)[: MOST_INTERVALS + 1]
     if len(messages) <= parameters.at_least and not _too_slow(messages, limits):
         return why_few(recording, parameters.topic, parameters.at_least + 1)
-    stop_if(_why_not_believed(recording, messages))
+    stop_if(why_not_believed(recording, messages))
     measured = intervals(messages)
     if len(measured) < min(parameters.at_least, len(messages) - 1):
         return Finding.undecided(
@@ -118,29 +106,55 @@ def period(recording: Recording, parameters: Period) -> Finding:
         )
     verdict = judge([item.seconds for item in measured], limits)
     observed = _figures(measured, verdict)
-    evidence = _evidence(recording, parameters, measured, verdict)
-    forgivable = verdict.period_good or not _is_declared(recording, verdict, limits)
-    is_excused = not verdict.good and (
-        forgivable and judge(forgiven(recording, measured, limits), limits).good
-    )
-    if is_excused:
+    if not verdict.good:
+        if not _machine_explains(recording, measured, verdict, limits):
+            return _wrong_period(recording, parameters, measured, verdict)
         calm = undisturbed(recording, measured)
         if len(calm) < max(parameters.at_least, len(measured) / 2) or not judge(calm, limits).good:
             stolen_s = recording.stolen_s(measured[0].begin_ns, measured[-1].end_ns)
             return Finding.held_up(observed, stolen_s)
         observed += f"; the machine took time in {len(measured) - len(calm)}, which do not count"
-    if verdict.good or is_excused:
-        last_ns = messages[-1].stamp_ns
-        silent = why_paused(
-            recording,
-            (last_ns, recording.stop_ns),
-            # Of a flood only the beginning is looked at.
-            _ENDED_PERIODS * parameters.period if len(messages) <= MOST_INTERVALS else math.inf,
-            f"{counted(len(messages), 'message')} at the right period, but none in the last "
-            f"{format_duration((recording.stop_ns - last_ns) / NS)} of the observation",
-            "ended",
-        )
-        return silent or Finding.as_asked(observed, evidence)
+    stop_if(_why_ended(recording, messages, parameters.period))
+    return Finding.as_asked(observed, _evidence(recording, parameters, measured, verdict))
+
+
+def _machine_explains(
+    recording: Recording,
+    measured: Sequence[Interval],
+    verdict: PeriodVerdict,
+    limits: PeriodLimits,
+) -> bool:
+    """Whether the intervals would be right if the machine had taken no time."""
+    if not verdict.period_good and _is_declared(recording, verdict, limits):
+        return False
+    return judge(forgiven(recording, measured, limits), limits).good
+
+
+def _why_ended(
+    recording: Recording, messages: Sequence[Message], period_s: float
+) -> Finding | None:
+    """Why no message came at the end of the observation; None if messages went on."""
+    last_ns = messages[-1].stamp_ns
+    # Of a flood only the beginning is looked at.
+    is_flood = len(messages) > MOST_INTERVALS
+    return why_paused(
+        recording,
+        (last_ns, recording.stop_ns),
+        math.inf if is_flood else _ENDED_PERIODS * period_s,
+        f"{counted(len(messages), 'message')} at the right period, but none in the last "
+        f"{format_duration((recording.stop_ns - last_ns) / NS)} of the observation",
+        "ended",
+    )
+
+
+def _wrong_period(
+    recording: Recording,
+    parameters: Period,
+    measured: tuple[Interval, ...],
+    verdict: PeriodVerdict,
+) -> Finding:
+    limits = parameters.limits
+    observed = _figures(measured, verdict)
     if verdict.period_good:
         number = len(verdict.irregular)
         observed += (
@@ -149,8 +163,10 @@ def period(recording: Recording, parameters: Period) -> Finding:
             f"{format_duration(limits.spread_s)}"
         )
     cause = cause_of(WrongRhythm(recording, parameters.topic, measured, verdict, limits))
-    observed += f": {cause.observed}" if cause.observed else ""
-    shown = replace(evidence, places=cause.evidence.places)
+    if cause.observed:
+        observed += f": {cause.observed}"
+    shown = _evidence(recording, parameters, measured, verdict)
+    shown = replace(shown, places=cause.evidence.places)
     return replace(cause, observed=observed, evidence=shown)
 
 
@@ -254,20 +270,20 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     messages = recording.on(parameters.topic)
     if len(messages) < parameters.messages:
         return why_few(recording, parameters.topic, parameters.messages)
-    stop_if(_why_not_believed(recording, messages))
+    stop_if(why_not_believed(recording, messages))
     first, last = messages[0], messages[-1]
     span_s = (last.stamp_ns - first.stamp_ns) / NS
     # Messages after the first, with those that were lost on their way.
     number = last.sequence - first.sequence if is_numbered(messages) else len(messages) - 1
-    found_hz = number / span_s if span_s > 0.0 else math.inf
-    observed = f"{found_hz:.4g} Hz: {counted(number + 1, 'message')} in {format_duration(span_s)}"
+    rate_hz = number / span_s if span_s > 0.0 else math.inf
+    observed = f"{rate_hz:.4g} Hz: {counted(number + 1, 'message')} in {format_duration(span_s)}"
     evidence = Evidence(moments=first_seen(recording, messages))
-    is_slow = parameters.at_least is not None and found_hz < parameters.at_least
-    if is_slow and number >= (parameters.at_least or 0.0) * left_s(
-        recording, first.stamp_ns, last.stamp_ns
-    ):
-        return Finding.undecided(f"{observed}, but the machine took time from the process")
-    if is_slow or (parameters.at_most is not None and found_hz > parameters.at_most):
+    if parameters.at_least is not None and rate_hz < parameters.at_least:
+        own_s = left_s(recording, first.stamp_ns, last.stamp_ns)
+        if number >= parameters.at_least * own_s:
+            return Finding.undecided(f"{observed}, but the machine took time from the process")
+        return mistaken("other_rate", observed, evidence)
+    if parameters.at_most is not None and rate_hz > parameters.at_most:
         return mistaken("other_rate", observed, evidence)
     stop_if(_why_paused(recording, parameters, messages))
     return Finding.as_asked(observed, evidence)
@@ -295,61 +311,3 @@ def _why_paused(
         f"{counted(before, 'message')}",
         "silent_calls",
     )
-
-
-def _why_not_believed(recording: Recording, messages: Sequence[Message]) -> Finding | None:
-    """Why the source timestamps, which the writer gives, do not tell when it published."""
-    given = any(message.stamp_ns for message in messages)
-    if not given and recording.environment.get("rmw") != _STAMPING:
-        return Finding.ours("the middleware gave no source timestamps")
-    for message in messages:
-        begin_ns = recording.launched_ns - _CLOCK_SLACK_NS
-        if not begin_ns <= message.stamp_ns <= message.received_ns + _CLOCK_SLACK_NS:
-            when = "before the launch" if message.stamp_ns < begin_ns else "after its arrival"
-            seen = f"the source timestamps are not the times of publishing: one lies {when}"
-            return mistaken("other_clock", seen, _arrival(recording, message))
-    # What was published before the match (transient local) arrives all at once.
-    begin_ns = recording.matched_ns or recording.launched_ns
-    live = [message for message in messages if message.stamp_ns >= begin_ns]
-    return _why_arrivals_differ(recording, live) if len(live) > _FEWEST else None
-
-
-def _why_arrivals_differ(recording: Recording, live: Sequence[Message]) -> Finding | None:
-    usual_s = median(map(_way_s, live))
-    # The first message of a publisher waits for its match. What holds up the middleware need not
-    # show at the same moment in what the machine took.
-    late = [
-        item
-        for item in live
-        if item.sequence != 1
-        and abs(_way_s(item) - usual_s)
-        > _ABSOLUTE_S
-        + recording.stolen_s(item.stamp_ns - _AROUND_NS, item.received_ns + _AROUND_NS)
-    ]
-    if len(late) > max(_MOST_LATE, _LATE_SHARE * len(live)):
-        way_s = max(map(_way_s, late)) - min(map(_way_s, live))
-        found = mistaken(
-            "other_clock",
-            f"{counted(len(late), 'message')} of {len(live)} came up to {format_duration(way_s)} "
-            "earlier or later than their source timestamps say, and the machine took no such "
-            "time: the timestamps are not the times of publishing",
-            _arrival(recording, late[0]),
-        )
-        return found.doubted()
-    arrivals_ns = sorted(message.received_ns for message in live)
-    source_s = median((b.stamp_ns - a.stamp_ns) / NS for a, b in pairwise(live))
-    arrival_s = median((b - a) / NS for a, b in pairwise(arrivals_ns))
-    if abs(arrival_s - source_s) <= max(_RELATIVE * source_s, _ABSOLUTE_S):
-        return None
-    return Finding.undecided(
-        f"messages arrive every {format_duration(arrival_s)}, but their source timestamps are "
-        f"{format_duration(source_s)} apart, while the machine was busy"
-    )
-
-
-def _arrival(recording: Recording, message: Message) -> Evidence:
-    return evidence_at(recording, f"a message on {message.topic} arrived", message.received_ns)
-
-
-def _way_s(message: Message) -> float:
-    return (message.received_ns - message.stamp_ns) / NS
