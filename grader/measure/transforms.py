@@ -80,11 +80,12 @@ def roots(transforms: Sequence[Sent]) -> list[str]:
     parents = {one.child: one.parent for one in reversed(transforms)}
     root_of: dict[str, str] = {}
     for start in (name for one in transforms for name in (one.parent, one.child)):
-        frame, way = start, [start]
+        # A dict, for a program may send any number of frames.
+        frame, way = start, {start: None}
         while frame in parents and frame not in root_of:
             frame = parents[frame]
             if frame in way:
                 break
-            way.append(frame)
+            way[frame] = None
         root_of |= dict.fromkeys(way, root_of.get(frame, frame))
     return list(dict.fromkeys(root_of.values()))

@@ -97,8 +97,9 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     if wrong:
         symptom = NotFollowing(source, derived, judged, wrong)
         return _held_up(recording, parameters, symptom) or _failure(recording, symptom)
+    # Those that have older values than are right without what the machine took.
     late = [one for one in judged if not derived.fitting(one.errors[one.excused :])]
-    # Where the machine took nothing, no message is excused: most of them decide for all.
+    # If most of the messages come when it took nothing, they decide for all.
     undisturbed = sum(not one.excused for one in judged)
     if late and undisturbed < max(parameters.at_least, len(judged) / 2):
         return Finding.undecided(
@@ -113,7 +114,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
 def _judged(
     recording: Recording, parameters: Follows, samples: list[Sample], right: set[int]
 ) -> list[Sample]:
-    """The messages that count."""
+    """The messages that count: from the first right one on, if that comes soon enough."""
     # One that fits nothing may be made of a message that was not recorded.
     known = [sample for sample in samples if sample.is_known or sample.number in right]
     begin_ns = recording.on(parameters.source)[0].stamp_ns
@@ -135,7 +136,7 @@ def _held_up(recording: Recording, parameters: Follows, symptom: NotFollowing) -
         stolen_s = recording.stolen_s(now_ns - round(2.0 * age_s * NS), now_ns)
         if age_s - parameters.within > stolen_s:
             return None
-    if not stolen_s:
+    if stolen_s == 0.0:
         return None
     return Finding.held_up(f"{len(symptom.wrong)} of the messages have older values", stolen_s)
 
@@ -155,7 +156,8 @@ def _plot(recording: Recording, derived: DerivedMessages, judged: list[Sample], 
     field = derived.fields[index]
     # The least error is that of the source that the value comes from.
     errors = [min((row[index] for row in sample.errors), key=abs) for sample in judged]
-    finite = [(s, e) for s, e in zip(judged, errors, strict=True) if math.isfinite(e)]
+    pairs = zip(judged, errors, strict=True)
+    finite = [(sample, error) for sample, error in pairs if math.isfinite(error)]
     return Plot(
         f"{field}: how far it is off",
         "time since launch (s)",

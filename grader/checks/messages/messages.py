@@ -35,11 +35,13 @@ from grader.findings.value import (
 )
 from grader.findings.words import code, codes, counted
 from grader.measure.numbering import is_numbered, published
-from grader.recording.model import Kind, Recording
+from grader.recording.model import Kind, Message, Recording
 from grader.spec.expression import Expression
 from grader.spec.name import TopicName
 
 _MOST_FIELDS = 8
+_MOST_MOMENTS = 10
+_MOST_ROWS = 50
 
 
 class Count(Parameters):
@@ -98,37 +100,37 @@ def count(recording: Recording, parameters: Count) -> Finding:
     Counts the messages on the topic in the whole observation, or since the first message of a
     stimulus that they answer. A message that was sent but lost in transit counts as published.
     """
-    everything = recording.on(parameters.topic)
-    messages, each, per = everything, 1, ""
+    everything = messages = recording.on(parameters.topic)
+    low, high = parameters.bounds
+    for_each = ""
     if parameters.stimulus is not None:
         sent = recording.sent.get(parameters.stimulus, ())
         if not sent:
             return why_not_sent(recording, parameters.stimulus)
         messages = tuple(item for item in everything if item.stamp_ns >= sent[0].stamp_ns)
-        each = len(sent)
-        per = f" for {counted(each, 'message')} on {code(parameters.stimulus)}"
-    low, high = parameters.bounds
+        low, high = low * len(sent), None if high is None else high * len(sent)
+        for_each = f" for {counted(len(sent), 'message')} on {code(parameters.stimulus)}"
     early = len(everything) - len(messages)
     number = published(everything) - early
-    if number < low * each:
-        return why_few(recording, parameters.topic, low * each + early)
+    if number < low:
+        return why_few(recording, parameters.topic, low + early)
+    observed = counted(number, "message")
+    if number > len(messages):
+        observed += f" ({number - len(messages)} of them lost on the way)"
+    observed += for_each
+    first = enumerate(messages[:_MOST_MOMENTS], start=1)
     evidence = Evidence(
-        moments=tuple(
-            moment(recording, f"message {index}", message.stamp_ns)
-            for index, message in enumerate(messages[:10], start=1)
-        )
+        moments=tuple(moment(recording, f"message {index}", one.stamp_ns) for index, one in first)
     )
-    lost = number - len(messages)
-    observed = counted(number, "message") + (f" ({lost} of them lost on the way)" if lost else "")
-    observed += per
-    if high is None or number <= high * each:
+    if high is None or number <= high:
         return Finding.as_asked(observed, evidence)
     publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
     if len(publishers) > 1:
         nodes = codes(sorted({item.node for item in publishers}))
         observed += f" from {len(publishers)} publishers (in {nodes})"
-    mistake = "once_per_call" if per else "once" if high == 1 else "too_many"
-    return mistaken(mistake, observed, evidence)
+    if for_each:
+        return mistaken("once_per_call", observed, evidence)
+    return mistaken("once" if high == 1 else "too_many", observed, evidence)
 
 
 class Equal(Parameters):
@@ -193,20 +195,20 @@ def _wrong(
     """The finding of messages of which some have differences."""
     messages = recording.on(parameters.topic)
     wrong = sum(map(bool, by_message))
-    first, found = next(item for item in enumerate(by_message, start=1) if item[1])
-    observed = f"message {first} of {len(messages)} has "
+    right = len(messages) - wrong
+    number, found = next(item for item in enumerate(by_message, start=1) if item[1])
+    message = messages[number - 1]
+    observed = f"message {number} of {len(messages)} has "
     observed += ", ".join(map(instead, found[:_MOST_FIELDS]))
-    more = len(found) - _MOST_FIELDS
-    observed += f" and {counted(more, 'more wrong field')}" if more > 0 else ""
-    field, message = found[0].field, messages[first - 1]
-    tolerance, right = tolerance_of(parameters.tolerance, field), len(messages) - wrong
-    series = [leaves(item.value).get(field) for item in messages]
-    clause = explain(WrongValue(found, leaves(message.value), tolerance, not right, series))
-    observed += f": {clause}" if clause else ""
+    if len(found) > _MOST_FIELDS:
+        observed += f" and {counted(len(found) - _MOST_FIELDS, 'more wrong field')}"
+    clause = _why_wrong(parameters, messages, message, found, all_wrong=not right)
+    if clause:
+        observed += f": {clause}"
     if len(messages) > 1:
         observed += f" ({wrong} of {counted(len(messages), 'message')} wrong)"
-    wrong_one = moment(recording, f"message {first} is wrong", message.stamp_ns)
-    shown = Evidence((wrong_one,), tables=(difference_table(f"Message {first}", found),))
+    first_wrong = moment(recording, f"message {number} is wrong", message.stamp_ns)
+    shown = Evidence((first_wrong,), tables=(difference_table(f"Message {number}", found),))
     if any(was_integer(item.observed) for item in found):
         return mistaken("float_field", observed, shown)
     if right:
@@ -214,6 +216,21 @@ def _wrong(
         return mistaken("some_wrong", observed, shown, right=words)
     fields = codes([item.field for item in found[:_MOST_FIELDS]])
     return mistaken("all_wrong", observed, shown, fields=fields)
+
+
+def _why_wrong(
+    parameters: Equal,
+    messages: Sequence[Message],
+    message: Message,
+    found: tuple[Difference, ...],
+    *,
+    all_wrong: bool,
+) -> str | None:
+    """Why the values of a message are wrong, as a part of a sentence; None if nothing tells."""
+    field = found[0].field
+    series = [leaves(one.value).get(field) for one in messages]
+    tolerance = tolerance_of(parameters.tolerance, field)
+    return explain(WrongValue(found, leaves(message.value), tolerance, all_wrong, series))
 
 
 class Series(Parameters):
@@ -278,18 +295,18 @@ def sequence(recording: Recording, parameters: Series) -> Finding:
     read = item_at if parameters.values else number_at
     found = [read(message.value, parameters.field) for message in messages]
     # Place of each message in all that its writer published, from 0.
-    numbered = is_numbered(messages)
-    places = [m.sequence - 1 if numbered else index for index, m in enumerate(messages)]
+    if is_numbered(messages):
+        places = [message.sequence - 1 for message in messages]
+    else:
+        places = list(range(len(messages)))
     wanted = _wanted_values(parameters, found, places)
-    tolerance, circle = parameters.tolerance, Expression.of(parameters.field).circle
-    wrong = [
-        index
-        for index, value in enumerate(wanted)
-        if value is not None
-        and not same(value, found[index], tolerance, messages[index].value, circle)
+    circle = Expression.of(parameters.field).circle
+    is_right = [
+        value is None or same(value, seen, parameters.tolerance, message.value, circle)
+        for value, seen, message in zip(wanted, found, messages, strict=True)
     ]
-    if wrong:
-        return _wrong_order(recording, parameters, found, wanted, wrong[0])
+    if not all(is_right):
+        return _wrong_order(recording, parameters, found, wanted, is_right.index(False))
     needed = len(parameters.values) or parameters.at_least
     if len(messages) < needed:
         return why_few(recording, parameters.topic, needed)
@@ -305,7 +322,10 @@ def _wanted_values(parameters: Series, found: Sequence[Any], places: Sequence[in
     if parameters.step is None:
         values = parameters.values
         return [values[place] if place < len(values) else None for place in places]
-    start, begin = (found[0], places[0]) if parameters.start is None else (parameters.start, 0)
+    if parameters.start is None:
+        start, begin = found[0], places[0]
+    else:
+        start, begin = parameters.start, 0
     return [start + parameters.step * (place - begin) for place in places]
 
 
@@ -328,5 +348,5 @@ def _wrong_order(
         f"{code(parameters.field)} is {plain(found[first])} instead of {plain(wanted[first])} in "
         f"message {first + 1} of {len(found)}{cause.observed}",
         cause.hint,
-        Evidence((wrong_one,), tables=(Table(title, header, rows[:50]),)),
+        Evidence((wrong_one,), tables=(Table(title, header, rows[:_MOST_ROWS]),)),
     )
