@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 from pydantic import Field
 
@@ -31,11 +31,9 @@ _ROUNDING = 1.001
 _MOST_POINTS = 400
 # The last command alone may be of a callback that was late.
 _LAST = 5
-# Of a proportion that is limited, the limit comes again and again, but nothing below it does.
-_SWITCHED = 2
 _SEVERAL = 3
 _DIGITS = 4
-# Of one with two decimals, the limit and the step below it may be all that comes.
+# Of a proportion with two decimals, the limit and the step below it may be all that comes.
 _STEP_M_S = 0.01
 # One that is computed at 2 Hz may be published more often, and be the only one below the limit.
 _HELD_NS = NS
@@ -70,34 +68,41 @@ def within_limits(recording: Recording, parameters: WithinLimits) -> Finding:
     if not sent:
         return why_silent(recording, command_topic(recording))
     stop_if(why_rejected(recording))
-    beyond = [item for item in sent if _excess(item, scene)[0] > _ROUNDING]
     plots = (
         _plot(recording, sent, "linear.x (m/s)", scene.max_linear_m_s),
         _plot(recording, sent, "angular.z (rad/s)", scene.max_angular_rad_s),
     )
+    widest = max(sent, key=lambda command: _share_of_limit(command, scene))
+    beyond = [command for command in sent if _share_of_limit(command, scene) > _ROUNDING]
     if not beyond:
-        widest = max(sent, key=lambda item: _excess(item, scene)[0])
-        seen = f"{counted(len(sent), 'command')}, at most {_excess(widest, scene)[1]}"
+        seen = f"{counted(len(sent), 'command')}, at most {_nearest_limit(widest, scene)}"
         return Finding.as_asked(seen, Evidence(plots=plots))
-    first, worst = beyond[0], max(beyond, key=lambda item: _excess(item, scene)[0])
+    first = beyond[0]
     share = percent(round(len(beyond) / len(sent), 3))
-    most = "" if worst is first else f", the largest {_excess(worst, scene)[1]}"
-    return mistaken(
-        "beyond_limits",
-        f"{len(beyond)} of {counted(len(sent), 'command')} ({share}): the first is "
-        f"{_excess(first, scene)[1]}{most}",
-        evidence_at(recording, "first command beyond a limit", first.time_ns, *plots),
-    )
+    seen = f"{len(beyond)} of {counted(len(sent), 'command')} ({share}): the first is "
+    seen += _nearest_limit(first, scene)
+    if widest is not first:
+        seen += f", the largest {_nearest_limit(widest, scene)}"
+    label = "first command beyond a limit"
+    return mistaken("beyond_limits", seen, evidence_at(recording, label, first.time_ns, *plots))
 
 
-def _excess(item: VelocityCommand, scene: Scene) -> tuple[float, str]:
-    """How many times the nearer limit is asked for, and the field that asks."""
-    linear, angular = item.twist.linear_m_s, item.twist.angular_rad_s
-    return max(
-        (abs(linear) / scene.max_linear_m_s, f"linear.x = {speed(linear)}"),
-        (abs(angular) / scene.max_angular_rad_s, f"angular.z = {turn(angular)}"),
-        key=lambda excess: excess[0],
-    )
+def _shares(command: VelocityCommand, scene: Scene) -> tuple[float, float]:
+    """How many times its limit each field asks for: linear.x, angular.z."""
+    linear, angular = abs(command.twist.linear_m_s), abs(command.twist.angular_rad_s)
+    return linear / scene.max_linear_m_s, angular / scene.max_angular_rad_s
+
+
+def _share_of_limit(command: VelocityCommand, scene: Scene) -> float:
+    return max(_shares(command, scene))
+
+
+def _nearest_limit(command: VelocityCommand, scene: Scene) -> str:
+    """The field that is nearer to its limit, or farther beyond it."""
+    linear, angular = _shares(command, scene)
+    if linear >= angular:
+        return f"linear.x = {speed(command.twist.linear_m_s)}"
+    return f"angular.z = {turn(command.twist.angular_rad_s)}"
 
 
 class SlowsDown(RobotParameters):
@@ -127,38 +132,55 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     no failure if the sizes differ by 0.01 m/s or less, or the lower one is sent for 1 s or less.
     """
     stop_if(why_not_moved(recording) or why_cut_short(recording))
-    driving = [item for item in commands(recording) if _size(item) > NO_SPEED_M_S]
+    driving = [command for command in commands(recording) if _size(command) > NO_SPEED_M_S]
     if not driving:
-        topic = command_topic(recording)
-        sent = recording.on(topic)
-        shown = Evidence(moments=first_seen(recording, sent))
-        seen = f"no command on {code(topic)} has a linear.x other than 0"
-        return mistaken("no_drive", seen, shown) if sent else why_silent(recording, topic)
+        return _no_drive(recording)
     fastest = max(map(_size, driving))
     last = min(driving[-_LAST:], key=_size)
     plot = _plot(recording, driving, "linear.x (m/s)")
     evidence = evidence_at(recording, "end of the way", last.time_ns, plot)
-    seen = f"{speed(_size(last))} at the end; the largest is {speed(fastest)}"
-    levels = Counter(round(_size(item), _DIGITS) for item in driving)
-    if len(levels) == _SWITCHED and min(levels.values()) >= _SEVERAL and _stays(driving, levels):
-        sizes = " and ".join(speed(size) for size in sorted(levels, reverse=True))
-        seen = f"linear.x is switched between {sizes}, whatever the distance is"
+    if _is_switched(driving):
+        sizes = sorted({_rounded(command) for command in driving}, reverse=True)
+        both = " and ".join(map(speed, sizes))
+        seen = f"linear.x is switched between {both}, whatever the distance is"
         return mistaken("on_off", seen, evidence)
+    seen = f"{speed(_size(last))} at the end; the largest is {speed(fastest)}"
     if _size(last) <= parameters.share * fastest:
         return Finding.as_asked(seen, evidence)
     return mistaken("not_slower", seen, evidence)
 
 
-def _stays(driving: list[VelocityCommand], levels: Collection[float]) -> bool:
-    """Whether the lower of two sizes is no step of a proportion that was rounded or held."""
-    lower = min(levels)
-    times_ns = [item.time_ns for item in driving if round(_size(item), _DIGITS) == lower]
-    difference_m_s = round(max(levels) - lower, _DIGITS)
-    return difference_m_s > _STEP_M_S and times_ns[-1] - times_ns[0] > _HELD_NS
+def _no_drive(recording: Recording) -> Finding:
+    topic = command_topic(recording)
+    sent = recording.on(topic)
+    if not sent:
+        return why_silent(recording, topic)
+    shown = Evidence(moments=first_seen(recording, sent))
+    return mistaken("no_drive", f"no command on {code(topic)} has a linear.x other than 0", shown)
 
 
-def _size(item: VelocityCommand) -> float:
-    return abs(item.twist.linear_m_s)
+def _is_switched(driving: Sequence[VelocityCommand]) -> bool:
+    """Whether the speed is switched between two sizes, which is on-off control.
+
+    Of a proportion that is limited, the limit comes again and again, but nothing below it does: no
+    size below is sent several times, but for one that is rounded, or held for a moment.
+    """
+    numbers = Counter(_rounded(command) for command in driving)
+    if len(numbers) != 2 or min(numbers.values()) < _SEVERAL:
+        return False
+    lower, upper = sorted(numbers)
+    times_ns = [command.time_ns for command in driving if _rounded(command) == lower]
+    is_rounded = round(upper - lower, _DIGITS) <= _STEP_M_S
+    is_held = times_ns[-1] - times_ns[0] <= _HELD_NS
+    return not is_rounded and not is_held
+
+
+def _rounded(command: VelocityCommand) -> float:
+    return round(_size(command), _DIGITS)
+
+
+def _size(command: VelocityCommand) -> float:
+    return abs(command.twist.linear_m_s)
 
 
 def _plot(

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import groupby
+from itertools import groupby, takewhile
 from statistics import median
 
 from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
-from grader.checks.motion.robot_check import RobotParameters, moved_in
+from grader.checks.motion.robot_check import RobotParameters, at_the_end, moved_in
 from grader.checks.need import OfSimulator, SimulatedRobot
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
 from grader.diagnosis.wrong_value import factor_words
-from grader.findings.finding import Evidence, Finding, evidence_at, until_the_end
+from grader.findings.finding import Evidence, Finding, evidence_at
 from grader.findings.words import counted, degrees, metres, percent, speed, turn
 from grader.measure.motion.command import stolen_s
-from grader.measure.motion.ground import ahead
+from grader.measure.motion.ground import ahead_m
 from grader.measure.motion.scan import misreading
 from grader.measure.motion.track import (
     MOVED_M,
@@ -74,78 +74,89 @@ def drives(recording: Recording, parameters: Drives) -> Finding:
     wanted, share = parameters.speed, parameters.tolerance
     scene = moved_in(recording)
     low, high = sorted((wanted * (1.0 - share), wanted * (1.0 + share)))
-    steps = _free(recording.truth, scene, parameters)
-    plot = speed_plot(recording, (low, high))
+    steps = _judged_steps(recording.truth, scene, parameters)
     if not steps:
         way = metres(way_m(recording.truth))
-        return why_interrupted(recording) or mistaken(
-            "little_way",
-            f"the robot drove only {way}, too little to judge its speed",
-            _since_departure(recording),
-        )
-    judged = [recording.since_launch_s(step.time_ns) for step in (steps[0], steps[-1])]
-    plot = replace(plot, judged=(judged[0], judged[1]))
-    middle = median(step.linear_m_s for step in steps)
-    good = sum(low <= step.linear_m_s <= high for step in steps) / len(steps)
-    seen = f"median {speed(middle)}; the speed is right for {percent(round(good, 3))} of the time"
-    if low <= middle <= high and good >= _LEAST_SHARE:
-        return Finding.as_asked(seen, Evidence(plots=(plot,)))
-    if low <= middle <= high:
+        seen = f"the robot drove only {way}, too little to judge its speed"
+        cause = why_interrupted(recording)
+        return cause or mistaken("little_way", seen, _since_departure(recording))
+    begin_s, end_s = (recording.since_launch_s(step.time_ns) for step in (steps[0], steps[-1]))
+    plot = replace(speed_plot(recording, (low, high)), judged=(begin_s, end_s))
+    median_m_s = median(step.linear_m_s for step in steps)
+    wrong = [step for step in steps if not low <= step.linear_m_s <= high]
+    right = (len(steps) - len(wrong)) / len(steps)
+    seen = f"median {speed(median_m_s)}; the speed is right for {percent(round(right, 3))} of "
+    seen += "the time"
+    if low <= median_m_s <= high:
+        if right >= _LEAST_SHARE:
+            return Finding.as_asked(seen, Evidence(plots=(plot,)))
         stop_if(why_interrupted(recording))
-    words, mistake = _wrong_speed(steps, scene, wanted, middle)
-    off = next((step for step in steps if not low <= step.linear_m_s <= high), steps[0])
-    evidence = evidence_at(recording, "first at a wrong speed", off.time_ns, plot)
+    words, mistake = _wrong_speed(steps, scene, wanted, median_m_s)
+    first = wrong[0] if wrong else steps[0]
+    evidence = evidence_at(recording, "first at a wrong speed", first.time_ns, plot)
     return mistaken(mistake, f"{seen}: {words}", evidence)
 
 
-def _free(truth: Sequence[Truth], scene: Scene, parameters: Drives) -> list[Truth]:
-    """The steps in which the speed counts."""
+def _judged_steps(truth: Sequence[Truth], scene: Scene, parameters: Drives) -> list[Truth]:
+    """The steps in which the speed counts; none if they are too few to judge."""
     begin = departure(truth)
     if begin is None:
         return []
-    rest = final_rest(truth)
-    end = len(truth) if rest is None else rest
-    # Braking before the final rest is judged where the robot stopped.
-    while rest is not None and end > begin and not truth[end - 1].command_m_s:
-        end -= 1
     speeding_up_s = _IN_STEPS_S + abs(parameters.speed) / scene.acceleration_m_s2
     since_ns = truth[begin].time_ns + round(speeding_up_s * NS)
-    found = []
-    for step in truth[begin:end]:
-        if step.contact is not None:
-            break
-        if step.time_ns < since_ns:
-            continue
-        if parameters.until_distance is not None:
-            sight = ahead(scene, step)
-            if sight is not None and sight.distance_m < parameters.until_distance:
-                continue
-        found.append(step)
-    return found if len(found) >= _LEAST_STEPS else []
+    driving = takewhile(lambda step: step.contact is None, truth[begin : _braking(truth, begin)])
+    steps = [
+        step
+        for step in driving
+        if step.time_ns >= since_ns and not _is_near(scene, step, parameters.until_distance)
+    ]
+    return steps if len(steps) >= _LEAST_STEPS else []
+
+
+def _braking(truth: Sequence[Truth], begin: int) -> int:
+    """Index of the step in which braking before the final rest begins: motion.stops judges that."""
+    end = final_rest(truth)
+    if end is None:
+        return len(truth)
+    while end > begin and not truth[end - 1].command_m_s:
+        end -= 1
+    return end
+
+
+def _is_near(scene: Scene, step: Truth, until_m: float | None) -> bool:
+    """Whether something straight ahead is so near that the speed does not count."""
+    if until_m is None:
+        return False
+    distance_m = ahead_m(scene, step)
+    return distance_m is not None and distance_m < until_m
 
 
 def _wrong_speed(
-    steps: Sequence[Truth], scene: Scene, wanted: float, middle: float
+    steps: Sequence[Truth], scene: Scene, wanted: float, median_m_s: float
 ) -> tuple[str, str]:
-    """What is wrong with the speed, in words."""
-    command = median(step.command_m_s for step in steps)
-    limit = scene.max_linear_m_s
-    pauses = groupby(steps, lambda step: abs(step.linear_m_s) < REST_M_S or not step.command_m_s)
-    number = sum(pausing for pausing, _ in pauses)
-    if abs(middle) < REST_M_S and any(abs(step.angular_rad_s) > 0.01 for step in steps):
+    """What is wrong with the speed, in words, and the name of the mistake."""
+    if abs(median_m_s) < REST_M_S and any(abs(step.angular_rad_s) > 0.01 for step in steps):
         return "the robot turns on the spot instead of driving", "other_field"
-    if number:
-        return f"the robot paused in between, {counted(number, 'time')}", "pauses"
-    if abs(command) > limit * 1.001 and abs(middle) > limit * 0.98:
-        times = factor_words(command, wanted)
+    pauses = sum(is_pause for is_pause, _ in groupby(steps, _is_pause))
+    if pauses:
+        return f"the robot paused in between, {counted(pauses, 'time')}", "pauses"
+    command, limit = median(step.command_m_s for step in steps), scene.max_linear_m_s
+    if abs(command) > limit * 1.001 and abs(median_m_s) > limit * 0.98:
         words = f"{speed(command)} was commanded, and the robot can do no more than {speed(limit)}"
-        return words + (f": the command {times}" if times else ""), "other_field"
-    pace = "slowly" if abs(middle) < abs(wanted) else "fast"
-    words = f"it drives too {pace}" if middle * wanted >= 0.0 else "it drives the wrong way"
+        times = factor_words(command, wanted)
+        return f"{words}: the command {times}" if times else words, "other_field"
     slowest, fastest = min(s.linear_m_s for s in steps), max(s.linear_m_s for s in steps)
-    if fastest - slowest > _SAME_SPEED * abs(middle) and speed(slowest) != speed(fastest):
-        words = f"it varies from {speed(slowest)} to {speed(fastest)}"
-    return words, "other_speed"
+    varies = fastest - slowest > _SAME_SPEED * abs(median_m_s)
+    if varies and speed(slowest) != speed(fastest):
+        return f"it varies from {speed(slowest)} to {speed(fastest)}", "other_speed"
+    if median_m_s * wanted < 0.0:
+        return "it drives the wrong way", "other_speed"
+    pace = "slowly" if abs(median_m_s) < abs(wanted) else "fast"
+    return f"it drives too {pace}", "other_speed"
+
+
+def _is_pause(step: Truth) -> bool:
+    return abs(step.linear_m_s) < REST_M_S or not step.command_m_s
 
 
 class KeepsDriving(RobotParameters):
@@ -209,8 +220,7 @@ def _too_slow(recording: Recording, gone_m: float) -> Finding:
     )
     if lost_s > 0.25 * (driven_s + waited_s):
         return Finding.held_up(words, lost_s)
-    evidence = Evidence(moments=(until_the_end(recording),), plots=(speed_plot(recording),))
-    return mistaken("other_field", words, evidence)
+    return mistaken("other_field", words, at_the_end(recording, "the observation ended"))
 
 
 def _since_departure(recording: Recording) -> Evidence:

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from itertools import accumulate
-from operator import sub
 
 from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
-from grader.checks.motion.robot_check import GoalParameters, RobotParameters
+from grader.checks.motion.robot_check import GoalParameters, RobotParameters, at_the_end
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.missed_goal import why_not_aligned, why_not_there
 from grader.diagnosis.motion.no_motion import approach, why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted, why_off_course, why_unsteered
-from grader.findings.finding import Evidence, Finding, Plot, evidence_at, until_the_end
+from grader.findings.finding import Evidence, Finding, Plot, evidence_at
 from grader.findings.words import degrees, metres, percent, point, speed, turn
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.command import stolen_s
@@ -83,10 +81,7 @@ def _restless(recording: Recording, last: Truth, place: str) -> Finding:
         "restless",
         f"{place} not at rest when the observation ends: {speed(last.linear_m_s)} and "
         f"{turn(last.angular_rad_s)}",
-        Evidence(
-            moments=(until_the_end(recording, "not at rest when the observation ended"),),
-            plots=(speed_plot(recording),),
-        ),
+        at_the_end(recording, "not at rest when the observation ended"),
     )
 
 
@@ -111,25 +106,20 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
     stop_if(why_not_moved(recording))
     truth = recording.truth
     rest = final_rest(truth)
-    evidence = Evidence(plots=(speed_plot(recording),))
     end = truth[-1] if rest is None else truth[rest]
     took_s = (end.time_ns - truth[0].time_ns) / NS
+    seen = "never at rest" if rest is None else f"at rest after {format_duration(took_s)}"
+    plot = speed_plot(recording)
     if rest is not None and took_s <= parameters.within:
-        seen = f"at rest after {format_duration(took_s)}"
-        return Finding.as_asked(seen, evidence)
+        return Finding.as_asked(seen, Evidence(plots=(plot,)))
     stop_if(why_interrupted(recording))
     lost_s = stolen_s(recording, truth[0].time_ns, end.time_ns)
     if lost_s > 0.0 and took_s - lost_s <= parameters.within:
-        seen = f"at rest after {format_duration(took_s)}" if rest is not None else "never at rest"
         return Finding.held_up(seen, lost_s)
     stop_if(why_unsteered(recording))
     if rest is None:
         return _restless(recording, end, f"after {format_duration(took_s)} it is")
-    return mistaken(
-        "slow",
-        f"at rest after {format_duration(took_s)}",
-        evidence_at(recording, "at rest", end.time_ns, *evidence.plots),
-    )
+    return mistaken("slow", seen, evidence_at(recording, "at rest", end.time_ns, plot))
 
 
 class PathLength(GoalParameters):
@@ -160,23 +150,17 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding:
     words = f"{percent(round(longer, 3))} longer" if longer >= 0.0 else "not longer"
     seen = f"a path of {metres(gone_m)} for a straight line of {metres(straight_m)}: {words}"
     evidence = Evidence(plots=(run.distance_plot,))
-    more_m = gone_m - straight_m * (1.0 + parameters.most)
-    if more_m <= 0.0:
+    too_long_m = gone_m - straight_m * (1.0 + parameters.most)
+    if too_long_m <= 0.0:
         return Finding.as_asked(seen, evidence)
     lost_s = stolen_s(recording, run.truth[0].time_ns, run.truth[-1].time_ns)
+    fastest_m_s = max(abs(step.linear_m_s) for step in run.truth)
     # What it drives on without a command, it has to come back.
-    if lost_s > 0.0 and 2.0 * lost_s * max(abs(step.linear_m_s) for step in run.truth) >= more_m:
+    if lost_s > 0.0 and 2.0 * lost_s * fastest_m_s >= too_long_m:
         return Finding.held_up(seen, lost_s)
-    return mistaken(
-        "long_path",
-        seen,
-        evidence_at(
-            recording,
-            "farthest from the straight line to the goal",
-            _farthest(run).time_ns,
-            *evidence.plots,
-        ),
-    )
+    label, farthest = "farthest from the straight line to the goal", _farthest(run)
+    shown = evidence_at(recording, label, farthest.time_ns, *evidence.plots)
+    return mistaken("long_path", seen, shown)
 
 
 def _farthest(run: Approach) -> Truth:
@@ -207,36 +191,42 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     come near.
     """
     run = parameters.approach(recording)
-    past_m = _past_m(run, parameters.arrival(run))
-    far = max(past_m, key=past_m.__getitem__)
-    seen, plot = f"{metres(past_m[far])} past the goal", _plot(run, past_m, parameters.most)
-    if past_m[far] <= parameters.most:
+    arrival = parameters.arrival(run)
+    past_m = _past_m(run, arrival)
+    worst_ns = max(past_m, key=past_m.__getitem__)
+    worst_m = past_m[worst_ns]
+    seen, plot = f"{metres(worst_m)} past the goal", _plot(run, past_m, worst_ns, parameters.most)
+    if worst_m <= parameters.most:
         return Finding.as_asked(seen, Evidence(plots=(plot,)))
-    since = run.truth[parameters.arrival(run)].time_ns - _BRAKING_NS
-    lost_s = stolen_s(recording, since, far)
-    fastest_m_s = max(abs(step.linear_m_s) for step in run.truth if since <= step.time_ns <= far)
+    since_ns = run.truth[arrival].time_ns - _BRAKING_NS
+    lost_s = stolen_s(recording, since_ns, worst_ns)
+    steps = [step for step in run.truth if since_ns <= step.time_ns <= worst_ns]
+    fastest_m_s = max(abs(step.linear_m_s) for step in steps)
     # The robot keeps its last command for as long as the machine keeps the next one back.
-    if lost_s * fastest_m_s >= past_m[far] - parameters.most:
+    if lost_s * fastest_m_s >= worst_m - parameters.most:
         return Finding.held_up(seen, lost_s)
-    shown = evidence_at(recording, seen, far, plot)
+    shown = evidence_at(recording, seen, worst_ns, plot)
     return why_off_course(recording) or mistaken("overshoots", seen, shown)
-
-
-def _plot(run: Approach, past_m: dict[int, float], most_m: float) -> Plot:
-    """How far it is past the goal by time, with the largest that is allowed and that is reached."""
-    far = max(past_m, key=past_m.__getitem__)
-    times = sorted({*[*past_m][:: max(1, len(past_m) // _MOST_POINTS)], far})
-    # In the unit of the text.
-    unit, factor = ("cm", 100.0) if past_m[far] < 0.1 else ("m", 1.0)
-    x = tuple(map(run.recording.since_launch_s, times))
-    y = tuple(past_m[time_ns] * factor for time_ns in times)
-    label, band = f"past the goal ({unit})", (-math.inf, most_m * factor)
-    return Plot(f"How far {label}", "time since launch (s)", label, x, y, band)
 
 
 def _past_m(run: Approach, arrival: int) -> dict[int, float]:
     """How far the distance has grown again since it was least, by time, from the arrival on."""
-    steps = run.truth[arrival:]
-    distances = [run.distance_m(step) for step in steps]
-    grown = map(sub, distances, accumulate(distances, min))
-    return {step.time_ns: past_m for step, past_m in zip(steps, grown, strict=True)}
+    past_m = {}
+    least_m = math.inf
+    for step in run.truth[arrival:]:
+        distance_m = run.distance_m(step)
+        least_m = min(least_m, distance_m)
+        past_m[step.time_ns] = distance_m - least_m
+    return past_m
+
+
+def _plot(run: Approach, past_m: dict[int, float], worst_ns: int, most_m: float) -> Plot:
+    """How far it is past the goal by time, with the largest that is allowed and that is reached."""
+    stride = max(1, len(past_m) // _MOST_POINTS)
+    times = sorted({*list(past_m)[::stride], worst_ns})
+    # In the unit of the text.
+    unit, factor = ("cm", 100.0) if past_m[worst_ns] < 0.1 else ("m", 1.0)
+    x = tuple(map(run.recording.since_launch_s, times))
+    y = tuple(past_m[time_ns] * factor for time_ns in times)
+    label, band = f"past the goal ({unit})", (-math.inf, most_m * factor)
+    return Plot(f"How far {label}", "time since launch (s)", label, x, y, band)

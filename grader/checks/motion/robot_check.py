@@ -10,9 +10,10 @@ from grader.checks.check import Parameters, stop_if
 from grader.checks.need import Doubt, Need, SimulatedRobot
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.no_motion import approach, why_not_moved
-from grader.findings.finding import Finding
+from grader.findings.finding import Evidence, Finding, until_the_end
 from grader.findings.reference import GoalPose
 from grader.measure.motion.approach import Approach
+from grader.measure.motion.track import speed_plot
 from grader.recording.model import Recording
 from grader.recording.simulated import Scene
 from grader.spec.quantity import PositiveLength
@@ -45,11 +46,11 @@ class GoalParameters(RobotParameters):
 
     def arrival(self, run: Approach) -> int:
         """Index of the first step near the goal; ends the check if there is none."""
-        found = run.arrival(self.position)
-        if found is None:
+        arrival = run.arrival(self.position)
+        if arrival is None:
             stop_if(why_not_there(run, self.position))
-        assert found is not None
-        return found
+        assert arrival is not None
+        return arrival
 
 
 def moved_in(recording: Recording) -> Scene:
@@ -57,3 +58,8 @@ def moved_in(recording: Recording) -> Scene:
     stop_if(why_not_moved(recording))
     assert recording.scene is not None
     return recording.scene
+
+
+def at_the_end(recording: Recording, label: str) -> Evidence:
+    """The end of the observation, with the robot's speed until then."""
+    return Evidence((until_the_end(recording, label),), plots=(speed_plot(recording),))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import takewhile
 from typing import Literal
 
 from pydantic import Field
 
 from grader.checks.check import Subject, check, stop_if
-from grader.checks.motion.robot_check import RobotParameters, moved_in
+from grader.checks.motion.robot_check import RobotParameters, at_the_end, moved_in
 from grader.checks.need import OfSimulator, SimulatedRobot
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.contact import why_touched
@@ -18,10 +19,10 @@ from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why
 from grader.diagnosis.motion.off_course import why_interrupted
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_it_exited
-from grader.findings.finding import Evidence, Finding, Table, evidence_at, until_the_end
+from grader.findings.finding import Evidence, Finding, Table, evidence_at
 from grader.findings.words import counted, metres, speed
 from grader.measure.motion.command import commands, scans, stolen_s
-from grader.measure.motion.ground import Sight, ahead
+from grader.measure.motion.ground import Sight, ahead, ahead_m
 from grader.measure.motion.scan import front, misreading
 from grader.measure.motion.track import (
     REST_M_S,
@@ -39,6 +40,8 @@ from grader.spec.quantity import Length, PositiveLength, Speed
 from grader.spec.unit import format_duration
 
 _SCANS = 6
+# What `tolerance` is for driving, this is for turning.
+_TURNS_RAD_S = 0.01
 
 
 class Stops(RobotParameters):
@@ -66,117 +69,120 @@ def stops(recording: Recording, parameters: Stops) -> Finding:
     Judged by the true distance from the LiDAR, straight ahead, at the moment the robot came to rest
     after it had moved. Delays of the machine cost no points.
     """
-    scene, wanted_m = moved_in(recording), parameters.distance
-    rest = first_rest(recording.truth)
+    scene, truth = moved_in(recording), recording.truth
+    rest = first_rest(truth)
     deeper = why_interrupted(recording)
     if rest is None:
         return deeper or _never_stopped(recording)
-    step = recording.truth[rest]
+    step = truth[rest]
     sight = ahead(scene, step)
     evidence = _evidence(recording, scene, rest, parameters)
-    off_m = None if sight is None or step.contact else sight.distance_m - wanted_m
-    if sight is not None and off_m is not None and -parameters.late <= off_m <= parameters.early:
-        seen = f"{sight.name} at {metres(sight.distance_m)}"
-        return Finding.as_asked(seen, evidence)
-    stop_if(deeper)
-    if sight is not None and off_m is not None and off_m < 0.0:
-        return _late(recording, scene, rest, sight, parameters)
-    where = f"{sight.name} still {metres(sight.distance_m)} ahead" if sight else "nothing ahead"
-    seen = f"stopped early, with {where}"
-    if gone_ahead_m(recording.truth[: rest + 1]) < 0.0:
-        return mistaken("drove_backwards", f"{seen}: it drove backwards", evidence)
-    misread = misreading(recording, step)
-    if misread:
-        return mistaken("misread_scan", f"{seen}: {misread.words}", evidence, hint=misread.hint)
-    return mistaken("stopped_early", seen, evidence)
+    if sight is not None and not step.contact:
+        off_m = sight.distance_m - parameters.distance
+        if -parameters.late <= off_m <= parameters.early:
+            return Finding.as_asked(f"{sight.name} at {metres(sight.distance_m)}", evidence)
+        if off_m < 0.0:
+            return deeper or _late(recording, rest, sight, parameters, evidence)
+    return deeper or _early(recording, rest, sight, evidence)
 
 
 def _never_stopped(recording: Recording) -> Finding:
     last = recording.truth[-1]
-    sight = ahead(recording.scene, last)
-    where = (
-        f"{sight.name} is still {metres(sight.distance_m)} ahead"
-        if sight
-        else "nothing is ahead any more"
-    )
-    return mistaken(
-        "never_stopped",
-        "the robot has not come to rest: it turns on the spot"
-        if abs(last.linear_m_s) < REST_M_S
-        else f"the robot never stopped: it still drives at {speed(last.linear_m_s)} when the "
-        f"observation ends, after {metres(way_m(recording.truth))}; {where}",
-        Evidence(
-            moments=(until_the_end(recording, "not at rest when the observation ended"),),
-            plots=(speed_plot(recording),),
-        ),
-    )
+    if abs(last.linear_m_s) < REST_M_S:
+        seen = "the robot has not come to rest: it turns on the spot"
+    else:
+        sight = ahead(recording.scene, last)
+        ahead_of_it = "nothing is ahead any more"
+        if sight is not None:
+            ahead_of_it = f"{sight.name} is still {metres(sight.distance_m)} ahead"
+        seen = (
+            f"the robot never stopped: it still drives at {speed(last.linear_m_s)} when the "
+            f"observation ends, after {metres(way_m(recording.truth))}; {ahead_of_it}"
+        )
+    shown = at_the_end(recording, "not at rest when the observation ended")
+    return mistaken("never_stopped", seen, shown)
+
+
+def _early(recording: Recording, rest: int, sight: Sight | None, shown: Evidence) -> Finding:
+    ahead_of_it = "nothing ahead"
+    if sight is not None:
+        ahead_of_it = f"{sight.name} still {metres(sight.distance_m)} ahead"
+    seen = f"stopped early, with {ahead_of_it}"
+    if gone_ahead_m(recording.truth[: rest + 1]) < 0.0:
+        return mistaken("drove_backwards", f"{seen}: it drove backwards", shown)
+    misread = misreading(recording, recording.truth[rest])
+    if misread is None:
+        return mistaken("stopped_early", seen, shown)
+    return mistaken("misread_scan", f"{seen}: {misread.words}", shown, hint=misread.hint)
 
 
 def _late(
-    recording: Recording, scene: Scene, rest: int, sight: Sight, parameters: Stops
+    recording: Recording, rest: int, sight: Sight, parameters: Stops, shown: Evidence
 ) -> Finding:
-    truth, wanted_m = recording.truth, parameters.distance
     seen = f"stopped late, with {sight.name} at {metres(sight.distance_m)}"
-    begin = rest
-    while begin and (other := ahead(scene, truth[begin - 1])) is not None:
-        if other.distance_m > wanted_m:
-            break
-        begin -= 1
-    begin_ns, end_ns = truth[begin].time_ns, truth[rest].time_ns
-    fastest = max((abs(item.linear_m_s) for item in truth[begin : rest + 1]), default=0.0)
+    too_near = recording.truth[_too_near_since(recording, rest, parameters.distance) : rest + 1]
+    begin_ns, end_ns = too_near[0].time_ns, too_near[-1].time_ns
+    fastest = max(abs(step.linear_m_s) for step in too_near)
     lost_s = stolen_s(recording, begin_ns, end_ns)
-    missing_m = wanted_m - parameters.late - sight.distance_m
+    missing_m = parameters.distance - parameters.late - sight.distance_m
     if lost_s > 0.0 and lost_s * fastest >= missing_m:
         return Finding.held_up(seen, lost_s)
-    shown = [one.stamp_ns for one in scans(recording) if begin_ns <= one.stamp_ns <= end_ns]
-    within = f"; {counted(len(shown), 'scan')} came meanwhile" if shown else ""
-    return mistaken(
-        "stopped_late",
-        f"{seen}: it drove on for {format_duration((end_ns - begin_ns) / NS)} below "
-        f"{metres(wanted_m)}, at up to {speed(fastest)}{within}",
-        _evidence(recording, scene, rest, parameters),
+    seen += (
+        f": it drove on for {format_duration((end_ns - begin_ns) / NS)} below "
+        f"{metres(parameters.distance)}, at up to {speed(fastest)}"
     )
+    received = sum(begin_ns <= scan.stamp_ns <= end_ns for scan in scans(recording))
+    if received:
+        seen += f"; {counted(received, 'scan')} came meanwhile"
+    return mistaken("stopped_late", seen, shown)
+
+
+def _too_near_since(recording: Recording, rest: int, distance_m: float) -> int:
+    """Index of the step from which on something ahead was too near until the robot rested."""
+    begin = rest
+    while begin:
+        sight = ahead(recording.scene, recording.truth[begin - 1])
+        if sight is None or sight.distance_m > distance_m:
+            break
+        begin -= 1
+    return begin
 
 
 def _evidence(recording: Recording, scene: Scene, rest: int, parameters: Stops) -> Evidence:
-    rest_ns, wanted_m = recording.truth[rest].time_ns, parameters.distance
-    band = (wanted_m - parameters.late, wanted_m + parameters.early)
-
-    def distance_m(step: Truth) -> float | None:
-        sight = ahead(scene, step)
-        return None if sight is None else sight.distance_m
-
-    title = "Distance to what is straight ahead"
-    distance_plot = over_time(recording, title, "distance (m)", distance_m, band)
-    still = takewhile(is_at_rest, recording.truth[rest:])
-    judged = [recording.since_launch_s(step.time_ns) for step in still]
-    distance_plot = replace(distance_plot, judged=(judged[0], judged[-1]))
-    plots = distance_plot, speed_plot(recording)
-    found = evidence_at(recording, "the robot came to rest", rest_ns, *plots)
-    return replace(found, tables=tuple(_table(recording, scene, rest)))
+    least_m = parameters.distance - parameters.late
+    most_m = parameters.distance + parameters.early
+    title, label = "Distance to what is straight ahead", "distance (m)"
+    plot = over_time(recording, title, label, partial(ahead_m, scene), (least_m, most_m))
+    still = list(takewhile(is_at_rest, recording.truth[rest:]))
+    begin_s, end_s = (recording.since_launch_s(step.time_ns) for step in (still[0], still[-1]))
+    plots = replace(plot, judged=(begin_s, end_s)), speed_plot(recording)
+    shown = evidence_at(recording, "the robot came to rest", still[0].time_ns, *plots)
+    return replace(shown, tables=tuple(_table(recording, scene, rest)))
 
 
 def _table(recording: Recording, scene: Scene, rest: int) -> Iterator[Table]:
     """The last scans before the robot came to rest, with the commands that followed."""
     truth, rest_ns = recording.truth, recording.truth[rest].time_ns
-    heard = [scan for scan in scans(recording) if scan.stamp_ns <= rest_ns][-_SCANS:]
-    ends_ns = [*(scan.stamp_ns for scan in heard[1:]), rest_ns]
+    received = [scan for scan in scans(recording) if scan.stamp_ns <= rest_ns][-_SCANS:]
+    if not received:
+        return
     rows = []
-    for scan, end_ns in zip(heard, ends_ns, strict=bool(heard)):
+    for scan, end_ns in zip(
+        received, [*(scan.stamp_ns for scan in received[1:]), rest_ns], strict=True
+    ):
         sent = [one for one in commands(recording) if scan.stamp_ns <= one.time_ns < end_ns]
-        sight = ahead(scene, truth[index_at(truth, scan.stamp_ns)])
-        measured = front(recording, scan)
+        measured_m = front(recording, scan)
+        true_m = ahead_m(scene, truth[index_at(truth, scan.stamp_ns)])
         rows.append(
             (
                 f"{recording.since_launch_s(scan.stamp_ns):.2f} s",
-                "none" if measured is None else f"{measured:.3f} m",
+                "none" if measured_m is None else f"{measured_m:.3f} m",
                 ", ".join(dict.fromkeys(speed(one.twist.linear_m_s) for one in sent)) or "none",
-                "nothing ahead" if sight is None else f"{sight.distance_m:.3f} m",
+                "nothing ahead" if true_m is None else f"{true_m:.3f} m",
             )
         )
     header = ("time", "beam ahead", "linear.x sent then", "true distance")
-    if rows:
-        yield Table("The last scans before it came to rest", header, tuple(rows))
+    yield Table("The last scans before it came to rest", header, tuple(rows))
 
 
 class StaysAtRest(RobotParameters):
@@ -216,32 +222,32 @@ def stays_at_rest(recording: Recording, parameters: StaysAtRest) -> Finding:
         evidence = Evidence(plots=() if is_start else (speed_plot(recording),))
         seen = f"at rest for {watched}, to the end"
         return Finding.as_asked(seen, evidence)
-    stop_if(None if is_start else why_cut_short(recording))
-    heard = scans(recording)
-    is_blind = is_start and bool(heard) and moved.time_ns < heard[0].stamp_ns
-    return _set_off(recording, truth[rest:], moved, is_blind, is_start)
+    if not is_start:
+        stop_if(why_cut_short(recording))
+        return _set_off(recording, truth[rest:], moved, "set_off_again")
+    received = scans(recording)
+    is_blind = bool(received) and moved.time_ns < received[0].stamp_ns
+    return _set_off(recording, truth[rest:], moved, "blind_start" if is_blind else "set_off")
 
 
 def _moves(step: Truth, tolerance_m_s: float) -> bool:
-    return abs(step.linear_m_s) > tolerance_m_s or abs(step.angular_rad_s) > 0.01
+    return abs(step.linear_m_s) > tolerance_m_s or abs(step.angular_rad_s) > _TURNS_RAD_S
 
 
-def _set_off(
-    recording: Recording, truth: tuple[Truth, ...], step: Truth, is_blind: bool, is_start: bool
-) -> Finding:
+def _set_off(recording: Recording, truth: tuple[Truth, ...], step: Truth, mistake: str) -> Finding:
     """How a robot that was at rest began to move."""
-    when_s = recording.since_launch_s(step.time_ns)
-    sight = ahead(recording.scene, step)
-    words = "set off" if is_start else "set off again"
+    words = "set off again" if mistake == "set_off_again" else "set off"
     if abs(step.linear_m_s) < REST_M_S:
         words = "turned on the spot"
     elif step.linear_m_s < 0.0:
         words += " backwards"
-    words += f" {when_s:.2f} s after launch"
-    words += ", before the first scan had come" if is_blind else ""
-    words += f", with {sight.name} {metres(sight.distance_m)} ahead" if sight else ""
+    words += f" {recording.since_launch_s(step.time_ns):.2f} s after launch"
+    if mistake == "blind_start":
+        words += ", before the first scan had come"
+    sight = ahead(recording.scene, step)
+    if sight is not None:
+        words += f", with {sight.name} {metres(sight.distance_m)} ahead"
     fastest = max(abs(item.linear_m_s) for item in truth)
-    mistake = "blind_start" if is_blind else "set_off" if is_start else "set_off_again"
     return mistaken(
         mistake,
         f"{words}: {metres(way_m(truth))} in all, at up to {speed(fastest)}",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import Literal
 
@@ -15,7 +16,7 @@ from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.findings.finding import Finding, Plot, evidence_at
 from grader.findings.words import metres, percent
-from grader.measure.motion.ground import nearest
+from grader.measure.motion.ground import nearest, nearest_m
 from grader.measure.motion.track import STRIDE, over_time, way_m
 from grader.recording.model import Recording
 from grader.recording.simulated import Scene, Truth
@@ -90,11 +91,7 @@ def _right_m(truth: tuple[Truth, ...], is_right: list[bool]) -> float:
 
 
 def _distance_plot(recording: Recording, scene: Scene, parameters: KeepsDistance) -> Plot:
-    def distance_m(step: Truth) -> float | None:
-        sight = nearest(scene, step)
-        return None if sight is None else sight.distance_m
-
     least_m = parameters.distance - parameters.tolerance
     most_m = parameters.distance + parameters.tolerance
-    title = "Distance to the nearest obstacle"
-    return over_time(recording, title, "distance (m)", distance_m, (least_m, most_m))
+    title, label = "Distance to the nearest obstacle", "distance (m)"
+    return over_time(recording, title, label, partial(nearest_m, scene), (least_m, most_m))

@@ -60,6 +60,18 @@ def nearest(scene: Scene, step: Truth) -> Sight | None:
     return found
 
 
+def ahead_m(scene: Scene, step: Truth) -> float | None:
+    """How far the nearest thing straight ahead is, or None where there is nothing."""
+    sight = ahead(scene, step)
+    return None if sight is None else sight.distance_m
+
+
+def nearest_m(scene: Scene, step: Truth) -> float | None:
+    """How far the nearest thing in any direction is, or None in an empty world."""
+    sight = nearest(scene, step)
+    return None if sight is None else sight.distance_m
+
+
 def _eye(scene: Scene, step: Truth) -> Pose:
     """Where the LiDAR is."""
     return compose(Pose(step.x_m, step.y_m, step.yaw_rad), scene.lidar)

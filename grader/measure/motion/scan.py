@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from grader.findings.words import metres, side
 from grader.measure.motion.command import number, scans
-from grader.measure.motion.ground import nearest
+from grader.measure.motion.ground import nearest, nearest_m
 from grader.recording.model import NS, Message, Recording
 from grader.recording.simulated import Truth
 
@@ -17,7 +17,7 @@ _CONE_RAD = math.radians(20.0)
 # What the robot drove on with for longer than this is not what stopped it: a filter of some
 # scans and a slow timer have decided by then.
 _DECIDED_NS = NS
-# Every so many steps of the simulator are looked at.
+# Of the steps of 10 ms: a tenth of a second is between two scans anyway.
 _STRIDE = 10
 
 
@@ -40,20 +40,22 @@ def misreading(recording: Recording, step: Truth) -> Misreading | None:
     scan = newest(recording, step.time_ns)
     if scan is None:
         return None
+    ahead_m = front(recording, scan)
+
+    def is_zero_ahead(earlier: Truth) -> bool:
+        return front(recording, newest(recording, earlier.time_ns)) == 0.0
+
     # Before the nearest of all: where a beam is 0.0, so is min(ranges).
-    seen = front(recording, scan)
-    if seen == 0.0 and not _drove_on(
-        recording, step, lambda one: front(recording, newest(recording, one.time_ns)) == 0.0
-    ):
+    if ahead_m == 0.0 and not _drove_on(recording, step, is_zero_ahead):
         return Misreading(
             "the beam straight ahead reported 0.0 then, which means that nothing came back",
             "A range below range_min is no obstacle: ignore ranges outside of range_min to "
             "range_max.",
         )
     beside = _beside(recording, scan, step)
-    if beside is None and seen is not None and not math.isfinite(seen):
+    if beside is None and ahead_m is not None and not math.isfinite(ahead_m):
         return Misreading(
-            f"the beam straight ahead reported {seen:g} then: nothing within its range",
+            f"the beam straight ahead reported {ahead_m:g} then: nothing within its range",
             "inf is a normal range: nothing is there, so drive on. Every comparison with nan is "
             "false.",
         )
@@ -80,9 +82,9 @@ def _beside(recording: Recording, scan: Message, step: Truth) -> Misreading | No
     if scene is None or near is None or near.distance_m > range_max_m:
         return None
 
-    def is_as_near(one: Truth) -> bool:
-        sight = nearest(scene, one)
-        return sight is not None and sight.distance_m <= near.distance_m
+    def is_as_near(earlier: Truth) -> bool:
+        distance_m = nearest_m(scene, earlier)
+        return distance_m is not None and distance_m <= near.distance_m
 
     if abs(near.bearing_rad) <= _CONE_RAD or _drove_on(recording, step, is_as_near):
         return None
