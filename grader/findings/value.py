@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
@@ -63,12 +63,20 @@ class Difference:
 def leaves(value: Any, path: str = "") -> dict[str, Any]:
     """Flatten a message: path of every leaf -> its value. An empty list is a leaf."""
     if isinstance(value, Mapping):
-        inner = [(f"{path}.{name}" if path else str(name), item) for name, item in value.items()]
+        parts = {_below(path, name): part for name, part in value.items()}
     else:
-        inner = [(f"{path}[{index}]", item) for index, item in enumerate(_items(value) or ())]
-        if not inner:
+        parts = {f"{path}[{index}]": part for index, part in enumerate(_items(value) or ())}
+        if not parts:
             return {path: value}
-    return {place: leaf for name, item in inner for place, leaf in leaves(item, name).items()}
+    found: dict[str, Any] = {}
+    for place, part in parts.items():
+        found |= leaves(part, place)
+    return found
+
+
+def _below(path: str, name: object) -> str:
+    """The path of a field of the message at a path, which is empty for the whole message."""
+    return f"{path}.{name}" if path else str(name)
 
 
 def expected_leaves(expected: Mapping[str, Any], message: Mapping[str, Any]) -> dict[str, Any]:
@@ -89,13 +97,13 @@ def expected_leaves(expected: Mapping[str, Any], message: Mapping[str, Any]) -> 
     return found
 
 
-def _field_of(message: Any, name: str, here: str) -> Any:
-    """The value of a field of a message that is called ``here`` in errors."""
+def _field_of(message: Any, name: str, called: str) -> Any:
+    """The value of a field of a message, which errors call as ``called``."""
     if not isinstance(message, Mapping):
-        raise NoSuchField(f"{here} has no field {name!r}: it is a plain value")
+        raise NoSuchField(f"{called} has no field {name!r}: it is a plain value")
     if name not in message:
         raise NoSuchField(
-            f"{here} has no field {name!r}; it has {', '.join(sorted(message)) or 'none'}."
+            f"{called} has no field {name!r}; it has {', '.join(sorted(message)) or 'none'}."
             + did_you_mean(name, message)
         )
     return message[name]
@@ -126,17 +134,17 @@ def item_at(message: Mapping[str, Any], path: str) -> Any:
 
 def _part_of(message: Any, path: str, around: str = "") -> Any:
     """What is in a field of a message, whose own path is ``around``: perhaps a message itself."""
-    here = message
+    part = message
     for step in _STEP.findall(path):
-        if isinstance(here, Sequence) and not isinstance(here, str) and step.isdigit():
-            if int(step) >= len(here):
-                raise NoSuchItem(f"{around} has {len(here)} items, so there is no [{step}]")
-            here = here[int(step)]
+        if isinstance(part, Sequence) and not isinstance(part, str) and step.isdigit():
+            if int(step) >= len(part):
+                raise NoSuchItem(f"{around} has {len(part)} items, so there is no [{step}]")
+            part = part[int(step)]
             around += f"[{step}]"
         else:
-            here = _field_of(here, step, around or "the message")
-            around = f"{around}.{step}" if around else step
-    return here
+            part = _field_of(part, step, around or "the message")
+            around = _below(around, step)
+    return part
 
 
 def number_at(message: Mapping[str, Any], path: str) -> float:
@@ -156,14 +164,14 @@ def _expect(item: Any, message: Any, path: str, found: dict[str, Any]) -> None:
         found[path] = item
     elif isinstance(item, Mapping):
         for name, inner in item.items():
-            here = f"{path}.{name}" if path else str(name)
+            inner_path = _below(path, name)
             try:
-                _expect(inner, _named(message, str(name), path), here, found)
+                _expect(inner, _named(message, str(name), path), inner_path, found)
             except NoSuchItem:
-                found[here] = inner
+                found[inner_path] = inner
     elif isinstance(message, Mapping):
         raise NoSuchField(f"{path} is a message: name its fields ({', '.join(message)})")
-    elif not _is_asked(item, message) and _kind(item) != _kind(message):
+    elif not _is_condition(item, message) and _kind(item) != _kind(message):
         raise NoSuchField(f"{path} {_other_kind(item, message)}")
     else:
         found[path] = item
@@ -182,17 +190,23 @@ def _named(message: Any, key: str, around: str) -> Any:
     return value_at(message, key)
 
 
-def _is_asked(item: Any, value: Any) -> bool:
-    """Whether a text is expected of a number: it is a condition."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return isinstance(item, str) and item != "" and number
+def _is_condition(expected: Any, value: Any) -> bool:
+    """Whether a text is expected of a number: it is a condition, such as ``> 0``."""
+    return isinstance(expected, str) and expected != "" and _is_number(value)
 
 
-def _other_kind(item: Any, value: Any) -> str:
-    here, wanted = ("true or false" if isinstance(x, bool) else _kind(x) for x in (value, item))
-    words = item.lower() if isinstance(item, str) and isinstance(value, bool) else ""
-    advice = ": write true or false" if words in ("yes", "no", "on", "off") else ""
-    return f"is {here}, but {wanted} is expected of it{advice}"
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _other_kind(expected: Any, value: Any) -> str:
+    found, wanted = (
+        "true or false" if isinstance(one, bool) else _kind(one) for one in (value, expected)
+    )
+    words = f"is {found}, but {wanted} is expected of it"
+    if isinstance(value, bool) and str(expected).lower() in ("yes", "no", "on", "off"):
+        words += ": write true or false"
+    return words
 
 
 def unreachable(expected: Any, sample: Any, tolerance: float) -> str:
@@ -200,7 +214,7 @@ def unreachable(expected: Any, sample: Any, tolerance: float) -> str:
 
     An empty text if it can.
     """
-    if _is_asked(expected, sample) or is_asked_of_text(expected):
+    if _is_condition(expected, sample) or is_asked_of_text(expected):
         return ""
     if isinstance(expected, str) and isinstance(sample, str) and looks_like_a_condition(expected):
         return (
@@ -209,20 +223,28 @@ def unreachable(expected: Any, sample: Any, tolerance: float) -> str:
         )
     if _kind(expected) != _kind(sample):
         return _other_kind(expected, sample)
-    items, samples = _items(expected), _items(sample)
-    if items is not None and samples:
-        return next(filter(None, (unreachable(one, samples[0], tolerance) for one in items)), "")
-    if not isinstance(expected, int | float) or not isinstance(sample, int | float):
-        return ""
+    expected_items, sample_items = _items(expected), _items(sample)
+    if expected_items is not None and sample_items:
+        reasons = (unreachable(item, sample_items[0], tolerance) for item in expected_items)
+        return next(filter(None, reasons), "")
+    if isinstance(expected, int | float) and isinstance(sample, int | float):
+        return _unreachable_number(expected, sample, tolerance)
+    return ""
+
+
+def _unreachable_number(expected: float, sample: float, tolerance: float) -> str:
     if isinstance(sample, bool):
         fits, kind = expected in (0, 1), "true or false"
-    elif isinstance(sample, int):
-        whole = not math.isfinite(expected) or abs(expected - round(expected)) <= tolerance
-        fits, kind = whole and not isinstance(expected, bool), "a whole number"
+    elif isinstance(expected, bool):
+        fits, kind = False, "a whole number" if isinstance(sample, int) else "a number"
+    elif isinstance(sample, int) and math.isfinite(expected):
+        fits, kind = abs(expected - round(expected)) <= tolerance, "a whole number"
     else:
-        fits, kind = not isinstance(expected, bool), "a number"
-    shown = str(expected).lower() if isinstance(expected, bool) else expected
-    return "" if fits else f"is {kind}, but {shown} is expected of it"
+        return ""
+    if fits:
+        return ""
+    written = str(expected).lower() if isinstance(expected, bool) else expected
+    return f"is {kind}, but {written} is expected of it"
 
 
 def differences(
@@ -246,24 +268,34 @@ def differences(
             found.append(Difference(path, wanted, observed))
     found = [one for one in found if not _is_opposite(one.field, expected, message, tolerance)]
     if rest_zero:
-        known = {name for path in expected for name in Expression.of(path).fields}
-        for path, observed in leaves(message).items():
-            named = any(path == name or path.startswith((f"{name}[", f"{name}.")) for name in known)
-            if not named and not _is_zero(observed, tolerance_of(tolerance, path)):
-                zero = [] if _items(observed) is not None else type(observed)()
-                found.append(Difference(path, zero, observed))
+        found += _not_zero(expected, message, tolerance)
     return tuple(found)
+
+
+def _not_zero(
+    expected: Mapping[str, Any], message: Mapping[str, Any], tolerance: Tolerance
+) -> Iterator[Difference]:
+    """Fields that nothing is expected of, and that are not zero, false or empty."""
+    known = {name for path in expected for name in Expression.of(path).fields}
+    for path, observed in leaves(message).items():
+        is_known = any(path == name or path.startswith((f"{name}[", f"{name}.")) for name in known)
+        if not is_known and not _is_zero(observed, tolerance_of(tolerance, path)):
+            zero = [] if _items(observed) is not None else type(observed)()
+            yield Difference(path, zero, observed)
 
 
 def _is_opposite(
     path: str, expected: Mapping[str, Any], message: Mapping[str, Any], tolerance: Tolerance
 ) -> bool:
     """Whether a field is of a quaternion that is -q where q is expected: the same rotation."""
+    # The quaternion of `pose.orientation.w` is `pose.orientation`; that of `w` the whole message.
     around = path[:-2] if path[-2:-1] == "." else ""
-    names = [f"{around}.{part}".removeprefix(".") for part in _QUATERNION]
+    names = [_below(around, part) for part in _QUATERNION]
     if path not in names or any(_kind(expected.get(name)) != "a number" for name in names):
         return False
-    return set(_part_of(message, around)) == set(_QUATERNION) and all(
+    if set(_part_of(message, around)) != set(_QUATERNION):
+        return False
+    return all(
         same(-expected[name], value_at(message, name), tolerance_of(tolerance, name))
         for name in names
     )
@@ -302,7 +334,7 @@ def same(
             same(*pair, tolerance, message)
             for pair in zip(wanted_items, observed_items, strict=True)
         )
-    if _is_asked(wanted, observed):
+    if _is_condition(wanted, observed):
         try:
             find = partial(_part_of, message)
             return meets(wanted, observed, tolerance, find, circle)
@@ -315,23 +347,22 @@ def same(
                 f"{wanted!r} is expected of it: write a number, '> 0', '0.1 .. 0.5' or an "
                 f"expression of fields ({error})"
             ) from None
-    truth = isinstance(wanted, bool) or isinstance(observed, bool)
-    if truth or not (isinstance(wanted, int | float) and isinstance(observed, int | float)):
-        # A tolerance is for numbers: false is never near enough to true.
-        return bool(wanted == observed)
-    return is_near(wanted, observed, tolerance, circle)
+    if _is_number(wanted) and _is_number(observed):
+        return is_near(wanted, observed, tolerance, circle)
+    # A tolerance is for numbers: false is never near enough to true.
+    return bool(wanted == observed)
 
 
 def same_value(wanted: Any, observed: Any) -> bool:
     """Whether a parameter has the wanted value: ``true`` is not 1, and '1' neither."""
-    if _is_asked(wanted, observed) and not is_comparison(wanted):
+    if _is_condition(wanted, observed) and not is_comparison(wanted):
         return False
     return isinstance(wanted, bool) == isinstance(observed, bool) and same(wanted, observed, EXACT)
 
 
 def _is_zero(value: Any, tolerance: float) -> bool:
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return abs(value) <= tolerance
+    if _is_number(value):
+        return bool(abs(value) <= tolerance)
     return not value
 
 

@@ -112,32 +112,35 @@ def bag(submission: SubmissionRecord, parameters: Bag) -> Finding:
     """
     if submission.bags is None:
         return Finding.ours("the bags were not read: grade again")
-    causes = [(one, _why_not(one, parameters)) for one in submission.bags]
-    for one, cause in causes:
-        if cause is None:
-            messages = counted(sum(topic.messages for topic in one.topics), "message")
-            observed = f"{code(one.path)} has {messages} in {format_duration(one.duration_s)}"
-            return Finding.as_asked(observed)
-    if not causes:
+    if not submission.bags:
         nothing = "there is no bag, a folder with `metadata.yaml` and an `.mcap` or `.db3` file"
         return mistaken("no_bag", nothing)
-    return next(cause for _, cause in causes if cause is not None)
+    causes = [_why_not(one, parameters) for one in submission.bags]
+    if None not in causes:
+        return next(filter(None, causes))
+    right = submission.bags[causes.index(None)]
+    messages = counted(sum(topic.messages for topic in right.topics), "message")
+    observed = f"{code(right.path)} has {messages} in {format_duration(right.duration_s)}"
+    return Finding.as_asked(observed)
 
 
 def _why_not(bag: BagRecord, parameters: Bag) -> Finding | None:
     """Why a bag is not what is asked for, or None."""
-    here = code(bag.path)
+    name = code(bag.path)
     if bag.problem is not None:
-        return mistaken("broken_bag", f"{here}: {bag.problem}")
+        return mistaken("broken_bag", f"{name}: {bag.problem}")
     types = {topic.name: topic.type for topic in bag.topics if topic.messages}
-    for topic, kind in parameters.topics.items():
-        if types.get(topic) != kind:
-            there = f"as {code(types[topic])}" if topic in types else "no message"
+    for topic, wanted in parameters.topics.items():
+        if topic in types and types[topic] != wanted:
+            seen = f"{name} has as {code(types[topic])} on {code(topic)}"
+        elif topic not in types:
             others = f"; it has {codes(types)}" if types else ""
-            seen = f"{here} has {there} on {code(topic)}{others if topic not in types else ''}"
-            return mistaken("not_in_bag", seen, topic=f"{code(topic)} ({kind})")
+            seen = f"{name} has no message on {code(topic)}{others}"
+        else:
+            continue
+        return mistaken("not_in_bag", seen, topic=f"{code(topic)} ({wanted})")
     if parameters.lasts is not None and bag.duration_s < parameters.lasts:
-        return mistaken("short_bag", f"{here} lasts {format_duration(bag.duration_s)}")
+        return mistaken("short_bag", f"{name} lasts {format_duration(bag.duration_s)}")
     if not types:
-        return mistaken("empty_bag", f"{here} has no message")
+        return mistaken("empty_bag", f"{name} has no message")
     return None

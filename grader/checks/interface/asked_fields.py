@@ -27,6 +27,8 @@ Types = tuple[str, ...]
 """Types of fields that a definition has together, such as two ``float64``."""
 Alternatives = tuple[Types, ...]
 """One of them is enough."""
+_Taken = dict[int, tuple[str, str]]
+"""Index of a field -> what it stands for, and the type that is asked for."""
 
 
 def fits(field: Field, type: str) -> bool:
@@ -44,14 +46,7 @@ def assigned(
     """
     best: dict[str, tuple[Field, ...]] = {}
     for chosen in product(*asked.values()):
-        taken: dict[int, tuple[str, str]] = {}
-        for role, types in zip(asked, chosen, strict=True):
-            more = _with(taken, role, types, fields)
-            taken = taken if more is None else more
-        found = {
-            role: tuple(fields[index] for index, (one, _) in sorted(taken.items()) if one == role)
-            for role in dict.fromkeys(role for role, _ in taken.values())
-        }
+        found = _fields_for(dict(zip(asked, chosen, strict=True)), fields)
         if len(found) > len(best):
             best = found
         if len(best) == len(asked):
@@ -59,9 +54,20 @@ def assigned(
     return best
 
 
-def _with(
-    taken: Mapping[int, tuple[str, str]], role: str, types: Types, fields: Sequence[Field]
-) -> dict[int, tuple[str, str]] | None:
+def _fields_for(
+    asked: Mapping[str, Types], fields: Sequence[Field]
+) -> dict[str, tuple[Field, ...]]:
+    """The same where each thing is asked for with one choice of types."""
+    taken: _Taken = {}
+    for role, types in asked.items():
+        taken = _taken_with(taken, role, types, fields) or taken
+    return {
+        role: tuple(fields[index] for index, (one, _) in sorted(taken.items()) if one == role)
+        for role in dict.fromkeys(role for role, _ in taken.values())
+    }
+
+
+def _taken_with(taken: _Taken, role: str, types: Types, fields: Sequence[Field]) -> _Taken | None:
     """What is taken, with fields for one role more; None where there are not enough.
 
     An augmenting path moves what is taken already (Kuhn 1955, bipartite matching).

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
-from itertools import islice
+from itertools import chain, islice
 from math import prod
 from pathlib import PurePosixPath
 from typing import Annotated, Any, Literal
@@ -197,9 +197,10 @@ class Has(OfInterface):
     @model_validator(mode="after")
     def _known(self) -> Has:
         for what, alternatives in self.fields.items():
-            for type in (type for types in alternatives for type in types):
+            for type in chain.from_iterable(alternatives):
                 single = type.removesuffix("[]")
-                if single not in (*PRIMITIVES, *FAMILIES) and not re.fullmatch(INTERFACE, single):
+                is_known = single in PRIMITIVES or single in FAMILIES
+                if not is_known and not re.fullmatch(INTERFACE, single):
                     raise ValueError(
                         f"{what}: {type!r} is no type of a field, such as float64, text or "
                         "geometry_msgs/msg/Pose"
@@ -228,24 +229,28 @@ def has(submission: SubmissionRecord, parameters: Has) -> Finding:
     definition = _definition(submission, parameters)
     own = _sections(name, definition)
     stop_if(_why_other_parts(name, definition, own, Evidence()))
-    parts = dict(zip(_PARTS[len(own)], own, strict=True))
-    chosen = [parts[parameters.part]] if parameters.part else [*own]
+    sections = list(own)
+    if parameters.part is not None:
+        sections = [own[_PARTS[len(own)].index(parameters.part)]]
+    written = [field for section in sections for field in section.fields]
     messages = dict(_own_messages(submission, name))
-    written = [field for section in chosen for field in section.fields]
-    fields = [*islice(all_fields(written, messages), _MOST_FIELDS)]
+    fields = list(islice(all_fields(written, messages), _MOST_FIELDS))
     found = assigned(parameters.fields, fields)
-    taken = [
+    assignments = [
         f"{what} is {codes(field.name for field in found[what])}"
         for what in parameters.fields
         if what in found
     ]
-    if len(found) == len(parameters.fields):
-        return Finding.as_asked("; ".join(taken))
-    lacking = {what: one for what, one in parameters.fields.items() if what not in found}
+    lacking = {what: types for what, types in parameters.fields.items() if what not in found}
+    if not lacking:
+        return Finding.as_asked("; ".join(assignments))
+    seen = f"{code(definition.file)} has {codes(map(str, written)) or 'no field'}: "
+    seen += f"no field is left for {listing(lacking)}"
+    if assignments:
+        seen += f" ({listing(assignments)})"
     return mistaken(
         "no_field_for",
-        f"{code(definition.file)} has {codes(map(str, written)) or 'no field'}: no field is left "
-        f"for {listing(lacking)}{f' ({listing(taken)})' if taken else ''}",
+        seen,
         Evidence(places=(SourceError(definition.file, None, "lacks a field"),)),
         fields=listing(f"{words_of(types)} for {what}" for what, types in lacking.items()),
     )

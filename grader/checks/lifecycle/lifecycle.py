@@ -50,32 +50,31 @@ def state(recording: Recording, parameters: State) -> Finding:
     stop_if(why_not_managed(recording, node))
     calls = judged_calls(recording, service)
     stop_if(why_slow(recording, calls, ANSWER_S))
-    seen = [_state(call) for call in calls]
-    if len(seen) < len(parameters.states):
+    states = [_state(call) for call in calls]
+    if len(states) < len(parameters.states):
         # A contact ends the run, too.
         stop_if(why_ended(recording) or why_touched(recording))
-        text = f"the scenario asks for the state only {counted(len(seen), 'time')}"
+        text = f"the scenario asks for the state only {counted(len(states), 'time')}"
         return Finding.ours(text)
     changes = [call for call in recording.calls if call.service == f"{node}/change_state"]
-    steps = [(call.requested_ns, f"is {label}") for call, label in zip(calls, seen, strict=True)]
+    steps = [(call.requested_ns, f"is {label}") for call, label in zip(calls, states, strict=True)]
     steps += [(call.requested_ns, f"transition {transition(call)}") for call in changes]
     shown = timeline(recording, f"The lifecycle of {node}", steps)
-    for number, (wanted, label) in enumerate(zip(parameters.states, seen, strict=False)):
-        if label != wanted:
-            before = [one for one in changes if one.requested_ns < calls[number].requested_ns]
-            observed = f"at call {number + 1} of get_state it is {label}"
-            return _otherwise(observed, before[-1:], shown)
-    return Finding.as_asked(listing(seen, "then"), shown)
+    for number, wanted in enumerate(parameters.states):
+        if states[number] != wanted:
+            observed = f"at call {number + 1} of get_state it is {states[number]}"
+            asked_ns = calls[number].requested_ns
+            before = [change for change in changes if change.requested_ns < asked_ns]
+            return _otherwise(observed, before[-1] if before else None, shown)
+    return Finding.as_asked(listing(states, "then"), shown)
 
 
-def _otherwise(observed: str, last_change: list[Call], shown: Evidence) -> Finding:
+def _otherwise(observed: str, last_change: Call | None, shown: Evidence) -> Finding:
     """The finding for another state, after the last transition succeeded or failed."""
-    mistake = "own_transition"
-    for call in last_change:
-        if (call.response or {}).get("success") is not True:
-            observed += f", after the transition {transition(call)} failed"
-            mistake = "failed_transition"
-    return mistaken(mistake, observed, shown)
+    if last_change is None or (last_change.response or {}).get("success") is True:
+        return mistaken("own_transition", observed, shown)
+    observed += f", after the transition {transition(last_change)} failed"
+    return mistaken("failed_transition", observed, shown)
 
 
 def _state(call: Call) -> str:

@@ -170,8 +170,9 @@ class Contains(Matching):
 
     def _asked(self) -> str:
         low, high = self.at_least, self.at_most
-        bounds = f"{low} or more" if high is None else f"{low} to {high}" if low < high else low
-        return f"{bounds} {self.words}"
+        if high is None:
+            return f"{low} or more {self.words}"
+        return f"{low} to {high} {self.words}" if low < high else f"{low} {self.words}"
 
     @model_validator(mode="after")
     def _sensible(self) -> Contains:
@@ -201,23 +202,19 @@ def contains(recording: Recording, parameters: Contains) -> Finding:
 
 
 def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]) -> Finding:
+    """Why too few of the records are there."""
     level = parameters.level or "INFO"
     call = worded(
         python=f"self.get_logger().{'warning' if level == 'WARN' else level.lower()}('...')",
         cpp=f'RCLCPP_{level}(get_logger(), "...")',
     )
     records = parameters.of(recording)
-    other = [item for item in records if parameters.says(item.text) and item not in found]
-    if other:
-        observed = f"{quote(other[0].text)} is logged as {other[0].level}, not as {level}"
-        return mistaken("other_level", observed, _evidence(recording, other), call=call)
+    others = [item for item in records if parameters.says(item.text) and item not in found]
+    if others:
+        observed = f"{quote(others[0].text)} is logged as {others[0].level}, not as {level}"
+        return mistaken("other_level", observed, _evidence(recording, others), call=call)
     seen = f"only {len(found)} of them" if found else "none"
-    lost = sum(process.dropped_bytes for process in recording.processes)
-    cause = parameters.why_no_node(recording) or why_ended(recording, seen)
-    if cause is None and lost:
-        return Finding.ours(f"{seen}, but {lost} bytes of output were not kept", "Log less.")
-    nodes = {node.name for node in recording.student_nodes}
-    cause = cause or explain(Uncalled(recording, seen, nodes))
+    cause = _why_not_run(recording, parameters, seen)
     if cause is not None:
         return cause
     lines = [line for line in printed(recording) if parameters.says(line.text)]
@@ -232,10 +229,23 @@ def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]
         nothing = until_the_end(recording, "nothing logged when the observation ended")
         return mistaken(mistake, "the node logs nothing", Evidence(moments=(nothing,)), call=call)
     if not found:
-        near = nearest(parameters.text or "", [item.text for item in records])
         seen = f"{counted(len(records), 'log message')}, but none of these"
-        seen += f"; similar is {quote(near)}" if near else ""
+        near = nearest(parameters.text or "", [item.text for item in records])
+        if near:
+            seen += f"; similar is {quote(near)}"
     return mistaken(mistake, seen, _evidence(recording, found or records[-_SHOWN:]), call=call)
+
+
+def _why_not_run(recording: Recording, parameters: Matching, seen: str) -> Finding | None:
+    """Why what logs did not run, or its output was not kept; None if neither is so."""
+    cause = parameters.why_no_node(recording) or why_ended(recording, seen)
+    if cause is not None:
+        return cause
+    lost = sum(process.dropped_bytes for process in recording.processes)
+    if lost:
+        return Finding.ours(f"{seen}, but {lost} bytes of output were not kept", "Log less.")
+    nodes = {node.name for node in recording.student_nodes}
+    return explain(Uncalled(recording, seen, nodes))
 
 
 class Worst(Records):
@@ -307,27 +317,17 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     """
     low_hz, high_hz = parameters.bounds_hz
     found = parameters.found(recording)
-    begin_ns, end_ns = recording.matched_ns or recording.launched_ns, recording.stop_ns
-    periods = float(len(found))
     if len(found) >= 3:
         begin_ns, end_ns = found[0].time_ns, found[-1].time_ns
-        periods -= 1.0
+        periods = len(found) - 1
+    else:
+        begin_ns, end_ns = recording.matched_ns or recording.launched_ns, recording.stop_ns
+        periods = len(found)
     rate_hz = periods * NS / max(end_ns - begin_ns, 1)
     seen = f"{counted(len(found), 'log message')}, {rate_hz:.3g} Hz"
     if low_hz <= rate_hz <= high_hz:
-        last_ns = found[-1].time_ns if found else recording.stop_ns
-        stop_if(
-            why_paused(
-                recording,
-                (last_ns, recording.stop_ns),
-                _SILENT_PERIODS / low_hz if low_hz else math.inf,
-                f"{counted(len(found), 'log message')}, but none in the last "
-                f"{format_duration((recording.stop_ns - last_ns) / NS)}",
-                "stops_logging",
-            )
-        )
-        shown = _evidence(recording, found)
-        return Finding.as_asked(f"{rate_hz:.3g} Hz", shown)
+        stop_if(_why_stopped(recording, found, low_hz))
+        return Finding.as_asked(f"{rate_hz:.3g} Hz", _evidence(recording, found))
     if not found:
         return _why_lacking(recording, parameters, found)
     if rate_hz < low_hz and left_s(recording, begin_ns, end_ns) <= len(found) / low_hz:
@@ -335,14 +335,29 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     return mistaken("other_log_rate", seen, _evidence(recording, found))
 
 
-def _evidence(recording: Recording, records: list[Logged]) -> Evidence:
-    return Evidence(
-        moments=tuple(
-            moment(recording, f"{item.level} logged" if item.level else "printed", item.time_ns)
-            for item in records[:_SHOWN]
-        ),
-        log=tuple(
-            f"[{item.level}] [{item.logger}]: {item.text}" if item.level else item.text
-            for item in records[:_SHOWN]
-        ),
+def _why_stopped(recording: Recording, found: list[Logged], low_hz: float) -> Finding | None:
+    """Why nothing more was logged at the end of the observation; None if it was not too long."""
+    if not found or not low_hz:
+        return None
+    last_ns = found[-1].time_ns
+    return why_paused(
+        recording,
+        (last_ns, recording.stop_ns),
+        _SILENT_PERIODS / low_hz,
+        f"{counted(len(found), 'log message')}, but none in the last "
+        f"{format_duration((recording.stop_ns - last_ns) / NS)}",
+        "stops_logging",
     )
+
+
+def _evidence(recording: Recording, records: list[Logged]) -> Evidence:
+    shown = records[:_SHOWN]
+    moments = (
+        moment(recording, f"{item.level} logged" if item.level else "printed", item.time_ns)
+        for item in shown
+    )
+    log = (
+        f"[{item.level}] [{item.logger}]: {item.text}" if item.level else item.text
+        for item in shown
+    )
+    return Evidence(moments=tuple(moments), log=tuple(log))

@@ -140,12 +140,11 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
     """
     name = parameters.name
     process = declarations.process_of(recording, name) if name else None
-    if process is None:
-        ended = list(exited(recording))
-    else:
-        ended = [process] if ended_early(recording, process) else []
+    ended = exited(recording)
+    if process is not None:
+        ended = tuple(one for one in ended if one is process)
     if ended:
-        stop_if(why_it_exited(recording, ended[0]))
+        return why_it_exited(recording, ended[0])
     stop_if(offence(recording))
     stop_if(why_not_node(recording, name) if name else why_no_node(recording))
     stop_if(_why_gone(recording, name))
@@ -313,16 +312,18 @@ def _why_other_order(recording: Recording, node: str, before: str) -> Finding | 
 def _was_killed(recording: Recording, process: Process) -> bool:
     """Whether a stimulus ended it in the middle of the run."""
     ended_ns = process.exited_ns or recording.end_ns
-    return process.stopped_by != "itself" and any(
+    if process.stopped_by == "itself" or ended_ns >= recording.stop_ns:
+        return False
+    return any(
         item.process == process.name and item.action == "kill" and item.time_ns <= ended_ns
         for item in recording.interventions
-        if ended_ns < recording.stop_ns
     )
 
 
 def _in_time(process: Process, parameters: Ends) -> bool:
     if process.stopped_by not in ("SIGINT", "itself"):
         return False
+    # A process that had ended before has no such time.
     return process.stop_s is None or process.stop_s <= parameters.within
 
 

@@ -121,31 +121,30 @@ def _judge(recording: Recording, parameters: Profile) -> Finding:
     has, did, other_end = _WORDS[kind]
     stop_if(why_no_endpoint(recording, kind, parameters.topic))
     endpoints = recording.student_endpoints(kind, parameters.topic)
-    profiles = [(item.node, item.qos) for item in endpoints]
+    profiles = [(endpoint.node, endpoint.qos) for endpoint in endpoints]
     source = ""
     if not endpoints and set(parameters.policies) <= _DECLARED_POLICIES:
-        # One that published and was destroyed before it could be discovered.
+        # It published, and was destroyed before it could be discovered.
         profiles += declarations.profiles(recording, kind, parameters.topic)
         source = ", declared by the process"
     for node, qos in profiles:
         wrong = _wrong(qos, parameters)
         if wrong:
-            own = [item for item in endpoints if item.qos is qos]
-            messages = recording.on(parameters.topic)
-            moments = endpoints_seen(recording, own) or first_seen(recording, messages)
             seen = f"the {kind.value} of {code(node)} {has} {_differences(wrong)}{source}"
             seen += _consequence(qos, parameters, other_end)
-            return _mistaken(parameters, wrong, seen, Evidence(moments=moments))
-    hidden = [
+            own = [endpoint for endpoint in endpoints if endpoint.qos is qos]
+            moments = endpoints_seen(recording, own)
+            shown = moments or first_seen(recording, recording.on(parameters.topic))
+            return _mistaken(parameters, wrong, seen, Evidence(moments=shown))
+    unknown = [
         name
         for name in parameters.policies
         if name in _DEFAULTS and any(getattr(qos, name) == "unknown" for _, qos in profiles)
     ]
-    if hidden or not profiles:
-        names = ", ".join(hidden) or "QoS"
+    if unknown or not profiles:
+        names = ", ".join(unknown) or "QoS"
         return Finding.ours(f"{names} of the {kind.value} was not discovered")
-    observed = f"{did} by {counted(len(profiles), kind.value)}{source}"
-    return Finding.as_asked(observed)
+    return Finding.as_asked(f"{did} by {counted(len(profiles), kind.value)}{source}")
 
 
 def _differences(wrong: Mapping[str, tuple[Any, Any]]) -> str:
@@ -164,21 +163,22 @@ def _consequence(qos: Qos, parameters: Profile, other_end: str) -> str:
 
 def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
     """Policy -> (expected, found) where they differ and are known."""
-    found: dict[str, tuple[Any, Any]] = {}
+    wrong: dict[str, tuple[Any, Any]] = {}
     for name, wanted in parameters.policies.items():
         actual = getattr(qos, _ATTRIBUTES.get(name, name))
         if name in _DEFAULTS:
-            right = actual in (wanted, "unknown")
+            is_right = actual in (wanted, "unknown")
         else:
-            right = actual is not None and math.isclose(actual, wanted, rel_tol=_SAME_DURATION)
-        if not right:
-            found[name] = wanted, actual
-    return found
+            is_right = actual is not None and math.isclose(actual, wanted, rel_tol=_SAME_DURATION)
+        if not is_right:
+            wrong[name] = wanted, actual
+    return wrong
 
 
 def _mistaken(parameters: Profile, wrong: Collection[str], seen: str, shown: Evidence) -> Finding:
     asked = parameters.policies
     if all(_DEFAULTS.get(name) == item for name, item in asked.items()):
+        # Nothing has to be set: say what the student's profile is for instead.
         names = {"reliability": "best_effort_profile", "durability": "latched_profile"}
         why = "".join(f" {remedy(name)}" for policy, name in names.items() if policy in wrong)
         return mistaken("no_default", seen, shown, why=why)
@@ -227,18 +227,22 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
     kind = Kind(parameters.kind)
     stop_if(why_no_endpoint(recording, kind, parameters.topic))
     declared = declarations.queues(recording, kind, parameters.topic)
-    shown = _kept(recording, parameters)
-    observed = _wrong_depth(parameters, declared, shown)
+    kept = _kept(recording, parameters)
+    observed = _wrong_depth(parameters, declared, kept)
     if observed:
         own = recording.student_endpoints(kind, parameters.topic)
-        messages = recording.on(parameters.topic)
-        seen = endpoints_seen(recording, own) or first_seen(recording, messages)
-        argument = "third" if kind is Kind.PUBLISHER else "fourth"
-        texts = {"argument": argument, "kind": kind.value, "depth": parameters.depth}
-        return mistaken("other_depth", observed, Evidence(moments=seen), **texts)
+        moments = endpoints_seen(recording, own)
+        return mistaken(
+            "other_depth",
+            observed,
+            Evidence(moments=moments or first_seen(recording, recording.on(parameters.topic))),
+            argument="third" if kind is Kind.PUBLISHER else "fourth",
+            kind=kind.value,
+            depth=parameters.depth,
+        )
     if any(queue.depth is None for queue in declared):
         return Finding.ours("the depth cannot be seen: the process declared no number")
-    if not declared and shown is None:
+    if not declared and kept is None:
         what = f"the {kind.value} on {code(parameters.topic)}"
         return why_undeclared(recording, what)
     source = "declared by the process" if declared else "as the heartbeats of the publisher show"
@@ -246,7 +250,7 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
 
 
 def _wrong_depth(
-    parameters: Depth, declared: tuple[declarations.DeclaredQueue, ...], shown: int | None
+    parameters: Depth, declared: tuple[declarations.DeclaredQueue, ...], kept: int | None
 ) -> str:
     """What shows another depth than the expected one, or nothing."""
     for queue in declared:
@@ -254,32 +258,32 @@ def _wrong_depth(
             return "history keep_all, declared by the process: the depth has no meaning then"
         if queue.depth not in (None, parameters.depth):
             return f"depth {queue.depth}, declared by the process"
-    if shown is None or shown == parameters.depth:
+    if kept is None or kept == parameters.depth:
         return ""
-    but = f"depth {parameters.depth} is declared, but " if declared else ""
-    keeps = f"it keeps {counted(shown, 'message')}"
-    return f"{but}the heartbeats of the publisher show that {keeps}"
+    shown = f"the heartbeats of the publisher show that it keeps {counted(kept, 'message')}"
+    return f"depth {parameters.depth} is declared, but {shown}" if declared else shown
 
 
 def _kept(recording: Recording, parameters: Depth) -> int | None:
-    """The depth of the publishers' queues, or as many messages as tell it from the expected one.
+    """How many messages the publishers keep, as their heartbeats show; None if they do not tell.
 
     A volatile publisher forgets what every subscription has acknowledged, for which it asks with
-    a heartbeat: every few seconds, and where its queue is full.
-
-    Returns:
-        What the heartbeats show, or None where that is nothing.
+    a heartbeat: every few seconds, and where its queue is full. So it may keep fewer than its depth
+    allows, unless it sends often and asks at every second message.
     """
-    times_ns = [item.stamp_ns for item in recording.on(parameters.topic)]
-    often = len(times_ns) > _FEWEST and times_ns[-1] - times_ns[0] < len(times_ns) * NS
+    times_ns = [message.stamp_ns for message in recording.on(parameters.topic)]
+    sends_often = len(times_ns) > _FEWEST and times_ns[-1] - times_ns[0] < len(times_ns) * NS
     own = recording.student_endpoints(Kind(parameters.kind), parameters.topic)
-    for item in own:
-        if item.kept is None or item.kept == parameters.depth:
+    for publisher in own:
+        if publisher.kept is None:
             continue
-        full = item.heartbeats >= max(_FEWEST, len(times_ns) // 2) and often
-        if item.kept > parameters.depth or (full and 2 * item.kept < parameters.depth):
-            return item.kept
-    return parameters.depth if {item.kept for item in own} == {parameters.depth} else None
+        if publisher.kept > parameters.depth:
+            return publisher.kept
+        is_full = sends_often and publisher.heartbeats >= max(_FEWEST, len(times_ns) // 2)
+        if is_full and 2 * publisher.kept < parameters.depth:
+            return publisher.kept
+    is_as_asked = {publisher.kept for publisher in own} == {parameters.depth}
+    return parameters.depth if is_as_asked else None
 
 
 class Compatible(Parameters):
@@ -332,43 +336,50 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
     what the publishers offer that are there when it is created. Only the process itself can declare
     that.
     """
-    kind, other = Kind(parameters.kind), parameters.other
+    kind = Kind(parameters.kind)
     stop_if(why_no_endpoint(recording, kind, parameters.topic))
     endpoints = recording.student_endpoints(kind, parameters.topic)
     if not endpoints:
         return Finding.ours(f"the {kind.value} was not discovered")
     for endpoint in endpoints:
-        pair = sides(kind, endpoint.qos, parameters.peer)
-        refused = refusals(*pair)
-        own = f"the {kind.value} of {code(endpoint.node)}"
-        left_open = _left_open(recording, endpoint, pair)
-        mistake = "matches"
-        if refused and parameters.expect == "match":
-            observed = f"{own} does not match such a {other}: {', '.join(refused)}"
-            mistake = "offers_less"
-        elif refused and left_open:
-            taken = ", ".join(str(getattr(endpoint.qos, policy)) for policy in left_open)
-            observed = (
-                f"{own} requests the best available {' and '.join(left_open)}, declared by the "
-                "process. It then takes what the publishers offer when it is created, here "
-                f"{taken}. Alone with such a publisher it would match"
-            )
-        elif not refused and parameters.expect == "refuse":
-            observed = (
-                f"{own} matches such a {other}: no policy that is offered is weaker than the one "
-                "that is requested"
-            )
-        else:
-            continue
-        evidence = Evidence(
-            moments=endpoints_seen(recording, (endpoint,)), tables=(compatibility_table(*pair),)
-        )
-        return mistaken(mistake, observed, evidence, kind=kind.value)
+        stop_if(_why_otherwise(recording, parameters, endpoint))
     pair = sides(kind, endpoints[0].qos, parameters.peer)
     return Finding.as_asked(
         ", ".join(refusals(*pair)) or "every policy is compatible",
         Evidence(tables=(compatibility_table(*pair),)),
     )
+
+
+def _why_otherwise(
+    recording: Recording, parameters: Compatible, endpoint: Endpoint
+) -> Finding | None:
+    """Why an endpoint matches the peer, or does not, where the other is expected; or None."""
+    kind, other = endpoint.kind.value, parameters.other
+    pair = sides(endpoint.kind, endpoint.qos, parameters.peer)
+    refused = refusals(*pair)
+    left_open = _left_open(recording, endpoint, pair)
+    own, mistake = f"the {kind} of {code(endpoint.node)}", "matches"
+    if parameters.expect == "match":
+        if not refused:
+            return None
+        observed = f"{own} does not match such a {other}: {', '.join(refused)}"
+        mistake = "offers_less"
+    elif not refused:
+        observed = (
+            f"{own} matches such a {other}: no policy that is offered is weaker than the one that "
+            "is requested"
+        )
+    elif left_open:
+        taken = ", ".join(str(getattr(endpoint.qos, policy)) for policy in left_open)
+        observed = (
+            f"{own} requests the best available {' and '.join(left_open)}, declared by the "
+            "process. It then takes what the publishers offer when it is created, here "
+            f"{taken}. Alone with such a publisher it would match"
+        )
+    else:
+        return None
+    moments, table = endpoints_seen(recording, (endpoint,)), compatibility_table(*pair)
+    return mistaken(mistake, observed, Evidence(moments=moments, tables=(table,)), kind=kind)
 
 
 def _left_open(recording: Recording, endpoint: Endpoint, pair: tuple[Qos, Qos]) -> tuple[str, ...]:
@@ -386,7 +397,8 @@ def _left_open(recording: Recording, endpoint: Endpoint, pair: tuple[Qos, Qos]) 
 
 def _profile_words(qos: Qos) -> str:
     words = [qos.reliability, qos.durability]
-    words += [qos.liveliness] if qos.liveliness == "manual_by_topic" else []
+    if qos.liveliness == "manual_by_topic":
+        words.append(qos.liveliness)
     durations = {"deadline": qos.deadline_s, "liveliness lease": qos.liveliness_lease_s}
     words += [f"{name} {item:g} s" for name, item in durations.items() if item is not None]
     return ", ".join(words)

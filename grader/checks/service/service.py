@@ -143,13 +143,15 @@ def _why_other_response(
     shown = evidence_at(recording, called, call.requested_ns)
     other = unlike(response, parameters.response, parameters.tolerance)
     wrong = why_other_fields(seen, "response", response, other, shown)
+    if wrong is not None:
+        return wrong
     lacking = [
         f"{path} = {value_at(response, path)!r} without “{word}”"
         for path, word in parameters.contains.items()
         if word.casefold() not in str(value_at(response, path)).casefold()
     ]
-    if wrong or not lacking:
-        return wrong
+    if not lacking:
+        return None
     return mistaken("other_text", f"{seen} {' and '.join(lacking)}", shown)
 
 
@@ -222,7 +224,7 @@ def _why_other_order(
     gap_s, takes_s = _gap_s(pair), parameters.takes
     side_by_side = parameters.calls == "side_by_side"
     together, far_apart = gap_s <= _TOGETHER * takes_s, gap_s >= _APART * takes_s
-    if together if side_by_side else far_apart:
+    if (side_by_side and together) or (far_apart and not side_by_side):
         return None
     seen = f"the answers to two calls at once came {format_duration(gap_s)} apart"
     ended_ns = max(call.answered_ns or 0 for call in pair)
@@ -235,13 +237,13 @@ def _why_other_order(
     if in_doubt:
         return Finding.held_up(seen, stolen_s)
     shown = _evidence(recording, pair)
-    if not (together or far_apart):
-        seen = f"{seen}: neither together nor one processing time apart"
+    if not together and not far_apart:
+        seen += ": neither together nor one processing time apart"
         return mistaken("other_duration", seen, shown, takes=format_duration(takes_s))
     executors = sorted({str(item.data.get("executor")) for item in recording.declared("spin")})
     declared = f"; the process declared a {codes(executors)}" if executors else ""
-    if not side_by_side:
-        seen = f"{seen}, so both were processed at the same time{declared}"
-        return mistaken("side_by_side", seen, shown)
-    seen = f"{seen}, so the second call waited until the first was answered{declared}"
-    return mistaken("one_after_another", seen, shown)
+    if side_by_side:
+        seen += f", so the second call waited until the first was answered{declared}"
+        return mistaken("one_after_another", seen, shown)
+    seen += f", so both were processed at the same time{declared}"
+    return mistaken("side_by_side", seen, shown)
