@@ -115,7 +115,7 @@ class Check:
 
 
 class Unmet(Exception):
-    """Ends a check with what it found; only :func:`stop_if` raises it."""
+    """Ends a check with what it found; :func:`stop_if` and :func:`stop_if_any` raise it."""
 
     def __init__(self, found: Finding) -> None:
         super().__init__()
@@ -135,8 +135,10 @@ def stop_if_any(findings: Iterable[Finding | None]) -> None:
     """
     undecided = None
     for found in findings:
-        if found is not None and found.status is not Status.ERROR:
-            stop_if(found)
+        if found is None:
+            continue
+        if found.status is not Status.ERROR:
+            raise Unmet(found)
         undecided = undecided or found
     stop_if(undecided)
 
@@ -160,9 +162,9 @@ def check(
                 found = Finding.ours(f"the assignment expects what cannot be: {error}")
             if not isinstance(found, Finding):
                 return found  # An instructor's own check is not typed: judging says what it is.
-            named = found.concept or (concept if found.status is Status.FAILED else "")
+            page = concept if found.status is Status.FAILED else ""
             expected = found.expected or parameters.asked_of(subject)
-            return replace(found, expected=expected, concept=named)
+            return replace(found, expected=expected, concept=found.concept or page)
 
         return Check(name, subject, parameters, judged, concept)
 
@@ -179,5 +181,6 @@ def toleranced(
 ) -> Iterator[NamedFields]:
     """The fields below one key of ``with``, and those that have a tolerance of their own."""
     yield NamedFields((key,), endpoint, fields, part, tolerance)
-    for path in tolerance if isinstance(tolerance, Mapping) else ():
-        yield NamedFields(("tolerance", path), endpoint, path, part)
+    if isinstance(tolerance, Mapping):
+        for path in tolerance:
+            yield NamedFields(("tolerance", path), endpoint, path, part)

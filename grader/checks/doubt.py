@@ -17,16 +17,18 @@ HELD_UP_S = 0.1
 
 def is_doubtful(recording: Recording, doubt: Doubt | None) -> bool:
     """Whether the failure of a check may be an accident of its run."""
-    return _was_signalled(recording) or (
-        _was_out_of_hand(recording)
-        if doubt is Doubt.STEERING_HELD_UP
-        else doubt is Doubt.ANSWER_MISSED and _did_not_meet(recording)
-    )
+    if _was_signalled(recording):
+        return True
+    if doubt is Doubt.STEERING_HELD_UP:
+        return _was_out_of_hand(recording)
+    return doubt is Doubt.ANSWER_MISSED and _did_not_meet(recording)
 
 
 def _was_signalled(recording: Recording) -> bool:
     """Whether a signal ended a process that another process may have sent."""
-    return not any(breach.ended for breach in recording.breaches) and any(
+    if any(breach.ended for breach in recording.breaches):
+        return False
+    return any(
         process.stopped_by == "itself" and process.exit_code in (-signal.SIGKILL, -signal.SIGSTOP)
         for process in recording.processes
     )

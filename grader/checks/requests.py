@@ -91,29 +91,33 @@ def judged_requests(
         Unmet: There is none, or one could not be sent.
         NoSuchField: A request cannot have such a field.
     """
-    own = [one for one in sent if name == (one.action if isinstance(one, Goal) else one.service)]
+    own = [one for one in sent if _asked_name(one) == name]
     stop_if(why_not_offered(recording, kind, name, own[0].type if own else None))
     failed = next((one.error for one in own if one.error not in ("", NO_SERVER)), None)
     if failed:
         stop_if(Finding.ours(f"{code(name)} could not be asked: {failed}"))
-    found = tuple(one for one in own if not unlike(_content(one), fields, EXACT) and is_judged(one))
-    if not found:
+    judged = [one for one in own if not unlike(_content(one), fields, EXACT) and is_judged(one)]
+    if not judged:
         request = "call" if kind is SERVICE else "goal"
         which = f" with {words(fields)}" if fields else ""
         never = f"the probe sent no such {request}{which} to {code(name)}"
         stop_if(why_ended(recording) or Finding.undecided(never))
-    for one in found:
+    for one in judged:
         if one.error:
             stop_if(why_not_met(recording, kind, name, _sent_ns(one)))
-    return found
+    return tuple(judged)
 
 
-def _content(one: Call | Goal) -> Mapping[str, Any]:
-    return one.goal if isinstance(one, Goal) else one.request or {}
+def _asked_name(request: Call | Goal) -> str:
+    return request.action if isinstance(request, Goal) else request.service
 
 
-def _sent_ns(one: Call | Goal) -> int:
-    return one.sent_ns if isinstance(one, Goal) else one.requested_ns
+def _content(request: Call | Goal) -> Mapping[str, Any]:
+    return request.goal if isinstance(request, Goal) else request.request or {}
+
+
+def _sent_ns(request: Call | Goal) -> int:
+    return request.sent_ns if isinstance(request, Goal) else request.requested_ns
 
 
 def why_other_fields(
@@ -143,14 +147,14 @@ def why_other_fields(
 
 def timeline(recording: Recording, title: str, steps: Iterable[tuple[int, str]]) -> Evidence:
     """What happened when, as a table and as moments; what follows a colon is for the table only."""
-    found = [
-        (recording.since_launch_s(at_ns), text)
-        for at_ns, text in sorted(steps, key=lambda step: step[0])
+    in_order = [
+        (recording.since_launch_s(time_ns), text)
+        for time_ns, text in sorted(steps, key=lambda step: step[0])
     ]
-    rows = tuple((f"{at_s:.2f} s", text) for at_s, text in found)
+    rows = tuple((f"{time_s:.2f} s", text) for time_s, text in in_order)
     moments = [
-        Moment(text.partition(":")[0], at_s)
-        for at_s, text in found
+        Moment(text.partition(":")[0], time_s)
+        for time_s, text in in_order
         if not text.startswith("feedback")
     ]
     table = Table(title, ("since launch", "what happened"), rows[:_MOST_ROWS])

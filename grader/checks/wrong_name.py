@@ -70,17 +70,14 @@ def misnamed(
     if own == asked or not parameters.remap:
         return None
     names = parameters.wrong(own)
-    how = f", with `--ros-args -r {' -r '.join(names.rules)}` to correct the name"
-    is_there = thing is Thing.NODE and own.rpartition("/")[2] == asked.rpartition("/")[2]
-    failed = mistaken(
-        "other_namespace" if is_there else "other_name",
-        f"found {code(own)} instead; everything else was judged in a second run"
-        + (how if len(names.rules) <= _MOST_RULES else " that corrects the name"),
-        shown,
-        thing=thing.value,
-        name=asked.rpartition("/")[0] or "/" if is_there else _written(thing, asked),
-    )
-    return replace(failed, names=names)
+    how = " that corrects the name"
+    if len(names.rules) <= _MOST_RULES:
+        how = f", with `--ros-args -r {' -r '.join(names.rules)}` to correct the name"
+    mistake, name = "other_name", _written(thing, asked)
+    if thing is Thing.NODE and name == _written(thing, own):
+        mistake, name = "other_namespace", asked.rpartition("/")[0] or "/"
+    seen = f"found {code(own)} instead; everything else was judged in a second run{how}"
+    return replace(mistaken(mistake, seen, shown, thing=thing.value, name=name), names=names)
 
 
 def _written(thing: Thing, name: str) -> str:

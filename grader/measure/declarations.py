@@ -103,14 +103,14 @@ def in_no_executor(recording: Recording, node: str) -> bool:
 
 def exiting_ns(recording: Recording, process: str) -> int | None:
     """When a process began to end in its usual way, or None where it did not."""
-    began = [item for item in recording.declared("started") if item.process == process]
+    started = [item for item in recording.declared("started") if item.process == process]
+    if not started:
+        return None
     # A process may have been started again, and children may have ended under its name.
-    ends = [
-        item.time_ns
-        for item in recording.declared("exiting")
-        if began and item.process == process and item.data.get("pid") == began[-1].data.get("pid")
-    ]
-    return ends[0] if ends else None
+    ends_ns = (
+        item.time_ns for item in recording.declared("exiting") if _same_process(item, started[-1])
+    )
+    return next(ends_ns, None)
 
 
 def timers(recording: Recording) -> tuple[DeclaredTimer, ...]:
@@ -156,43 +156,50 @@ def dropped_ns(recording: Recording, kind: Kind, topic: str) -> int | None:
     made before the executor spun, and is destroyed afterwards, was kept and ended on purpose; so
     was what lived for longer.
     """
-    ends = []
+    ends_ns = []
     for made in _on(recording, kind, topic):
         end = destroyed(recording, made)
-        spun = [one.time_ns for one in recording.declared("spin") if _same_process(one, made)]
-        # One that wait_for_message() makes and destroys.
+        # A brief one is made and destroyed by wait_for_message().
         if end is None or made.data.get("brief") or end.data.get("brief"):
             return None
-        if any(made.time_ns < one < end.time_ns for one in spun[:1]):
+        spun_ns = [item.time_ns for item in recording.declared("spin") if _same_process(item, made)]
+        if spun_ns and made.time_ns < spun_ns[0] < end.time_ns:
             return None
         if _lived_s(recording, made, end) > _MOMENT_S:
             return None
-        ends.append(end.time_ns)
-    return max(ends, default=None)
+        ends_ns.append(end.time_ns)
+    return max(ends_ns, default=None)
 
 
 def _lived_s(recording: Recording, made: Declaration, end: Declaration) -> float:
     """How long the program had an endpoint, without what the tracer and the machine waited."""
-    held, leaving = (
-        [
-            one.time_ns
-            for one in recording.declared(kind)
-            if _same_process(one, made)
-            and made.time_ns < one.time_ns < end.time_ns
-            and one.data.get("topic") in (None, made.data.get("topic"))
-        ]
-        for kind in ("held", "leaving")
-    )
-    begin_ns, end_ns = max(held, default=made.time_ns), min(leaving, default=end.time_ns)
+    # The tracer held the endpoint until here, and the program began to leave there.
+    begin_ns = max(_times_between(recording, "held", made, end), default=made.time_ns)
+    end_ns = min(_times_between(recording, "leaving", made, end), default=end.time_ns)
     return (end_ns - begin_ns) / NS - recording.stolen_s(begin_ns, end_ns)
+
+
+def _times_between(
+    recording: Recording, kind: str, made: Declaration, end: Declaration
+) -> list[int]:
+    """When a process declared something about an endpoint that it had."""
+    return [
+        item.time_ns
+        for item in recording.declared(kind)
+        if _same_process(item, made)
+        and made.time_ns < item.time_ns < end.time_ns
+        and item.data.get("topic") in (None, made.data.get("topic"))
+    ]
 
 
 def destroyed(recording: Recording, made: Declaration) -> Declaration | None:
     """What a process declared when it destroyed an endpoint, while it was observed."""
     number = made.data.get("number")
-    for item in recording.declared("destroyed") if number is not None else ():
-        is_it = _same_process(item, made) and item.data.get("number") == number
-        if is_it and item.time_ns < recording.stop_ns:
+    if number is None:
+        return None
+    for item in recording.declared("destroyed"):
+        is_same = _same_process(item, made) and item.data.get("number") == number
+        if is_same and item.time_ns < recording.stop_ns:
             return item
     return None
 

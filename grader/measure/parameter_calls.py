@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, repeat
@@ -92,17 +93,25 @@ def misnamed_parameters(recording: Recording, asked: Collection[str]) -> dict[st
 
     They have most words in common, or nearly the same letters; each is meant once.
     """
-    nodes = recording.student_nodes
-    declared = {name for node in nodes for name in names(recording, node.name)}
-    others = {name.lower(): name for name in sorted(declared - {*recording.given_parameters})}
-    found: dict[str, str] = {}
+    declared = {name for node in recording.student_nodes for name in names(recording, node.name)}
+    unused = sorted(declared - {*recording.given_parameters})
+    likely = {}
     for name in undeclared(recording):
-        words = [len({*name.split("_")} & {*other.split("_")}) for other in others]
-        best = [one for one, common in zip(others, words, strict=True) if common == max(words) > 0]
-        likely = best[0] if len(best) == 1 else nearest(name, best or others)
-        if name in asked and likely:
-            found[name] = others[likely]
-    return {one: other for one, other in found.items() if [*found.values()].count(other) == 1}
+        meant = _meant(name, unused)
+        if name in asked and meant is not None:
+            likely[name] = meant
+    meant_once = Counter(likely.values())
+    return {name: meant for name, meant in likely.items() if meant_once[meant] == 1}
+
+
+def _meant(name: str, others: Sequence[str]) -> str | None:
+    """Which of some parameters has most words in common with a name, or nearly the same letters."""
+    lower = {other.lower(): other for other in others}
+    common = {other: len({*name.split("_")} & {*other.split("_")}) for other in lower}
+    most = max(common.values(), default=0)
+    best = [other for other in lower if common[other] == most > 0]
+    likely = best[0] if len(best) == 1 else nearest(name, best or list(lower))
+    return lower[likely] if likely else None
 
 
 def descriptor(recording: Recording, node: str, name: str) -> Descriptor | None:
@@ -125,28 +134,26 @@ def descriptor(recording: Recording, node: str, name: str) -> Descriptor | None:
 
 def readings(recording: Recording, node: str, name: str) -> tuple[Reading, ...]:
     """What a parameter's value was, each time that the probe asked for it."""
-    return tuple(
-        Reading(call, _value(value))
-        for call in calls_to(recording, node, "get_parameters")
-        for asked, value in zip(
-            (call.request or {})["names"], _answered(call, "values"), strict=False
-        )
-        if asked == name
-    )
+    found = []
+    for call in calls_to(recording, node, "get_parameters"):
+        asked = (call.request or {})["names"]
+        for other, value in zip(asked, _answered(call, "values"), strict=False):
+            if other == name:
+                found.append(Reading(call, _value(value)))
+    return tuple(found)
 
 
 def settings(recording: Recording, node: str, name: str) -> tuple[Setting, ...]:
     """Every attempt to set a parameter."""
-    return tuple(
-        Setting(call, _value(wanted["value"]), result["successful"], result["reason"])
-        for call in calls_to(recording, node, "set_parameters")
-        for wanted, result in zip(
-            (call.request or {})["parameters"],
-            chain(_answered(call, "results"), repeat(_NO_RESULT)),
-            strict=False,
-        )
-        if wanted["name"] == name
-    )
+    found = []
+    for call in calls_to(recording, node, "set_parameters"):
+        asked = (call.request or {})["parameters"]
+        results = chain(_answered(call, "results"), repeat(_NO_RESULT))
+        for wanted, result in zip(asked, results, strict=False):
+            if wanted["name"] == name:
+                value, accepted = _value(wanted["value"]), result["successful"]
+                found.append(Setting(call, value, accepted, result["reason"]))
+    return tuple(found)
 
 
 def _answered(call: Call, key: str) -> Sequence[Any]:

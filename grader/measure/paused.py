@@ -13,7 +13,11 @@ _GRACE = 0.4
 
 @dataclass(frozen=True)
 class Paused:
-    """The pause of the processes that publish on a topic, and what came on the topic meanwhile."""
+    """The pause of the processes that publish on a topic.
+
+    Attributes:
+        uncalled_ns: When messages came on it although no executor called anything.
+    """
 
     began_ns: int
     ended_ns: int
@@ -34,21 +38,22 @@ class Paused:
 def paused(recording: Recording, topic: str) -> Paused | None:
     """How the processes with a publisher on a topic paused, or None where one did not."""
     pause = recording.pauses[-1]
-    # Of a process that was started again, the newest counts.
-    publish = {one.process: _who(one) for one in publishers(recording, topic)}
-    began = {
-        _who(one): one.time_ns
+    # By name: of a process that was started again, the newest counts.
+    publishing = {one.process: _process_of(one) for one in publishers(recording, topic)}
+    began_ns = {
+        _process_of(one): one.time_ns
         for one in recording.declared("paused")
-        if pause.began_ns <= one.time_ns <= pause.ended_ns and one.process in publish
+        if pause.began_ns <= one.time_ns <= pause.ended_ns and one.process in publishing
     }
-    # A helper that only publishes has no executor.
-    spun = {_who(one) for one in recording.declared("spin")}
-    if not began or not spun & set(publish.values()) <= began.keys():
+    # A helper that only publishes has no executor, so nothing of it can pause.
+    spun = {_process_of(one) for one in recording.declared("spin")}
+    must_pause = spun & set(publishing.values())
+    if not began_ns or not must_pause <= began_ns.keys():
         return None
-    began_ns = max(began.values())
-    from_ns = began_ns + _GRACE * (pause.ended_ns - began_ns)
-    times = pause.received.get(topic, ())
-    return Paused(began_ns, pause.ended_ns, tuple(one for one in times if one > from_ns))
+    all_began_ns = max(began_ns.values())
+    judged_ns = all_began_ns + _GRACE * (pause.ended_ns - all_began_ns)
+    uncalled_ns = (time_ns for time_ns in pause.received.get(topic, ()) if time_ns > judged_ns)
+    return Paused(all_began_ns, pause.ended_ns, tuple(uncalled_ns))
 
 
 def publishers(recording: Recording, topic: str) -> list[Declaration]:
@@ -57,20 +62,23 @@ def publishers(recording: Recording, topic: str) -> list[Declaration]:
     Those that were destroyed before are left out where others are left.
     """
     began_ns = recording.pauses[-1].began_ns
-    left = {_who(one) for one in recording.declared("exiting") if one.time_ns < began_ns}
-    ran = {
-        one.name
-        for one in recording.processes
-        if one.exited_ns is None or one.exited_ns >= began_ns
+    ended = {_process_of(one) for one in recording.declared("exiting") if one.time_ns < began_ns}
+    running = {
+        process.name
+        for process in recording.processes
+        if process.exited_ns is None or process.exited_ns >= began_ns
     }
     found = [
         one
         for one in recording.declared("publisher")
-        if one.data.get("topic") == topic and one.process in ran and _who(one) not in left
+        if one.data.get("topic") == topic
+        and one.process in running
+        and _process_of(one) not in ended
     ]
     kept = [one for one in found if destroyed(recording, one) is None]
     return kept or found
 
 
-def _who(declared: Declaration) -> tuple[str, str]:
+def _process_of(declared: Declaration) -> tuple[str, str]:
+    """Which process declared something: its name, and the pid of this start of it."""
     return declared.process, str(declared.data.get("pid"))
