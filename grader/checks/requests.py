@@ -23,13 +23,7 @@ from grader.diagnosis.no_endpoint import (
     why_not_offered,
 )
 from grader.diagnosis.process.process_exit import why_ended
-from grader.findings.fields import (
-    difference_table,
-    difference_words,
-    fields_hint,
-    unlike,
-    words,
-)
+from grader.findings.fields import difference_table, difference_words, fields_hint, unlike, words
 from grader.findings.finding import Evidence, Finding, Moment, Table
 from grader.findings.value import EXACT, Difference
 from grader.findings.words import code

@@ -15,7 +15,10 @@ EXACT = 1e-9
 _FLOAT32_MAX = 3.4028234663852886e38
 
 _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
-    **{">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt},
+    ">=": operator.ge,
+    "<=": operator.le,
+    ">": operator.gt,
+    "<": operator.lt,
 }
 _FORM = re.compile(r"(>=|<=|>|<|!=|)\s*(.*)", re.DOTALL)
 _BETWEEN = ".."
@@ -78,15 +81,23 @@ def meets(text: str, observed: float, tolerance: float, find: Find, circle: floa
     numbers = [bound.value(find) for bound in bounds]
     if not all(isinstance(number, int | float) for number in numbers):
         raise TypeError("not a number")
-    first, last = numbers[0], numbers[-1]
     if sign == _BETWEEN:
-        turned = first + (observed - first) % circle if circle else observed
-        ends = any(is_near(end, observed, EXACT, circle) for end in numbers)
-        return ends or first <= turned <= last
-    if sign in ("", "!="):
-        same = is_near(first, observed, tolerance, circle)
-        return same if not sign else not same and not math.isnan(observed)
+        return _is_between(numbers[0], numbers[1], observed, circle)
+    bound = numbers[0]
+    if sign == "":
+        return is_near(bound, observed, tolerance, circle)
+    if sign == "!=":
+        return not math.isnan(observed) and not is_near(bound, observed, tolerance, circle)
     # The float32 that is nearest to a bound is the bound.
-    if is_near(first, observed, EXACT if "=" in sign else 0.0):
+    if is_near(bound, observed, EXACT if "=" in sign else 0.0):
         return "=" in sign
-    return _COMPARISONS[sign](observed, first)
+    return _COMPARISONS[sign](observed, bound)
+
+
+def _is_between(low: float, high: float, observed: float, circle: float) -> bool:
+    """Whether a number is in a range with its ends; of an angle, on the way from low to high."""
+    if is_near(low, observed, EXACT, circle) or is_near(high, observed, EXACT, circle):
+        return True
+    if circle:
+        observed = low + (observed - low) % circle
+    return low <= observed <= high

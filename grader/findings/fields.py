@@ -10,17 +10,13 @@ from pydantic import Field
 from grader.findings.condition import is_comparison
 from grader.findings.finding import Table
 from grader.findings.text import is_asked_of_text, text_words
-from grader.findings.value import (
-    Difference,
-    FieldPath,
-    Tolerance,
-    differences,
-    expected_leaves,
-)
+from grader.findings.value import Difference, FieldPath, Tolerance, differences, expected_leaves
 from grader.findings.words import codes, value_text, worded
 from grader.recording.interaction import Goal
 
 _MOST_FIELDS = 6
+_MOST_IN_WORDS = 4
+_MOST_ROWS = 50
 
 _Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 FieldTolerance = Annotated[
@@ -56,9 +52,8 @@ def unlike(
 
 def words(value: Mapping[str, Any]) -> str:
     """Write fields as ``a = 2, b = 3``; ``nothing`` for none."""
-    return (
-        ", ".join(f"{path} {wanted_words(item)}" for path, item in each_field(value)) or "nothing"
-    )
+    fields = [f"{path} {wanted_words(item)}" for path, item in each_field(value)]
+    return ", ".join(fields) or "nothing"
 
 
 def within_words(tolerance: Tolerance) -> str:
@@ -90,8 +85,10 @@ def instead(item: Difference) -> str:
 def _expected_text(item: Difference) -> str:
     if is_asked_of_text(item.expected):
         return f"a text that {text_words(item.expected)}"
-    is_condition = isinstance(item.expected, str) and isinstance(item.observed, int | float | None)
-    return str(item.expected) if is_condition else value_text(item.expected)
+    # A text that is expected of a number is a condition, such as `> 0`, and has no quotes.
+    if isinstance(item.expected, str) and isinstance(item.observed, int | float | None):
+        return item.expected
+    return value_text(item.expected)
 
 
 def the_goal(goal: Goal) -> str:
@@ -128,11 +125,11 @@ def fields_hint(what: str, value: Mapping[str, Any], wrong: Sequence[str]) -> st
 
 
 def difference_words(found: Sequence[Difference]) -> str:
-    """Write differences as ``sum = 4 instead of 5``."""
-    return ", ".join(map(instead, found[:4]))
+    """Write the first differences as ``sum = 4 instead of 5, count = 1 instead of 2``."""
+    return ", ".join(map(instead, found[:_MOST_IN_WORDS]))
 
 
 def difference_table(title: str, found: Sequence[Difference]) -> Table:
     """The same as a table."""
     rows = ((item.field, _expected_text(item), value_text(item.observed)) for item in found)
-    return Table(title, ("field", "expected", "observed"), tuple(rows)[:50])
+    return Table(title, ("field", "expected", "observed"), tuple(rows)[:_MOST_ROWS])

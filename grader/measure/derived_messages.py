@@ -85,7 +85,8 @@ class DerivedMessages:
             due_ns = message.stamp_ns - round(within_s * NS)
             begin_ns = recording.own_begin_ns(message.stamp_ns, within_s)
             # Where the source is silent its newest values stay the right ones.
-            first, due = (min(bisect_left(stamps, at), last - 1) for at in (begin_ns, due_ns))
+            first = min(bisect_left(stamps, begin_ns), last - 1)
+            due = min(bisect_left(stamps, due_ns), last - 1)
             is_known = last < len(stamps) and lost_before[first] == lost_before[last]
             window = range(first, last)
             errors = self.errors(values, window)

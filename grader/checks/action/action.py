@@ -20,13 +20,7 @@ from grader.checks.check import (
     toleranced,
 )
 from grader.checks.need import Act, Doubt, Stimulated
-from grader.checks.requests import (
-    Offered,
-    is_offered,
-    judged_requests,
-    timeline,
-    why_other_fields,
-)
+from grader.checks.requests import Offered, is_offered, judged_requests, timeline, why_other_fields
 from grader.diagnosis.explanation import cause_of, mistaken, remedy
 from grader.diagnosis.no_answer import NoAnswer, why_late
 from grader.diagnosis.no_endpoint import ACTION

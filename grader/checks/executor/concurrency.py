@@ -19,12 +19,7 @@ from grader.diagnosis.wrong_executor import GROUP, MULTI, SINGLE, OtherExecution
 from grader.findings.finding import Evidence, Finding, Moment, moment
 from grader.findings.words import code, codes, counted, group_class, listing
 from grader.measure.callback_runs import Event, Run, overlaps, paired, spans, timed
-from grader.measure.declarations import (
-    executors,
-    hides_calls,
-    traced,
-    was_held_up,
-)
+from grader.measure.declarations import executors, hides_calls, traced, was_held_up
 from grader.recording.model import NS, Recording
 from grader.spec.unit import Dimension, parse_quantity
 

@@ -48,21 +48,23 @@ def graph(recording: Recording, parameters: Graph) -> Finding:
     stop_if(why_no_node(recording))
     for name in parameters.nodes:
         stop_if(why_not_node(recording, name))
-    nodes = written_nodes(recording)
-    more = [one for one in nodes if one.name not in parameters.nodes]
-    if more:
-        seen = f"{codes(sorted({one.name for one in more}))} is started, too"
-        return mistaken("more_nodes", seen, Evidence(moments=nodes_seen(recording)))
-    ends = [one for kind in Kind for one in recording.student_endpoints(kind)]
-    own = {one.topic for one in ends if one.node in parameters.nodes and "/_" not in one.topic}
-    topics = own.difference(_OF_EVERY_NODE)
+    started = {node.name for node in written_nodes(recording)}
+    evidence = Evidence(moments=nodes_seen(recording))
+    others = started.difference(parameters.nodes)
+    if others:
+        return mistaken("more_nodes", f"{codes(sorted(others))} is started, too", evidence)
+    topics = {
+        endpoint.topic
+        for kind in Kind
+        for endpoint in recording.student_endpoints(kind)
+        if endpoint.node in parameters.nodes and "/_" not in endpoint.topic
+    }.difference(_OF_EVERY_NODE)
     wanted = topics if parameters.topics is None else set(parameters.topics)
     if topics != wanted:
-        lacking, others = codes(sorted(wanted - topics)), codes(sorted(topics - wanted))
-        seen = f"lacking: {lacking or 'no topic'}; beyond that there is: {others or 'no topic'}"
-        return mistaken("other_topics", seen, Evidence(moments=nodes_seen(recording)))
-    started = f"{codes(sorted({one.name for one in nodes}))} and no other node"
-    return Finding.as_asked(started, Evidence(moments=nodes_seen(recording)))
+        lacking, beyond = codes(sorted(wanted - topics)), codes(sorted(topics - wanted))
+        seen = f"lacking: {lacking or 'no topic'}; beyond that there is: {beyond or 'no topic'}"
+        return mistaken("other_topics", seen, evidence)
+    return Finding.as_asked(f"{codes(sorted(started))} and no other node", evidence)
 
 
 class Arguments(Parameters):
@@ -87,15 +89,17 @@ _DEFAULT = re.compile(r" +\(default: (?P<default>.*)\)")
 def shown_arguments(lines: Iterable[str]) -> dict[str, tuple[str, str]]:
     """What `ros2 launch --show-args` prints: name -> description and default, or empty texts."""
     found: dict[str, tuple[str, str]] = {}
-    name = ""
+    name = description = ""
     for line in lines:
-        if argument := _ARGUMENT.fullmatch(line):
-            name = argument["name"]
+        argument, default = _ARGUMENT.fullmatch(line), _DEFAULT.fullmatch(line)
+        if argument:
+            name, description = argument["name"], ""
             found[name] = ("", "")
-        elif name and (default := _DEFAULT.fullmatch(line)):
-            found[name] = (found[name][0], default["default"])
+        elif name and default:
+            found[name] = (description, default["default"])
         elif name and line.startswith("     "):
-            found[name] = (f"{found[name][0]} {line.strip()}".strip(), found[name][1])
+            description = f"{description} {line.strip()}".strip()
+            found[name] = (description, found[name][1])
     return found
 
 

@@ -13,13 +13,7 @@ from grader.diagnosis.explanation import cause_of, explain, mistaken
 from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
 from grader.diagnosis.wrong_order import WrongOrder, plain
 from grader.diagnosis.wrong_value import WrongValue, was_integer
-from grader.findings.fields import (
-    FieldTolerance,
-    difference_table,
-    instead,
-    within_words,
-    words,
-)
+from grader.findings.fields import FieldTolerance, difference_table, instead, within_words, words
 from grader.findings.finding import Evidence, Finding, Table, moment
 from grader.findings.value import (
     EXACT,

@@ -53,36 +53,39 @@ def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
     """
     run = parameters.approach(recording)
     stray = _stray(run, parameters.arrival(run), parameters.speed)
-    evidence = Evidence(plots=(speed_plot(recording), run.distance_plot))
+    plots = speed_plot(recording), run.distance_plot
     way = sum(way_m(pair) for pair in stray)
-    fastest = 0.0 if recording.scene is None else recording.scene.max_linear_m_s
-    if way <= max(_RUN_OUT_M, _RUN_OUT_S * fastest):
+    top_speed = 0.0 if recording.scene is None else recording.scene.max_linear_m_s
+    if way <= max(_RUN_OUT_M, _RUN_OUT_S * top_speed):
         seen = f"drove {metres(way)} after it had begun to turn"
-        return Finding.as_asked(seen, evidence)
+        return Finding.as_asked(seen, Evidence(plots=plots))
     first = stray[0][1]
-    fastest = max((abs(after.command_m_s) for _, after in stray))
+    fastest = max(abs(after.command_m_s) for _, after in stray)
     when_s = recording.since_launch_s(first.time_ns)
     return why_off_course(recording) or mistaken(
         "drives_and_turns",
         f"drove {metres(way)} while it turned at the goal, commanded with up to {speed(fastest)} "
         f"(from {when_s:.2f} s after launch)",
-        evidence_at(recording, "drives again", first.time_ns, *evidence.plots),
+        evidence_at(recording, "drives again", first.time_ns, *plots),
     )
 
 
 def _stray(run: Approach, arrival: int, none_m_s: float) -> list[tuple[Truth, Truth]]:
     """Pairs of steps between which the robot drives where it should only turn."""
     found = []
-    turning = False
-    still_since: int | None = None
+    only_turns = False
+    still_since_ns: int | None = None
     for before, after in pairwise(run.truth[arrival:]):
-        if abs(after.command_m_s) <= none_m_s:
-            still_since = still_since or after.time_ns
-            turning |= after.time_ns - still_since >= _PAUSE_NS and _turns_away(run, after)
+        turns_away = _turns_away(run, after)
+        if abs(after.command_m_s) > none_m_s:
+            still_since_ns = None
+            if only_turns or turns_away:
+                found.append((before, after))
             continue
-        still_since = None
-        if turning or _turns_away(run, after):
-            found.append((before, after))
+        if still_since_ns is None:
+            still_since_ns = after.time_ns
+        if turns_away and after.time_ns - still_since_ns >= _PAUSE_NS:
+            only_turns = True
     return found
 
 
@@ -134,8 +137,9 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
         ]
     evidence = Evidence(plots=(run.heading_plot,))
     if not detours:
-        # A robot that drives off has shown nothing of how it turns to this goal.
-        stop_if(why_not_there(run, parameters.position) if arrival is None else None)
+        if arrival is None:
+            # A robot that drives off has shown nothing of how it turns to this goal.
+            stop_if(why_not_there(run, parameters.position))
         return Finding.as_asked("it never turned the long way", evidence)
     what, error_rad, step = detours[0]
     when_s = recording.since_launch_s(step.time_ns)

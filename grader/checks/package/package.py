@@ -68,10 +68,12 @@ def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding:
     """
     stop_if(why_no_manifest(submission, parameters.package))
     package = existing_package(submission, parameters.package)
-    if finding := why_misnamed(submission, parameters.package):
+    finding = why_misnamed(submission, parameters.package)
+    if finding is not None:
         seen = f"{finding.observed}; everything else was judged in this package"
         return replace(finding, observed=seen, names=parameters.wrong(package.name))
-    if breach := breach_of_rep_144(package.name):
+    breach = breach_of_rep_144(package.name)
+    if breach:
         return mistaken("bad_name", f"found in {code(package.path)}{breach}")
     if not parameters.build_type or package.build_type in parameters.build_type:
         return Finding.as_asked(f"found in {code(package.path)}")
@@ -132,12 +134,13 @@ def _names(submission: SubmissionRecord, parameters: Executable) -> Names:
     if why_not_built(submission, parameters.package) is not None:
         return NO_NAMES
     package, name = existing_package(submission, parameters.package), parameters.executable
-    there = [package.misplaced(name)]
-    if not there[0]:
-        there = [f"lib/{package.name}/{other}" for other in package.executables]
-    runs = len(there) == 1 and name not in package.executables and _FILE.fullmatch(there[0])
-    asked = f"lib/{package.name}/{name}"
-    return Names.of([WrongName(Thing.FILE, there[0], asked)] if runs else [])
+    misplaced = package.misplaced(name)
+    files = [f"lib/{package.name}/{other}" for other in package.executables]
+    if misplaced:
+        files = [misplaced]
+    if name in package.executables or len(files) != 1 or not _FILE.fullmatch(files[0]):
+        return NO_NAMES
+    return Names.of([WrongName(Thing.FILE, files[0], f"lib/{package.name}/{name}")])
 
 
 class Dependencies(OfPackage):
@@ -260,11 +263,8 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding:
     other = _meant(parameters.path, installed) if parameters.remap else None
     if other:
         seen = f"it installs {code(other)} instead; everything else was judged with that file"
-        found_there = mistaken("other_file", seen, file=name, folder=f"{package.name}/{folder}")
-        names = parameters.wrong(f"share/{package.name}/{other}")
-        return replace(found_there, names=names)
-    own = [path for path in submission.files if fnmatchcase(path.rpartition("/")[2], name)]
-    seen = f"{codes(own)} is handed in, but not installed; " if own else ""
+        instead = mistaken("other_file", seen, file=name, folder=f"{package.name}/{folder}")
+        return replace(instead, names=parameters.wrong(f"share/{package.name}/{other}"))
     line = f"install(DIRECTORY {folder} DESTINATION share/${{PROJECT_NAME}})` in CMakeLists.txt"
     if package.build_type != "ament_cmake":
         line = worded(
@@ -272,8 +272,13 @@ def file(submission: SubmissionRecord, parameters: File) -> Finding:
             "of setup.py",
             cpp=line,
         )
-    mistake = "not_installed" if own else "no_such_file"
-    return mistaken(mistake, f"{seen}it installs {codes(installed)}", line=line)
+    seen = f"it installs {codes(installed)}"
+    own = [path for path in submission.files if fnmatchcase(path.rpartition("/")[2], name)]
+    if not own:
+        return mistaken("no_such_file", seen, line=line)
+    return mistaken(
+        "not_installed", f"{codes(own)} is handed in, but not installed; {seen}", line=line
+    )
 
 
 def _meant(path: str, installed: Iterable[str]) -> str | None:
@@ -283,13 +288,13 @@ def _meant(path: str, installed: Iterable[str]) -> str | None:
     """
     asked = PurePosixPath(path)
     others = [PurePosixPath(one) for one in installed]
-    same = [str(one) for one in others if one.name == asked.name]
-    kind = [
+    of_that_name = [str(one) for one in others if one.name == asked.name]
+    of_that_kind = [
         str(one)
         for one in others
-        if (one.parent, one.suffixes) == (asked.parent, asked.suffixes) and asked.suffix
+        if asked.suffix and one.parent == asked.parent and one.suffixes == asked.suffixes
     ]
-    return meant(path, same or kind)
+    return meant(path, of_that_name or of_that_kind)
 
 
 class Tests(OfPackage):

@@ -133,8 +133,11 @@ def _why_other_descriptor(
         mistake = "integer_parameter" if is_integer else "other_parameter_type"
         declare = declare_parameter(parameters.name)
         return mistaken(mistake, f"it is {_article(found.type)}", shown, declare=declare)
-    wanted = [*(parameters.range or ()), *([] if parameters.step is None else [parameters.step])]
-    if wanted and not (found.range and same(wanted, found.range[: len(wanted)], _TOLERANCE)):
+    wanted = list(parameters.range or ())
+    if parameters.step is not None:
+        wanted.append(parameters.step)
+    has_range = found.range is not None and same(wanted, found.range[: len(wanted)], _TOLERANCE)
+    if wanted and not has_range:
         kind = "IntegerRange" if found.type == "integer" else "FloatingPointRange"
         seen = f"its range is {_range_words(found.range)}" if found.range else "it has no range"
         return mistaken("other_range", seen, shown, kind=kind)

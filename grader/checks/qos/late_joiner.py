@@ -7,12 +7,7 @@ from pydantic import Field
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.need import Act, Stimulated
 from grader.diagnosis.explanation import cause_of
-from grader.diagnosis.kept_history import (
-    OtherHistory,
-    TooFewKept,
-    TooManyKept,
-    UnpublishedBefore,
-)
+from grader.diagnosis.kept_history import OtherHistory, TooFewKept, TooManyKept, UnpublishedBefore
 from grader.diagnosis.no_messages import why_few
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Finding

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
 
@@ -37,8 +37,6 @@ from grader.recording.submission import (
 from grader.submission.read.lint import EXCLUDED
 
 _RULE = re.compile(r"[A-Z]+[0-9]*")
-
-
 _PLURALS = {"module": "modules", "class": "classes", "function": "functions"}
 
 
@@ -66,57 +64,60 @@ def docstrings(submission: SubmissionRecord, parameters: Docstrings) -> Finding:
     operators, and methods with `override` need none.
     """
     package, files = judged_package(submission, parameters.package)
-    documentable = [(file, one) for file in files for one in _documentable_python(file)]
-    documentable += _documentable_cpp([file for file in files if file.language == CPP])
-    judged = [
-        (documented, SourceError(file.path, line, text))
-        for file, (kind, documented, line, text) in documentable
-        if kind in parameters.of
-    ]
+    items = [item for file in files for item in _documentable_python(file)]
+    items += _documentable_cpp([file for file in files if file.language == CPP])
+    judged = [(item.documented, item.place) for item in items if item.kind in parameters.of]
     what = worded(python="a docstring", cpp="a comment for Doxygen")
     found = shared(parameters, judged, what, "no_docstring")
     return found if found.status is Status.PASSED else unless_unread(submission, package, found)
 
 
-_Item = tuple[str, bool, int, str]
-"""What should have a docstring: its kind, whether it has one, its line, and words for it."""
+class _Item(NamedTuple):
+    """What should have a docstring: a module, a class or a function."""
+
+    kind: str
+    documented: bool
+    place: SourceError
 
 
 def _documentable_python(file: SourceFile) -> Iterator[_Item]:
     if file.language == CPP:
         return
     if file.classes or file.functions or file.names or file.stars or file.prints:
-        yield "module", file.documented, 1, "the module"
-    for one in file.classes:
-        if _is_public(one.name):
-            yield "class", one.documented, one.line, f"the class {one.name}"
+        yield _Item("module", file.documented, SourceError(file.path, 1, "the module"))
+    for class_ in file.classes:
+        if _is_public(class_.name):
+            place = SourceError(file.path, class_.line, f"the class {class_.name}")
+            yield _Item("class", class_.documented, place)
     for function in file.functions:
         decorators = {name.rpartition(".")[2] for name in function.decorators}
         if _is_public(function.name) and not decorators & {"overload", "setter", "deleter"}:
-            yield "function", function.documented, function.line, f"{function.name}()"
+            place = SourceError(file.path, function.line, f"{function.name}()")
+            yield _Item("function", function.documented, place)
 
 
-def _documentable_cpp(files: Sequence[SourceFile]) -> Iterator[tuple[SourceFile, _Item]]:
+def _documentable_cpp(files: Sequence[SourceFile]) -> Iterator[_Item]:
     """The same of C++, where a declaration and a definition may be in two files."""
-    found: dict[str, list[tuple[SourceFile, SourceFunction]]] = {}
+    by_name: dict[str, list[tuple[SourceFile, SourceFunction]]] = {}
     for file in files:
-        for one in file.classes:
-            if "<locals>" not in one.name:
-                yield file, ("class", one.documented, one.line, f"the class {one.name}")
+        for class_ in file.classes:
+            if "<locals>" not in class_.name:
+                place = SourceError(file.path, class_.line, f"the class {class_.name}")
+                yield _Item("class", class_.documented, place)
         for function in file.functions:
             # With its class: the namespace may be left out where it is defined.
             name = "::".join(function.name.split("::")[-2:])
-            found.setdefault(name, []).append((file, function))
-    classes = {one.short for file in files for one in file.classes}
-    for name, places in found.items():
+            by_name.setdefault(name, []).append((file, function))
+    classes = {class_.short for file in files for class_ in file.classes}
+    for name, places in by_name.items():
         file, first = places[0]
-        all_ = [function for _, function in places]
+        functions = [function for _, function in places]
         is_special = first.short in classes or first.short.startswith(("~", "operator"))
-        if is_special or "<locals>" in first.name or any(one.overriding for one in all_):
+        if is_special or "<locals>" in first.name or any(one.overriding for one in functions):
             continue
-        if all(one.public for one in all_):
-            documented = any(one.documented for one in all_)
-            yield file, ("function", documented, first.line, f"{name}()")
+        if all(one.public for one in functions):
+            documented = any(one.documented for one in functions)
+            yield _Item("function", documented, SourceError(file.path, first.line, f"{name}()"))
 
 
 def _is_public(name: str) -> bool:

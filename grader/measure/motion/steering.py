@@ -25,9 +25,12 @@ LEAST_FIT = 3
 """A slow timer and a large gain leave few commands between the clamp and the goal."""
 ZERO_RAD_S = 1e-4
 FEW_STRAYS = 0.05
+# Two commands of one size, in shares of it, and how many of them show a limit.
 _SAME = 1e-6
 _PLATEAU = 3
+# Of fewer commands none is left out as a stray.
 _LEAST_TRIMMED = 8
+# Share of a limit below which the line does not ask for the limit.
 _SHORT_OF = 0.8
 
 
@@ -105,28 +108,35 @@ def fit(samples: Sequence[Sample], limit: float) -> Line:
 
     errors = np.array([item.error for item in samples])
     commands = np.array([item.command for item in samples])
-    sizes, wanted = np.abs(commands), np.abs(errors)
+    kept = _between_limits(errors, commands, limit)
+    errors, commands = errors[kept], commands[kept]
+    if len(errors) >= _LEAST_TRIMMED:
+        # Where one phase ends and the next begins, a command or two answer the error of the other.
+        best_first = abs(commands - _gain(errors, commands) * errors).argsort(kind="stable")
+        best = best_first[: len(errors) - math.ceil(FEW_STRAYS * len(errors))]
+        errors, commands = errors[best], commands[best]
+    gain = _gain(errors, commands)
+    return Line(gain, _r2(errors, commands, gain), len(errors))
+
+
+def _between_limits(errors: Numbers, commands: Numbers, limit: float) -> Numbers:
+    """Which commands are at no limit, or ask for no more than the limit that they are at."""
+    sizes = abs(commands)
     highest = sizes.max()
     lowest = sizes[sizes > ZERO_RAD_S].min(initial=highest)
+    # The law has a limit of its own where its largest or smallest command comes again and again.
     clamp = highest if _count(sizes, highest) >= _PLATEAU else math.inf
-    floor = lowest if _count(sizes, lowest) >= _PLATEAU and lowest < highest else 0.0
     clamp = min(clamp, limit * 0.999)
+    floor = lowest if _count(sizes, lowest) >= _PLATEAU and lowest < highest else 0.0
     high, low = clamp * (1.0 - _SAME), floor * (1.0 + _SAME)
     inside = (low < sizes) & (sizes < high)
     if inside.sum() < LEAST_FIT:
         # Without a clamp of its own the law shows in what was asked for beyond the limit too.
         inside, high, low = sizes >= 0.0, math.inf, 0.0
-    wanted = wanted * _gain(errors[inside], commands[inside])
-    kept = (sizes > low) | (wanted > floor / _SHORT_OF)
-    kept &= (sizes < high) | (wanted < _SHORT_OF * clamp)
-    errors, commands = errors[kept], commands[kept]
-    if len(errors) >= _LEAST_TRIMMED:
-        # Where one phase ends and the next begins, a command or two answer the error of the other.
-        fitting = abs(commands - _gain(errors, commands) * errors).argsort(kind="stable")
-        fitting = fitting[: len(errors) - math.ceil(FEW_STRAYS * len(errors))]
-        errors, commands = errors[fitting], commands[fitting]
-    gain = _gain(errors, commands)
-    return Line(gain, _r2(errors, commands, gain), len(errors))
+    asked = abs(errors) * _gain(errors[inside], commands[inside])
+    above_floor = (sizes > low) | (asked > floor / _SHORT_OF)
+    below_clamp = (sizes < high) | (asked < _SHORT_OF * clamp)
+    return above_floor & below_clamp
 
 
 def _count(sizes: Numbers, size: float) -> int:
