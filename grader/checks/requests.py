@@ -60,8 +60,7 @@ def is_offered(recording: Recording, parameters: Offered) -> Finding:
     times_s = [recording.since_launch_s(one.appeared_ns) for one in servers[:1]]
     shown = Evidence(moments=tuple(Moment(f"{word.noun} {name} appeared", s) for s in times_s))
     meant = meant_endpoint(recording, word, name, parameters.type)
-    if wrong := misnamed(recording, parameters, cause, meant, shown):
-        return wrong
+    stop_if(misnamed(recording, parameters, cause, meant, shown))
     stop_if(why_withdrawn(recording, f"the {word.noun} {code(name)}", servers))
     found = servers[0]
     return Finding.as_asked(

@@ -107,18 +107,16 @@ def judge(seconds: Sequence[float], limits: PeriodLimits) -> PeriodVerdict:
 
 
 def _irregular(deviations: Sequence[float], allowed_s: float) -> tuple[int, ...]:
+    """Indices of the deviations that are too large; one late message counts once."""
     found = []
-    index = 0
-    while index < len(deviations):
-        if abs(deviations[index]) > allowed_s:
-            found.append(index)
-            following = deviations[index + 1] if index + 1 < len(deviations) else 0.0
-            # Too long, then as much too short: one message was late.
-            if deviations[index] > 0.0 > following and (
-                abs(deviations[index] + following) <= allowed_s
-            ):
-                index += 1
-        index += 1
+    is_made_up_for = False
+    for index, (deviation_s, next_s) in enumerate(pairwise([*deviations, 0.0])):
+        if is_made_up_for or abs(deviation_s) <= allowed_s:
+            is_made_up_for = False
+            continue
+        found.append(index)
+        # Too long, then as much too short: one message was late.
+        is_made_up_for = deviation_s > 0.0 > next_s and abs(deviation_s + next_s) <= allowed_s
     return tuple(found)
 
 

@@ -39,12 +39,12 @@ class Standing:
 
 def standing(recording: Recording, process: str | None = None) -> list[Standing]:
     """What the processes, or one of them, declared while they were observed."""
-    return [
-        one
+    declared = [
+        _read(item.process, item.data)
         for item in recording.declared("stands")
         if process in (None, item.process) and item.time_ns <= recording.stop_ns
-        if (one := _read(item.process, item.data)) is not None
     ]
+    return [stand for stand in declared if stand is not None]
 
 
 def at_the_end(recording: Recording, process: str) -> Standing | None:

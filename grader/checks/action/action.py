@@ -175,12 +175,14 @@ class FeedbackOf(OfGoals):
         return self
 
     def _asked(self) -> str:
-        parts = [f"at least {counted(self.at_least, 'message')} of feedback"]
+        asked = f"at least {counted(self.at_least, 'message')} of feedback"
         if self.rate is not None:
-            parts.append(f" at {self.rate:g} Hz (within {percent(self.tolerance)})")
-        parts += [f", the first with {words(self.first)}"] if self.first else []
-        parts += [f", the last with {words(self.last)}"] if self.last else []
-        return f"{''.join(parts)}, for {self.words}"
+            asked += f" at {self.rate:g} Hz (within {percent(self.tolerance)})"
+        if self.first:
+            asked += f", the first with {words(self.first)}"
+        if self.last:
+            asked += f", the last with {words(self.last)}"
+        return f"{asked}, for {self.words}"
 
 
 @check("action.feedback", Subject.RECORDING, FeedbackOf)
@@ -302,11 +304,12 @@ def _why_other_status(recording: Recording, goal: Goal, parameters: Result) -> F
     if goal.status == parameters.status:
         return None
     seen = f"{the_goal(goal)} {goal.status or 'has no status'}"
-    is_aborted = goal.status == "aborted"
     call = {"succeeded": "succeed", "aborted": "abort", "canceled": "canceled"}[parameters.status]
-    raised = why_raised(recording, seen, goal.sent_ns) if is_aborted else None
-    mistake = "aborted" if is_aborted else "not_ended"
-    return raised or mistaken(mistake, seen, evidence(recording, goal), call=call)
+    shown = evidence(recording, goal)
+    if goal.status != "aborted":
+        return mistaken("not_ended", seen, shown, call=call)
+    raised = why_raised(recording, seen, goal.sent_ns)
+    return raised or mistaken("aborted", seen, shown, call=call)
 
 
 def _why_no_result(recording: Recording, goal: Goal, within_s: float) -> Finding | None:
@@ -341,7 +344,7 @@ def cancels(recording: Recording, parameters: Cancels) -> Finding:
     Judged by the goals that the probe asked to cancel (`cancel_after`): the server agrees, and
     the goal ends as canceled in time.
     """
-    goals = answered_goals(recording, parameters, lambda goal: goal.cancel_after_s is not None)
+    goals = answered_goals(recording, parameters, _is_to_cancel)
     stop_if_any(
         why_rejected(recording, goal)
         or _why_not_asked(recording, goal)
@@ -388,11 +391,9 @@ def preempts(recording: Recording, parameters: Preempts) -> Finding:
     goals = answered_goals(recording, parameters, lambda goal: goal.preempts)
     sent = [goal for goal in recording.goals if goal.action == parameters.action]
     for goal in goals:
-        number = sent.index(goal)
-        if number == 0:
-            text = "there is no goal before it that it could end"
-            return Finding.ours(text)
-        old = sent[number - 1]
+        if goal == sent[0]:
+            return Finding.ours("there is no goal before it that it could end")
+        old = sent[sent.index(goal) - 1]
         stop_if(why_rejected(recording, old) or why_rejected(recording, goal))
         stop_if(_why_goes_on(recording, old, goal, parameters.within))
     shown = evidence(recording, goals[0])
@@ -405,7 +406,8 @@ def _why_goes_on(recording: Recording, old: Goal, new: Goal, within_s: float) ->
     mistake = "not_preempted"
     if end_ns is None:
         seen = f"{the_goal(old)} was still worked on at the end"
-        return why_no_end(recording, seen, sent_ns, within_s) or mistaken(mistake, seen, shown)
+        cause = why_no_end(recording, seen, sent_ns, within_s)
+        return cause or mistaken(mistake, seen, shown)
     if end_ns < sent_ns:
         if recording.stolen_s(old.sent_ns, sent_ns) >= (sent_ns - end_ns) / NS:
             return Finding.undecided("the old goal had ended before the new one was sent")

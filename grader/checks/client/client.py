@@ -76,17 +76,19 @@ def asks(recording: Recording, parameters: Asks) -> Finding:
     server, asked = parameters.server, recording.asked_of(parameters.server)
     shown, needed = evidence(recording, asked), len(parameters.sequence)
     hint = remedy("other_request")
-    for number, (wanted, one) in enumerate(zip(parameters.sequence, asked, strict=False), start=1):
+    pairs = zip(parameters.sequence, asked, strict=False)
+    for number, (wanted, request) in enumerate(pairs, start=1):
         seen = f"number {number} that came to {code(server)} has"
-        other = unlike(one.fields, wanted, parameters.tolerance)
-        stop_if(why_other_fields(seen, "request", one.fields, other, shown, hint))
-    for before, after in itertools.pairwise(asked) if parameters.after_result else ():
-        stop_if(_why_too_early(before, after, shown))
+        other = unlike(request.fields, wanted, parameters.tolerance)
+        stop_if(why_other_fields(seen, "request", request.fields, other, shown, hint))
+    if parameters.after_result:
+        for before, after in itertools.pairwise(asked):
+            stop_if(_why_too_early(before, after, shown))
     if len(asked) < needed:
         stop_if(why_not_asked(recording, server, needed))
     if len(asked) > needed and not parameters.more:
         seen = f"{code(server)} was asked {counted(len(asked), 'time')}, not {needed}"
-        stop_if(mistaken("too_many_requests", seen, shown))
+        return mistaken("too_many_requests", seen, shown)
     if parameters.cancels is not None:
         stop_if(_why_not_canceled(recording, asked[needed - 1], parameters.cancels, shown))
     observed = f"asked {counted(len(asked), 'time')}, first for {brief(asked[0].fields)}"
@@ -106,14 +108,16 @@ def _why_not_canceled(
     recording: Recording, goal: Asked, span_s: tuple[float, float], shown: Evidence
 ) -> Finding | None:
     """Why a goal was not asked to cancel in time, or None if it was."""
-    begin_ns, canceled_ns = goal.accepted_ns or goal.asked_ns, goal.canceled_ns
-    took_s = ((canceled_ns or recording.stop_ns) - begin_ns) / NS
-    if canceled_ns is not None and span_s[0] <= took_s <= span_s[1]:
-        return None
-    seen = f"the last goal was asked to cancel {format_duration(took_s)} after it was accepted"
-    if canceled_ns is None:
+    shortest_s, longest_s = span_s
+    begin_ns, end_ns = goal.accepted_ns or goal.asked_ns, goal.canceled_ns or recording.stop_ns
+    if goal.canceled_ns is None:
         seen = "the last goal was never asked to cancel"
-    is_early = canceled_ns is not None and took_s < span_s[0]
-    end_ns = canceled_ns or recording.stop_ns
-    taken = None if is_early else why_taken(recording, seen, begin_ns, end_ns, span_s[1])
+    else:
+        took_s = (end_ns - begin_ns) / NS
+        if shortest_s <= took_s <= longest_s:
+            return None
+        seen = f"the last goal was asked to cancel {format_duration(took_s)} after it was accepted"
+        if took_s < shortest_s:
+            return mistaken("not_canceled", seen, shown)
+    taken = why_taken(recording, seen, begin_ns, end_ns, longest_s)
     return taken or mistaken("not_canceled", seen, shown)

@@ -88,8 +88,7 @@ def exists(recording: Recording, parameters: NodeExists) -> Finding:
     """
     cause, shown = why_not_node(recording, parameters.name), Evidence(moments=nodes_seen(recording))
     meant = meant_node(recording, parameters.name)
-    if wrong := misnamed(recording, parameters, cause, meant, shown):
-        return wrong
+    stop_if(misnamed(recording, parameters, cause, meant, shown))
     publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.publishes)
     others = sorted({item.node for item in publishers} - {parameters.name})
     if parameters.publishes is not None and others:
@@ -183,7 +182,7 @@ def _vanished(recording: Recording, node: Node) -> bool:
             return False
     # The graph can lose a node for a moment on a busy machine; what it does tells better. What it
     # subscribed to tells nothing: others publish that.
-    again = any(
+    appeared_again = any(
         other.name == node.name and (other.vanished_ns is None or other.vanished_ns > gone_ns)
         for other in recording.student_nodes
     )
@@ -197,7 +196,7 @@ def _vanished(recording: Recording, node: Node) -> bool:
         if item.node == node.name
         for message in recording.on(item.topic)[-1:]
     )
-    return not (again or answered or published)
+    return not (appeared_again or answered or published)
 
 
 class Finishes(Parameters):
@@ -240,7 +239,7 @@ class Ends(Parameters):
 
     @model_validator(mode="after")
     def _is_an_order(self) -> Ends:
-        if (self.node is None) is not (self.before is None):
+        if (self.node is None) != (self.before is None):
             raise ValueError("'node' and 'before' go together")
         return self
 

@@ -110,11 +110,11 @@ def class_(submission: SubmissionRecord, parameters: Class) -> Finding:
     if not kin:
         missed = _why_no_class(family, classes, named, parameters)
         return unless_unread(submission, package, missed)
-    lacks = [_why_not_as_asked(family, item, parameters) for item in kin]
-    right = [item for item, lack in zip(kin, lacks, strict=True) if lack is None]
+    why_not = [_why_not_as_asked(family, item, parameters) for item in kin]
+    right = [item for item, why in zip(kin, why_not, strict=True) if why is None]
     if len(right) < parameters.at_least:
-        lack = next(filter(None, lacks), None) or _too_few(right, parameters)
-        return unless_unread(submission, package, lack)
+        missed = next(filter(None, why_not), None) or _too_few(right, parameters)
+        return unless_unread(submission, package, missed)
     places = tuple(_place(item, f"class {item.found.name}") for item in right)
     where = ", ".join(f"{place.file}:{place.line}" for place in places[:3])
     observed = f"{codes(item.found.name for item in right)} ({where})"
@@ -150,13 +150,11 @@ def _write(parameters: Class) -> str:
     if inherits is None:
         return worded(python=code(f"class {name}:"), cpp=code(f"class {name} {{ ... }};"))
     module, _, base = inherits.rpartition(".")
+    lines = [f"class {name}({base}):"]
+    if module:
+        lines.insert(0, f"from {module} import {base}")
     cpp_base = "rclcpp::Node" if inherits in (NODE, "Node") else inherits.replace(".", "::")
-    return worded(
-        python=codes(
-            [*([f"from {module} import {base}"] if module else []), f"class {name}({base}):"]
-        ),
-        cpp=code(f"class {name} : public {cpp_base}"),
-    )
+    return worded(python=codes(lines), cpp=code(f"class {name} : public {cpp_base}"))
 
 
 def _too_few(right: Sequence[FoundClass], parameters: Class) -> Finding:
@@ -228,29 +226,28 @@ def _why_not_overridden(family: Family, item: FoundClass, method: str) -> str | 
     above = family.inherited(item, method)
     if not own:
         return f"does not define {code(f'{method}()')} itself"
-    if any(map(_is_sure, own)) or (not above and family.foreign(item)):
+    if any(one.overriding and not one.pure for one in own):
+        # The compiler sees to it that it overrides another one.
         return None
-    if not above and item.file.language != CPP:
-        # Of the classes of rclpy and of Python, the methods are not known.
-        has_others = any(name != "object" for name in item.found.bases)
-        return None if has_others and not family.own_ancestors(item) else _nothing_above(method)
     if not above:
-        return _nothing_above(method)
-    if item.file.language == CPP and not any(_hides(one, above) for one in own):
+        if _may_inherit_more(family, item):
+            return None
+        return f"defines {code(f'{method}()')}, which no class that it inherits declares"
+    if item.file.language == CPP and not any(_overrides_one(one, above) for one in own):
         return f"defines {code(f'{method}()')}, which is not virtual with these parameters above"
     return None
 
 
-def _nothing_above(method: str) -> str:
-    return f"defines {code(f'{method}()')}, which no class that it inherits declares"
+def _may_inherit_more(family: Family, item: FoundClass) -> bool:
+    """Whether a class inherits one whose methods are not known, such as those of rclpy."""
+    if family.foreign(item):
+        return True
+    if item.file.language == CPP or family.own_ancestors(item):
+        return False
+    return any(name != "object" for name in item.found.bases)
 
 
-def _is_sure(method: SourceFunction) -> bool:
-    """Whether the compiler sees to it that a method overrides another one."""
-    return method.overriding and not method.pure
-
-
-def _hides(method: SourceFunction, above: Iterable[SourceFunction]) -> bool:
+def _overrides_one(method: SourceFunction, above: Iterable[SourceFunction]) -> bool:
     return any(one.virtual and one.parameters == method.parameters for one in above)
 
 

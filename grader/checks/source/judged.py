@@ -44,8 +44,9 @@ def judged_package(
     if not files:
         if submission.language(package) == CPP and CPP in languages:
             stop_if(_of_before())
-        seen = f"the package {code(name)} has no {PYTHON if languages != _BOTH else ''} code"
-        stop_if(mistaken("no_code", seen.replace("  ", " "), folder=code(f"{name}/{name}")))
+        what = "code" if languages == _BOTH else f"{PYTHON} code"
+        seen = f"the package {code(name)} has no {what}"
+        stop_if(mistaken("no_code", seen, folder=code(f"{name}/{name}")))
     return package, files
 
 
@@ -65,8 +66,8 @@ def _of_before() -> Finding:
 def unless_unread(
     submission: SubmissionRecord, package: PackageRecord, finding: Finding
 ) -> Finding:
-    """A failure; or that nothing is judged, where what is missed may be in what was not read."""
-    unread = [one.unread for one in package.sources if one.unread is not None]
+    """A failure; or that nothing is judged, if a part of the C++ that holds it was not read."""
+    unread = [file.unread for file in package.sources if file.unread is not None]
     if not unread:
         return finding
     if submission.build is not None and package.name in submission.build.failed_packages:

@@ -52,13 +52,15 @@ class Pen(TurtleParameters):
 
     def is_right(self, line: Line) -> bool:
         """Whether a line is drawn with it."""
-        same = (self.colour in (None, line.colour), self.width in (None, line.width))
-        return all(same)
+        return self.colour in (None, line.colour) and self.width in (None, line.width)
 
 
 def _words(colour: tuple[int, int, int] | None, width: int | None) -> str:
-    parts = [f"the colour {list(colour)}"] if colour is not None else []
-    parts += [counted(width, "pixel") + " of width"] if width is not None else []
+    parts = []
+    if colour is not None:
+        parts.append(f"the colour {list(colour)}")
+    if width is not None:
+        parts.append(f"{counted(width, 'pixel')} of width")
     return " and ".join(parts)
 
 
