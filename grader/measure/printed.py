@@ -58,17 +58,20 @@ def exchanged(text: str, values: Mapping[str, float], decimals: int) -> tuple[st
         named.setdefault(match["name"].lower(), []).append(float(match["number"]))
 
     def is_named(path: str, value: float) -> bool:
-        return any(shows(number, value, decimals) for number in named.get(_last(path), []))
+        return any(shows(number, value, decimals) for number in named.get(_last_name(path), []))
 
     for one, other in combinations(values, 2):
-        right = is_named(one, values[one]) or is_named(other, values[other])
-        wrong = is_named(one, values[other]) and is_named(other, values[one])
-        if _last(one) != _last(other) and wrong and not right:
+        if _last_name(one) == _last_name(other):
+            continue
+        is_right = is_named(one, values[one]) or is_named(other, values[other])
+        is_exchanged = is_named(one, values[other]) and is_named(other, values[one])
+        if is_exchanged and not is_right:
             return one, other
     return None
 
 
-def _last(path: str) -> str:
+def _last_name(path: str) -> str:
+    """What a line calls a field: ``x`` of ``pose.x``, ``yaw`` of ``yaw(pose.orientation)``."""
     return path.partition("(")[0].rpartition(".")[2].lower()
 
 

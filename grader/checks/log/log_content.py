@@ -131,12 +131,16 @@ class Matching(Records):
     @property
     def words(self) -> str:
         """Which records, in words."""
-        level = f"{self.level} " if self.level else ""
-        what = f" with “{self.text}”" if self.text is not None else ""
-        what += f" that match {code(self.pattern)}" if self.pattern is not None else ""
-        what += f" with a number {self.number}" if self.number is not None else ""
-        whose = f" of {code(self.node)}" if self.node else ""
-        return f"{level}log messages{whose}{what}"
+        words = f"{self.level} log messages" if self.level else "log messages"
+        if self.node:
+            words += f" of {code(self.node)}"
+        if self.text is not None:
+            words += f" with “{self.text}”"
+        if self.pattern is not None:
+            words += f" that match {code(self.pattern)}"
+        if self.number is not None:
+            words += f" with a number {self.number}"
+        return words
 
     def says(self, text: str) -> bool:
         """Whether a record has the text."""

@@ -77,14 +77,11 @@ class Hunt:
         for event in self.killed:
             name = event.turtle
             begin_ns = min(begin_ns, event.time_ns)
-            away_m = {
-                other: distance_m
-                for other in alive
-                if (distance_m := self.distance_m(other, begin_ns)) is not None
-            }
-            nearest = min(away_m.items(), key=lambda pair: pair[1], default=None)
-            distance_m = self.distance_m(name, event.time_ns)
-            caught.append(Catch(name, event.time_ns, distance_m, nearest, away_m.get(name)))
+            distances_m = {other: self.distance_m(other, begin_ns) for other in alive}
+            known_m = {other: one for other, one in distances_m.items() if one is not None}
+            nearest = min(known_m.items(), key=lambda pair: pair[1], default=None)
+            at_end_m = self.distance_m(name, event.time_ns)
+            caught.append(Catch(name, event.time_ns, at_end_m, nearest, known_m.get(name)))
             alive.remove(name)
             begin_ns = event.time_ns
         return tuple(caught)
