@@ -62,12 +62,17 @@ def keeps_distance(recording: Recording, parameters: KeepsDistance) -> Finding:
     if not any(is_right):
         shown = evidence_at(recording, "the run began", truth[0].time_ns, plot)
         seen = "it never was at this distance"
+        away_m = [nearest_m(scene, step) for step in truth]
+        known_m = [distance_m for distance_m in away_m if distance_m is not None]
+        if known_m:
+            seen += f", but from {metres(min(known_m))} to {metres(max(known_m))} away"
         return why_off_course(recording) or mistaken("never_at_distance", seen, shown)
     begin = is_right.index(True)
     judged, is_right = truth[begin:], is_right[begin:]
     whole_m, right_m = way_m(judged), _right_m(judged, is_right)
     ratio = right_m / whole_m if whole_m else 0.0
-    seen = f"{metres(right_m)} of {metres(whole_m)} at this distance ({percent(round(ratio, 2))})"
+    since = f"the {metres(whole_m)} since it first was"
+    seen = f"at this distance for {metres(right_m)} of {since} ({percent(round(ratio, 2))})"
     begin_s, end_s = (recording.since_launch_s(judged[index].time_ns) for index in (0, -1))
     plot = replace(plot, judged=(begin_s, end_s))
     evidence = evidence_at(recording, "first at this distance", judged[0].time_ns, plot)
