@@ -64,8 +64,7 @@ class OfGoals(Parameters):
 
     action: TopicName = Field(description="Action that a `send_goal` of the scenario sends to.")
     goal: dict[str, Any] = Field(
-        default_factory=dict,
-        description="Judge only goals with these fields; by default all.",
+        default_factory=dict, description="Judge only goals with these fields; by default all."
     )
 
     def named_fields(self) -> Iterator[NamedFields]:

@@ -42,8 +42,7 @@ class Responsive(Parameters):
 
     within: Duration = Field(1.0, description="Longest time for an answer.")
     typically: Duration | None = Field(
-        None,
-        description="Longest median of the answer times; by default any.",
+        None, description="Longest median of the answer times; by default any."
     )
 
     def _asked(self) -> str:
@@ -253,7 +252,7 @@ def _judged_by_declarations(recording: Recording, names: Sequence[str]) -> Findi
         )
     return Finding.ours(
         f"no call to {codes(executor_services(name)[0] for name in names)} could be judged, of "
-        f"{counted(len(recording.calls), 'call')} that the probe sent",
+        f"{counted(len(recording.calls), 'call')} that the probe sent"
     )
 
 

@@ -72,8 +72,7 @@ class Follows(Parameters):
         validate_default=False,
     )
     every: Duration | None = Field(
-        None,
-        description="Longest time without such a line while messages come; by default any.",
+        None, description="Longest time without such a line while messages come; by default any."
     )
 
     def _asked(self) -> str:

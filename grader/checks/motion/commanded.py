@@ -184,10 +184,7 @@ def _size(command: VelocityCommand) -> float:
 
 
 def _plot(
-    recording: Recording,
-    sent: Sequence[VelocityCommand],
-    field: str,
-    limit: float | None = None,
+    recording: Recording, sent: Sequence[VelocityCommand], field: str, limit: float | None = None
 ) -> Plot:
     """A field of the commands over time, with the robot's limit."""
     shown = sent[:: max(1, len(sent) // _MOST_POINTS)]

@@ -33,11 +33,7 @@ _SAME_DURATION = 1e-3
 _DEFAULTS = {"reliability": "reliable", "durability": "volatile", "liveliness": "automatic"}
 _POLICIES = (*_DEFAULTS, "deadline", "lifespan", "lease")
 # Where the attribute of our profile, or the argument of rclpy's, has another name than the YAML.
-_ATTRIBUTES = {
-    "deadline": "deadline_s",
-    "lifespan": "lifespan_s",
-    "lease": "liveliness_lease_s",
-}
+_ATTRIBUTES = {"deadline": "deadline_s", "lifespan": "lifespan_s", "lease": "liveliness_lease_s"}
 _ARGUMENTS = {"lease": "liveliness_lease_duration"}
 _DECLARED_POLICIES = {"reliability", "durability"}
 """What a process declares of an endpoint."""

@@ -40,8 +40,7 @@ class Names(Share):
     classes: tuple[Style, ...] = Field((Style.CAMEL,), description="Styles of classes.")
     functions: tuple[Style, ...] = Field((Style.SNAKE,), description="Styles of functions.")
     fields: tuple[Style, ...] = Field(
-        (),
-        description="Styles of fields; none stands for any. ROS 2 writes `snake_case_` in C++.",
+        (), description="Styles of fields; none stands for any. ROS 2 writes `snake_case_` in C++."
     )
 
     def _asked(self) -> str:

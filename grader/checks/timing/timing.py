@@ -119,10 +119,7 @@ def period(recording: Recording, parameters: Period) -> Finding:
 
 
 def _machine_explains(
-    recording: Recording,
-    measured: Sequence[Interval],
-    verdict: PeriodVerdict,
-    limits: PeriodLimits,
+    recording: Recording, measured: Sequence[Interval], verdict: PeriodVerdict, limits: PeriodLimits
 ) -> bool:
     """Whether the intervals would be right if the machine had taken no time."""
     if not verdict.period_good and _is_declared(recording, verdict, limits):
@@ -148,10 +145,7 @@ def _why_ended(
 
 
 def _wrong_period(
-    recording: Recording,
-    parameters: Period,
-    measured: tuple[Interval, ...],
-    verdict: PeriodVerdict,
+    recording: Recording, parameters: Period, measured: tuple[Interval, ...], verdict: PeriodVerdict
 ) -> Finding:
     limits = parameters.limits
     observed = _figures(measured, verdict)
