@@ -150,11 +150,12 @@ def _write(parameters: Class) -> str:
     if inherits is None:
         return worded(python=code(f"class {name}:"), cpp=code(f"class {name} {{ ... }};"))
     module, _, base = inherits.rpartition(".")
-    lines = [f"class {name}({base}):"]
-    if module:
-        lines.insert(0, f"from {module} import {base}")
+    python = f"class {name}({base}):"
     cpp_base = "rclcpp::Node" if inherits in (NODE, "Node") else inherits.replace(".", "::")
-    return worded(python=codes(lines), cpp=code(f"class {name} : public {cpp_base}"))
+    return worded(
+        python=codes([f"from {module} import {base}", python]) if module else code(python),
+        cpp=code(f"class {name} : public {cpp_base}"),
+    )
 
 
 def _too_few(right: Sequence[FoundClass], parameters: Class) -> Finding:
