@@ -28,16 +28,19 @@ class TurtleParameters(Parameters):
     def lines(self, recording: Recording) -> tuple[Line, ...]:
         """What it drew; ends the check if that is nothing."""
         stop_if(why_no_turtles(recording))
-        found = tuple(line for line in drawn(recording) if line.turtle == self.turtle)
-        if not found:
-            way = [one for one in recording.truth if one.robot == self.turtle]
-            seen = f"{code(self.turtle)} drew no line"
-            has_moved = any((a.x_m, a.y_m) != (way[0].x_m, way[0].y_m) for a in way)
-            service = code(f"/{self.turtle}/set_pen")
-            shown = Evidence((until_the_end(recording),))
-            up = mistaken("turtle_no_line", f"{seen}: its pen is up", shown, service=service)
-            stop_if(up if has_moved else astray(recording, seen, self.turtle, evidence=shown))
-        return found
+        lines = tuple(line for line in drawn(recording) if line.turtle == self.turtle)
+        if not lines:
+            stop_if(self._why_no_line(recording))
+        return lines
+
+    def _why_no_line(self, recording: Recording) -> Finding:
+        seen = f"{code(self.turtle)} drew no line"
+        shown = Evidence((until_the_end(recording),))
+        places = {(step.x_m, step.y_m) for step in recording.truth if step.robot == self.turtle}
+        if len(places) < 2:
+            return astray(recording, seen, self.turtle, evidence=shown)
+        service = code(f"/{self.turtle}/set_pen")
+        return mistaken("turtle_no_line", f"{seen}: its pen is up", shown, service=service)
 
 
 def astray(
