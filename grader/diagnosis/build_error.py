@@ -23,8 +23,17 @@ class BuildError(Symptom[str]):
     package: PackageRecord
 
 
-class Row(Model):
-    """A row of the table: a mistake, how to recognise its error, and what to do."""
+class KnownError(Model):
+    """A row of the table: a mistake, how to recognise its error, and what to do.
+
+    Attributes:
+        mistake: What the student did, for the documentation.
+        examples: The error as tools print it: the first for the documentation, all for the test.
+        message: Regular expression that is searched in the error.
+        file: Regular expression that is searched in the path of its file; by default any but
+            one of Python.
+        hint: What to do; ``$name`` is what the group ``name`` of ``message`` found.
+    """
 
     mistake: str
     examples: tuple[str, ...]
@@ -32,24 +41,28 @@ class Row(Model):
     file: str = r"(?<!\.py)$"
     hint: str
 
-    def __call__(self, symptom: BuildError) -> str | None:
+    def hint_for(self, symptom: BuildError) -> str | None:
         """The hint, if the error is that of the mistake."""
-        found = re.search(self.message, symptom.error.message)
-        if found is None or not re.search(self.file, symptom.error.file):
+        message = re.search(self.message, symptom.error.message)
+        if message is None or not re.search(self.file, symptom.error.file):
             return None
         return Template(self.hint).safe_substitute(
-            found.groupdict(""), package=symptom.package.name
+            message.groupdict(""), package=symptom.package.name
         )
+
+    @property
+    def language(self) -> str:
+        """The language of the packages that can have it: only those in Python have a setup.py."""
+        return PYTHON if "setup" in self.file else CPP
 
 
 class Table(Model):
     """The whole of ``build_error.yaml``."""
 
-    errors: tuple[Row, ...]
+    errors: tuple[KnownError, ...]
 
 
 TABLE = read_source(Path(__file__).with_suffix(".yaml")).read(Table)
-
 
 _OWN_HEADER = re.compile(r"^'?(\w+)/\S+?'?(?:: No such file or directory| file not found)")
 _COMMAND = re.compile(r'Unknown CMake command "(\w+)"')
@@ -72,30 +85,34 @@ def empty_file(symptom: BuildError) -> str | None:
 @explanation(BuildError, only=CPP)
 def own_header(symptom: BuildError) -> str | None:
     """CMakeLists.txt does not say where the package's own headers lie."""
-    found = _OWN_HEADER.match(symptom.error.message)
-    if found is None or found[1] != symptom.package.name:
+    match = _OWN_HEADER.match(symptom.error.message)
+    if match is None or match[1] != symptom.package.name:
         return None
-    return remedy("own_header", package=found[1])
+    return remedy("own_header", package=match[1])
 
 
 @explanation(BuildError, only=CPP)
 def command_of_another_package(symptom: BuildError) -> str | None:
     """CMakeLists.txt uses a command of a package without find_package() of it above."""
-    found = _COMMAND.search(symptom.error.message)
-    if found is None:
+    match = _COMMAND.search(symptom.error.message)
+    if match is None:
         return None
     for beginning, package in _PACKAGE_OF_COMMAND.items():
-        if found[1].startswith(beginning):
-            return remedy("command_of_another_package", package=package, command=found[1])
+        if match[1].startswith(beginning):
+            return remedy("command_of_another_package", package=package, command=match[1])
     return None
 
 
 for _row in TABLE.errors:
-    _example = _row.examples[0]
-    _only = PYTHON if "setup" in _row.file else CPP
     add(
         Explanation(
-            BuildError, _row.mistake, _row, __name__, _row.mistake, example=_example, only=_only
+            symptom=BuildError,
+            name=_row.mistake,
+            apply=_row.hint_for,
+            module=__name__,
+            sentence=_row.mistake,
+            example=_row.examples[0],
+            only=_row.language,
         )
     )
 

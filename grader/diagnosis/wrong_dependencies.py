@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from grader.diagnosis.explanation import mistaken, remedy
-from grader.diagnosis.process.exceptions import import_of
+from grader.diagnosis.process.exception_table import import_of
 from grader.findings.finding import Evidence, Finding, Table
 from grader.findings.words import code, codes
 from grader.recording.submission import EMPTY, Import, PackageRecord, SourceError, SubmissionRecord

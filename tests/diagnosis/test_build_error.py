@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.diagnosis.build_error import TABLE, BuildError, Row
+from grader.diagnosis.build_error import TABLE, BuildError, KnownError
 from grader.diagnosis.explanation import cause_of, explanations
 from grader.recording.submission import EMPTY, SourceError
 from tests.checks.builder import package
@@ -17,11 +17,11 @@ def error(message: str, file: str = "src/bot_publisher/src/bot.cpp") -> BuildErr
 @pytest.mark.parametrize(
     ("row", "example"), [(row, one) for row in TABLE.errors for one in row.examples]
 )
-def test_every_row_of_the_table_answers_for_its_examples(row: Row, example: str) -> None:
+def test_every_row_of_the_table_answers_for_its_examples(row: KnownError, example: str) -> None:
     symptom = error(example, file="src/bot_publisher/setup.py" if row.file == r"setup\.py$" else "")
     answer = next(one for one in explanations()[BuildError] if one.apply(symptom) is not None)
     assert answer.sentence == row.mistake
-    assert "$" not in (row(symptom) or "").replace("${PROJECT_NAME}", "")
+    assert "$" not in (row.hint_for(symptom) or "").replace("${PROJECT_NAME}", "")
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,7 @@ from unittest.mock import patch
 import pytest
 
 from grader.diagnosis import explanation
-from grader.diagnosis.build_error import Row as BuildRow
 from grader.diagnosis.explanation import Symptom, explanations
-from grader.diagnosis.process.exceptions import Row
 from grader.recording.event import Breach
 from grader.recording.model import Ending, Kind, Recording
 from grader.recording.submission import (
@@ -516,7 +514,7 @@ def test_every_explanation_has_a_case() -> None:
         for symptom, entries in explanations().items()
         for entry in entries
         # Those of the table have an example of their own.
-        if not isinstance(entry.apply, (Row, BuildRow))
+        if not entry.example
     }
     assert named - catalogue == set()
     # One that came later has a test of its own beside this one.

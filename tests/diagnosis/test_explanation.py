@@ -11,7 +11,8 @@ import pytest
 from grader.authoring.documentation import explanations_markdown
 from grader.diagnosis.explanation import Explanation, cause_of, explanations, in_order
 from grader.diagnosis.no_messages import FewMessages, NoMessages
-from grader.diagnosis.process.exceptions import CPP_ROWS, TABLE, Raised, Row
+from grader.diagnosis.process.exception_table import CPP_ROWS, TABLE, KnownException
+from grader.diagnosis.process.exceptions import Raised
 from grader.diagnosis.process.failure import Failure, Frame
 from grader.diagnosis.process.process_exit import why_it_exited
 from grader.recording.submission import SourceFile
@@ -68,8 +69,8 @@ def failure(type_: str, message: str, file: str = "/w/node.py", source: str = ""
     return Raised(Failure(type_, message, frames), recording())
 
 
-def row(**fields: str) -> Row:
-    return Row(mistake="x.", example="", **fields)
+def row(**fields: str) -> KnownException:
+    return KnownException(mistake="x.", example="", **fields)
 
 
 @pytest.mark.parametrize(
@@ -100,15 +101,15 @@ def row(**fields: str) -> Row:
     ],
 )
 def test_a_row_of_the_table_matches_all_that_it_says(
-    row: Row, raised: Raised, hint: str | None
+    row: KnownException, raised: Raised, hint: str | None
 ) -> None:
-    assert row(raised) == hint
+    assert row.hint_for(raised.failure) == hint
 
 
 @pytest.mark.parametrize(
     "entry", (*TABLE.exceptions, *CPP_ROWS), ids=lambda entry: entry.example[:60]
 )
-def test_every_row_of_the_tables_answers_for_its_example(entry: Row) -> None:
+def test_every_row_of_the_tables_answers_for_its_example(entry: KnownException) -> None:
     type_, _, message = entry.example.partition(": ")
     frame = Frame(f"/opt/ros/jazzy/{entry.raised_in or 'bot/node.py'}", 1, "f", entry.line)
     compiled = entry in CPP_ROWS

@@ -18,7 +18,7 @@ from grader.assignment.load import list_assignments, load_assignment
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import NoParameters, Subject
 from grader.diagnosis.explanation import explanations, hints, mistakes, remedy
-from grader.diagnosis.process import exceptions
+from grader.diagnosis.process import exception_table
 from grader.findings.finding import Finding, Status
 from grader.findings.words import SPIN_NODE, Words, speaking
 from grader.grade import judge_all
@@ -153,7 +153,7 @@ def test_hints_have_no_word_of_python_for_students_of_cpp() -> None:
 
 
 def test_exceptions_of_both_languages_have_no_word_of_python_for_students_of_cpp() -> None:
-    hints = [row.hint for row in exceptions.TABLE.exceptions if isinstance(row.hint, Words)]
+    hints = [row.hint for row in exception_table.TABLE.exceptions if isinstance(row.hint, Words)]
     with speaking(CPP):
         assert hints and not list(filter(_OF_PYTHON.search, map(str, hints)))
 
