@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from string import Template
 
@@ -26,13 +26,7 @@ class BuildError(Symptom[str]):
 class KnownError(Model):
     """A row of the table: a mistake, how to recognise its error, and what to do.
 
-    Attributes:
-        mistake: What the student did, for the documentation.
-        examples: The error as tools print it: the first for the documentation, all for the test.
-        message: Regular expression that is searched in the error.
-        file: Regular expression that is searched in the path of its file; by default any but
-            one of Python.
-        hint: What to do; ``$name`` is what the group ``name`` of ``message`` found.
+    What each column means stands at the top of ``build_error.yaml``.
     """
 
     mistake: str
@@ -104,17 +98,8 @@ def command_of_another_package(symptom: BuildError) -> str | None:
 
 
 for _row in TABLE.errors:
-    add(
-        Explanation(
-            symptom=BuildError,
-            name=_row.mistake,
-            apply=_row.hint_for,
-            module=__name__,
-            sentence=_row.mistake,
-            example=_row.examples[0],
-            only=_row.language,
-        )
-    )
+    _entry = Explanation(BuildError, _row.mistake, _row.hint_for, __name__, sentence=_row.mistake)
+    add(replace(_entry, example=_row.examples[0], only=_row.language))
 
 
 @explanation(BuildError, general=True)

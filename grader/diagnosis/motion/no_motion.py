@@ -28,8 +28,8 @@ from grader.recording.model import NS, Recording
 from grader.spec.unit import format_duration
 
 _STILL = "the robot never moved"
+# In so little time a robot does not get far enough to be seen.
 _SHORT_S = 0.2
-"""In so little time a robot does not get far enough to be seen."""
 
 
 def why_not_judged(recording: Recording) -> Finding | None:
@@ -57,7 +57,10 @@ class NotMoved(NotDone):
 
     @cached_property
     def first(self) -> VelocityCommand:
-        """The first command to move, or else the first of all."""
+        """The first command to move, or else the first of all.
+
+        There is one for all explanations after ``nothing_published``, which answers without any.
+        """
         moving = (item for item in self.sent if not is_zero(item.twist))
         return next(moving, self.sent[0])
 
@@ -77,39 +80,41 @@ def why_not_moved(recording: Recording) -> Finding | None:
 
 
 def approach(recording: Recording, goal: Goal) -> Approach | Finding:
-    """What there is to judge, or why there is nothing."""
-    cause = why_not_moved(recording)
-    if cause is not None and not recording.truth:
-        return cause
+    """The run towards a goal, or why there is none to judge."""
+    not_judged = why_not_judged(recording)
+    if not_judged is not None:
+        return not_judged
+    # That nobody knows the goal is our fault: it is said before what the student did wrong.
     try:
         pose = goal.pose(recording.values)
     except UnknownValue as error:
         return Finding.ours(str(error))
-    return cause or Approach(recording, pose)
+    return why_not_moved(recording) or Approach(recording, pose)
 
 
 def why_cut_short(recording: Recording) -> Finding | None:
     """A process that ended while the robot was on its way, or commands that are not numbers."""
     ended = exited(recording)
     if ended:
-        exited_ns = ended[0].exited_ns or recording.stop_ns
-        truth = recording.truth
-        rested = bool(truth) and is_at_rest(truth[index_at(truth, exited_ns)])
-        if not rested or ended[0].exit_code != 0:
-            return why_it_exited(recording, ended[0])
+        process, truth = ended[0], recording.truth
+        exited_ns = process.exited_ns or recording.stop_ns
+        was_at_rest = bool(truth) and is_at_rest(truth[index_at(truth, exited_ns)])
+        # A program that stopped the robot and then returned has done its work.
+        if process.exit_code != 0 or not was_at_rest:
+            return why_it_exited(recording, process)
     return why_rejected(recording)
 
 
 def why_rejected(recording: Recording) -> Finding | None:
     """Commands that the robot refused, for they were NaN or infinite; None without any."""
-    refused = [item for item in recording.incidents if item.kind == "command_rejected"]
-    if not refused:
+    rejected = [item for item in recording.incidents if item.kind == "command_rejected"]
+    if not rejected:
         return None
-    first = refused[0]
-    were = "was" if len(refused) == 1 else "were"
+    first = rejected[0]
+    verb = "was" if len(rejected) == 1 else "were"
     return mistaken(
         "not_finite",
-        f"{counted(len(refused), 'command')} on {code(command_topic(recording))} {were} not finite "
+        f"{counted(len(rejected), 'command')} on {code(command_topic(recording))} {verb} not finite "
         f"(first: {first.text}); the robot stops instead",
         evidence_at(recording, "command rejected", first.time_ns),
     )
@@ -118,8 +123,9 @@ def why_rejected(recording: Recording) -> Finding | None:
 @explanation(NotMoved, after=(process_ended,))
 def nothing_published(symptom: NotMoved) -> Finding | None:
     """Nothing was published on the topic of velocity commands."""
-    recording, topic = symptom.recording, command_topic(symptom.recording)
-    return None if symptom.sent else why_silent(recording, topic).after(_STILL)
+    if symptom.sent:
+        return None
+    return why_silent(symptom.recording, command_topic(symptom.recording)).after(_STILL)
 
 
 @explanation(NotMoved)
@@ -135,36 +141,41 @@ def robot_not_matched(symptom: NotMoved) -> Finding | None:
     if any(step.command_m_s or step.command_rad_s for step in recording.truth):
         return None
     # A subscription of the probe that requests less may get what the robot does not.
-    refused = why_refused(NoMessages(recording, command_topic(recording)))
-    return refused and refused.after(_STILL)
+    cause = why_refused(NoMessages(recording, command_topic(recording)))
+    return cause.after(_STILL) if cause is not None else None
 
 
 @explanation(NotMoved)
 def only_zeros(symptom: NotMoved) -> Finding | None:
     """linear.x and angular.z of all commands are 0, perhaps because a scan was misread."""
-    recording, sent = symptom.recording, symptom.sent
-    if not all(is_zero(item.twist) for item in sent):
+    if not all(is_zero(command.twist) for command in symptom.sent):
         return None
-    topic = command_topic(recording)
-    number = counted(len(sent), "command")
-    seen = f"{_STILL}: in all {number} on {code(topic)}, linear.x and angular.z are 0"
-    last = recording.truth[-1]
-    misread = misreading(recording, last)
-    twists = (item.value.get("twist", item.value) for item in recording.on(topic))
-    others = sorted({path for twist in twists for path, value in leaves(twist).items() if value})
-    if others:
-        seen += f", but {codes(others)} {'is' if len(others) == 1 else 'are'} not"
-    elif misread is not None:
-        return Finding(f"{seen}; {misread.words}", str(misread.hint), symptom.evidence)
+    recording, topic = symptom.recording, command_topic(symptom.recording)
+    count = counted(len(symptom.sent), "command")
+    seen = f"{_STILL}: in all {count} on {code(topic)}, linear.x and angular.z are 0"
+    other_fields = _fields_not_zero(recording, topic)
+    if other_fields:
+        verb = "is" if len(other_fields) == 1 else "are"
+        seen = f"{seen}, but {codes(other_fields)} {verb} not"
+        return mistaken("only_zeros", seen, symptom.evidence)
+    misread = misreading(recording, recording.truth[-1])
+    if misread is not None:
+        return Finding(f"{seen}; {misread.words}", misread.hint, symptom.evidence)
     return mistaken("only_zeros", seen, symptom.evidence)
+
+
+def _fields_not_zero(recording: Recording, topic: str) -> list[str]:
+    """Fields of the commands that have another value than 0 in any of them."""
+    twists = [message.value.get("twist", message.value) for message in recording.on(topic)]
+    return sorted({path for twist in twists for path, value in leaves(twist).items() if value})
 
 
 @explanation(NotMoved)
 def integer_in_command(symptom: NotMoved) -> Finding | None:
     """A float field holds an integer, which ROS misreads."""
     twist = symptom.first.twist
-    for field, number in (("linear.x", twist.linear_m_s), ("angular.z", twist.angular_rad_s)):
-        if was_integer(number):
+    for field, value in (("linear.x", twist.linear_m_s), ("angular.z", twist.angular_rad_s)):
+        if was_integer(value):
             return Finding(
                 f"{_STILL}: {misread_words(code(field))}", remedy("float_field"), symptom.evidence
             )
@@ -175,9 +186,9 @@ def integer_in_command(symptom: NotMoved) -> Finding | None:
 def moves_too_late(symptom: NotMoved) -> Finding:
     """The first command to move came too late or was too slow."""
     recording, first = symptom.recording, symptom.first
-    left_s = (recording.truth[-1].time_ns - first.time_ns) / NS
-    begin_ns = recording.truth[0].time_ns
-    lost_s = stolen_s(recording, begin_ns, recording.truth[-1].time_ns)
+    begin_ns, end_ns = recording.truth[0].time_ns, recording.truth[-1].time_ns
+    left_s = (end_ns - first.time_ns) / NS
+    lost_s = stolen_s(recording, begin_ns, end_ns)
     if left_s < _SHORT_S <= left_s + lost_s:
         return Finding.held_up(f"{_STILL} until the end", lost_s)
     return mistaken(

@@ -17,19 +17,11 @@ from grader.spec.source import Model, read_source
 class KnownException(Model):
     """A row of a table: a mistake, how to recognise its exception, and what to try.
 
-    The columns that recognise the exception must all match; an empty one matches any.
+    What each column means stands at the top of ``exceptions.yaml``. All those that recognise the
+    exception must match; one that is left out matches any exception.
 
     Attributes:
-        mistake: What the student did, for the documentation.
-        example: The exception as it is printed, for the documentation and the test.
         only: The one language of the programs that it explains, or nothing if any.
-        line: The line of code that raised it in the example.
-        type: Regular expression that the whole name of the class matches.
-        message: Regular expression that is searched in the message.
-        raised_in: Part of the path of the file that raised it.
-        source: Regular expression that is searched in the line that raised it; ``$name`` is what
-            the group ``name`` of ``message`` found.
-        hint: What to try, with ``$name`` as in ``source``.
     """
 
     mistake: str

@@ -6,7 +6,7 @@ What the explanations below advise stands in ``hints.yaml``, as for all others.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from grader.diagnosis.explanation import Explanation, Symptom, add, explanation, remedy
 from grader.diagnosis.process.exception_table import CPP_ROWS, TABLE, KnownException, import_of
@@ -145,28 +145,19 @@ def _own_file(submission: SubmissionRecord, name: str) -> tuple[str, PackageReco
     return path, max(owners, key=lambda package: len(package.path), default=None)
 
 
-def _add(row: KnownException) -> None:
-    """Put a row of a table into the catalogue, below the explanations above."""
+def _entry(row: KnownException) -> Explanation:
+    """A row of a table as an entry of the catalogue."""
 
     def hint(symptom: Raised) -> str | None:
         return row.hint_for(symptom.failure)
 
-    add(
-        Explanation(
-            symptom=Raised,
-            name=row.mistake,
-            apply=hint,
-            module=__name__,
-            sentence=row.mistake,
-            example=row.example,
-            only=row.only,
-        )
-    )
+    entry = Explanation(Raised, row.mistake, hint, __name__, sentence=row.mistake)
+    return replace(entry, example=row.example, only=row.only)
 
 
 # What ends programs in C++ is asked first: exceptions that both languages have stand in the other.
 for _row in (*CPP_ROWS, *TABLE.exceptions):
-    _add(_row)
+    add(_entry(_row))
 
 
 @explanation(Raised, general=True)
