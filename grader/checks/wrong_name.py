@@ -64,7 +64,7 @@ def misnamed(
         if meant is None or not parameters.remap or cause.status is not Status.FAILED:
             return cause
         names = parameters.wrong(meant)
-        return cause if names <= recording.names else replace(cause, names=names)
+        return cause if names.all_in(recording.names) else replace(cause, names=names)
     thing, asked = parameters.asked_name
     own = recording.names.own(thing, asked)
     if own == asked or not parameters.remap:

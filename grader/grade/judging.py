@@ -13,7 +13,7 @@ from graphlib import TopologicalSorter
 
 from grader.assignment.binding import BoundCheck
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.model import Counts
+from grader.assignment.model import Counts, Scenario
 from grader.assignment.mutant import required_by
 from grader.assignment.random_values import fixed_values
 from grader.checks.check import Subject
@@ -61,38 +61,26 @@ def judge_all(
     recordings = _with_fixed_values(loaded, recordings)
     imported = with_runtime_imports(submission, recordings.values())
     known = _Known(loaded, imported, recordings, faults, named.unnamed)
-    bound = {item.spec.id: item for item in loaded.checks}
-    parameters_first = _parameters_first(bound)
+    checks = {bound.spec.id: bound for bound in loaded.checks}
+    parameters_first = _parameters_first(checks)
     order = TopologicalSorter(
-        {name: (*item.spec.requires, *parameters_first[name]) for name, item in bound.items()}
+        {name: (*bound.spec.requires, *parameters_first[name]) for name, bound in checks.items()}
     )
     results: dict[str, CheckResult] = {}
     for name in order.static_order():
-        item = bound[name]
-        blockers = _blockers(item.spec.requires, results)
-        lacking = _blockers(parameters_first[name], results)
-        with speaking(imported.spoken(known.about(item))):
-            hints = tuple(map(str, item.spec.hints))
-            findings = () if blockers else tuple(known.findings(item))
-        # One mistake costs its own check, and takes no credit from another.
-        if findings and lacking and known.is_lost_by_parameters(item, findings):
-            blockers = lacking
-        if blockers:
-            findings = (_skipped([results[one] for one in blockers]),)
-        results[name] = known.result(item, findings, blockers, hints)
-    ordered = tuple(results[name] for name in bound)
-    return Grade(loaded, submission, ordered, named.chosen)
+        results[name] = known.result(checks[name], parameters_first[name], results)
+    return Grade(loaded, submission, tuple(results[name] for name in checks), named.chosen)
 
 
-def _parameters_first(bound: Mapping[str, BoundCheck]) -> dict[str, list[str]]:
-    """By check, the checks of given parameters: all others are judged after them.
+def _parameters_first(checks: Mapping[str, BoundCheck]) -> dict[str, list[str]]:
+    """By check, the checks of given parameters that are judged before it.
 
-    But not what these require themselves.
+    Before these checks, and without any before it, comes what they require themselves.
     """
-    requires = {name: item.spec.requires for name, item in bound.items()}
-    checks = [name for name, item in bound.items() if item.check.name == PARAMETERS_GIVEN]
-    before = set(checks).union(*(required_by(name, requires) for name in checks))
-    return {name: [] if name in before else checks for name in bound}
+    requires = {name: bound.spec.requires for name, bound in checks.items()}
+    of_parameters = [n for n, bound in checks.items() if bound.check.name == PARAMETERS_GIVEN]
+    earliest = set(of_parameters).union(*(required_by(name, requires) for name in of_parameters))
+    return {name: [] if name in earliest else of_parameters for name in checks}
 
 
 @dataclass(frozen=True)
@@ -116,29 +104,54 @@ class _Known:
         scenarios = self.loaded.scenarios_of(bound)
         return [named] if named else [name for one in scenarios for name in self._launched(one.id)]
 
+    def result(
+        self,
+        bound: BoundCheck,
+        parameters_first: Iterable[str],
+        results: Mapping[str, CheckResult],
+    ) -> CheckResult:
+        """Judge one check, or skip it for what was judged before.
+
+        Args:
+            parameters_first: The checks of given parameters before it.
+            results: Of all checks before it.
+        """
+        blockers = _blockers(bound.spec.requires, results)
+        with speaking(self.submission.spoken(self.about(bound))):
+            hints = tuple(map(str, bound.spec.hints))
+            findings = () if blockers else tuple(self.findings(bound))
+        # One mistake costs its own check, and takes no credit from another.
+        lost_parameters = _blockers(parameters_first, results)
+        if findings and lost_parameters and self.is_lost_by_parameters(bound, findings):
+            blockers = lost_parameters
+        if blockers:
+            findings = (_skipped([results[name] for name in blockers]),)
+        return self._with_points(bound, findings, blockers, hints)
+
     def findings(self, bound: BoundCheck) -> Iterator[ScenarioFinding]:
         """What a check says of the submission, or of each of its scenarios."""
         scenarios = [scenario.id for scenario in self.loaded.scenarios_of(bound)]
-        unnamed = next((one for one in self.unnamed if self._needs(bound, one)), None)
+        unnamed = next((item for item in self.unnamed if self._needs(bound, item)), None)
         if unnamed is not None and (unnamed.finding.asks or not unnamed.can_run):
-            yield from (ScenarioFinding(one, unnamed.finding) for one in scenarios or (None,))
+            yield from (ScenarioFinding(name, unnamed.finding) for name in scenarios or (None,))
         elif bound.check.subject is Subject.SUBMISSION:
             yield self._of_submission(bound)
         elif not scenarios:
             # Else a check that judges nothing would pass, and every student would get its points.
             yield ScenarioFinding(None, fault("there is no scenario that this check could judge"))
         else:
-            found = (self._of_run(bound, scenario) for scenario in scenarios)
-            yield from (_with_reason(one, unnamed) for one in found)
+            for scenario in scenarios:
+                yield _with_reason(self._of_run(bound, scenario), unnamed)
 
     def is_lost_by_parameters(self, bound: BoundCheck, findings: Sequence[ScenarioFinding]) -> bool:
         """Whether a check failed without credit in a run whose parameters the nodes do not take."""
-        lost = _counted(bound.spec.counts, [item.finding for item in findings])
+        if _status_and_credit(bound.spec.counts, findings) != (Status.FAILED, 0.0):
+            return False
         failed = {item.scenario for item in findings if item.finding.status is Status.FAILED}
         runs = (run for name, run in self.recordings.items() if name in failed)
-        return lost == (Status.FAILED, 0.0) and any(map(not_taken, runs))
+        return any(not_taken(run) is not None for run in runs)
 
-    def result(
+    def _with_points(
         self,
         bound: BoundCheck,
         findings: tuple[ScenarioFinding, ...],
@@ -147,7 +160,7 @@ class _Known:
     ) -> CheckResult:
         """What a check is worth by its findings."""
         spec = bound.spec
-        status, credit = _counted(spec.counts, [item.finding for item in findings])
+        status, credit = _status_and_credit(spec.counts, findings)
         return CheckResult(
             id=spec.id,
             title=bound.title,
@@ -172,11 +185,12 @@ class _Known:
 
     def _launched(self, scenario: str) -> tuple[str, ...]:
         """Packages that a scenario launches something of."""
-        assignment = self.loaded.assignment
-        launches = next(item.launch for item in assignment.scenarios if item.id == scenario)
-        return tuple(
-            dict.fromkeys(launch.package or assignment.packages[0].name for launch in launches)
-        )
+        packages = self.loaded.assignment.packages
+        launches = self._scenario(scenario).launch
+        return tuple(dict.fromkeys(launch.package or packages[0].name for launch in launches))
+
+    def _scenario(self, name: str) -> Scenario:
+        return next(item for item in self.loaded.assignment.scenarios if item.id == name)
 
     def _of_submission(self, bound: BoundCheck) -> ScenarioFinding:
         only = bound.parameters.only
@@ -187,35 +201,44 @@ class _Known:
         return ScenarioFinding(None, Finding.error(asked, unread, hint=NOT_YOURS))
 
     def _of_run(self, bound: BoundCheck, scenario: str) -> ScenarioFinding:
-        recording, launched = self.recordings.get(scenario), self._launched(scenario)
-        if recording is None and (why := self._why_no_bag(scenario)) is not None:
-            return ScenarioFinding(scenario, why)
+        recording, robot = self.recordings.get(scenario), bound.spec.robot
         if recording is None:
-            lost = self.faults.get(scenario, f"there is no recording of the scenario {scenario!r}")
-            packages = [*launched, *(one.name for one in self.loaded.assignment.packages)]
-            finding = why_incomplete(self.submission, launched, "a run of what was handed in")
-            finding = finding or why_not_run(self.submission, packages) or fault(lost)
-        elif unusable := _why_unusable(recording, scenario, self.submission):
-            finding = fault(unusable)
-        elif (robot := bound.spec.robot) and robot not in recording.scenes:
-            finding = fault(f"the recording has no robot {robot!r}")
-        else:
-            shown = of_robot(recording, robot) if robot else recording
-            return judged(Case(bound, self.submission, shown, scenario, launched))
-        return ScenarioFinding(scenario, finding)
+            return ScenarioFinding(scenario, self._why_not_recorded(scenario))
+        unusable = _why_unusable(recording, scenario, self.submission)
+        if unusable is not None:
+            return ScenarioFinding(scenario, fault(unusable))
+        if robot:
+            if robot not in recording.scenes:
+                return ScenarioFinding(scenario, fault(f"the recording has no robot {robot!r}"))
+            recording = of_robot(recording, robot)
+        launched = self._launched(scenario)
+        return judged(Case(bound, self.submission, recording, scenario, launched))
+
+    def _why_not_recorded(self, scenario: str) -> Finding:
+        """Why there is no recording of a scenario, the deepest cause first."""
+        launched = self._launched(scenario)
+        packages = [*launched, *(package.name for package in self.loaded.assignment.packages)]
+        lost = self.faults.get(scenario, f"there is no recording of the scenario {scenario!r}")
+        return (
+            self._why_no_bag(scenario)
+            or why_incomplete(self.submission, launched, "a run of what was handed in")
+            or why_not_run(self.submission, packages)
+            or fault(lost)
+        )
 
     def _why_no_bag(self, scenario: str) -> Finding | None:
         """What is wrong with the bags, if the scenario reads one and cannot."""
-        run = next(one for one in self.loaded.assignment.scenarios if one.id == scenario)
-        found = run.bag and chosen_bag(run.bag, scenario, self.submission)
-        return found if isinstance(found, Finding) else None
+        options = self._scenario(scenario).bag
+        bag = chosen_bag(options, scenario, self.submission) if options else None
+        return bag if isinstance(bag, Finding) else None
 
     def _is_put_right(self, item: ScenarioFinding) -> bool:
         """Whether no check has to wait for a finding: it passed, or the others do not need it."""
-        names = item.finding.names
+        finding = item.finding
+        if finding.status is Status.PASSED or finding.stands_alone:
+            return True
         runs = [run for name, run in self.recordings.items() if item.scenario in (None, name)]
-        goes_on = item.finding.status is Status.PASSED or item.finding.stands_alone
-        return goes_on or (bool(names) and all(names <= run.names for run in runs))
+        return bool(finding.names) and all(finding.names.all_in(run.names) for run in runs)
 
 
 def _with_reason(item: ScenarioFinding, unnamed: Unnamed | None) -> ScenarioFinding:
@@ -230,29 +253,35 @@ def _with_reason(item: ScenarioFinding, unnamed: Unnamed | None) -> ScenarioFind
     return replace(item, finding=finding)
 
 
-def _counted(counts: Counts, findings: Sequence[Finding]) -> tuple[Status, float]:
+def _status_and_credit(counts: Counts, items: Sequence[ScenarioFinding]) -> tuple[Status, float]:
     """Status and credit of a check that judged several scenarios.
 
     Those that could not be judged leave it open only where they matter: a check that failed
-    elsewhere is worth no more.
+    elsewhere is worth no more. So the credit is counted twice, with none and with all for them.
     """
+    findings = [item.finding for item in items]
     worst = min((finding.status for finding in findings), key=SEVERITY.index)
     if worst is Status.SKIPPED:
         return worst, 0.0
-    least, credit = (
-        _CREDIT[counts]([open_ if one.status is Status.ERROR else one.credit for one in findings])
-        for open_ in (0.0, 1.0)
-    )
-    if least < credit:
+
+    def credit(if_not_judged: float) -> float:
+        return _CREDIT[counts](
+            [if_not_judged if one.status is Status.ERROR else one.credit for one in findings]
+        )
+
+    least, most = credit(0.0), credit(1.0)
+    if least < most:
         return Status.ERROR, 0.0
-    return (Status.PASSED if credit == 1.0 else Status.FAILED), credit
+    return (Status.PASSED if most == 1.0 else Status.FAILED), most
 
 
 def _blockers(requires: Iterable[str], results: Mapping[str, CheckResult]) -> tuple[str, ...]:
     """Of the checks that a check requires, or of theirs, those that failed or ended as an error."""
-    required = [results[name] for name in requires]
-    lacking = [one for one in required if one.status != Status.PASSED and not one.put_right]
-    return tuple(dict.fromkeys(root for item in lacking for root in item.waits_for or (item.id,)))
+    roots: list[str] = []
+    for result in (results[name] for name in requires):
+        if result.status is not Status.PASSED and not result.put_right:
+            roots += result.waits_for or (result.id,)
+    return tuple(dict.fromkeys(roots))
 
 
 def _skipped(blockers: Sequence[CheckResult]) -> ScenarioFinding:
@@ -283,12 +312,12 @@ def _with_fixed_values(
     loaded: LoadedAssignment, recordings: Mapping[str, Recording]
 ) -> Mapping[str, Recording]:
     """The recordings, also those from before a number got its name under ``values``."""
-    found = dict(recordings)
+    completed = dict(recordings)
     for scenario in loaded.assignment.scenarios:
-        fixed, recording = fixed_values(scenario), found.get(scenario.id)
+        fixed, recording = fixed_values(scenario), recordings.get(scenario.id)
         if recording is not None and not fixed.keys() <= recording.values.keys():
-            found[scenario.id] = replace(recording, values={**fixed, **recording.values})
-    return found
+            completed[scenario.id] = replace(recording, values={**fixed, **recording.values})
+    return completed
 
 
 def _why_unusable(recording: Recording, scenario: str, submission: SubmissionRecord) -> str | None:

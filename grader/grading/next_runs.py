@@ -101,4 +101,4 @@ def _names(scenario: Scenario, rounds: Sequence[Round]) -> Names:
 
 
 def _is_new(run: Run, before: Run | None) -> bool:
-    return before is None or run.scenario != before.scenario or not run.names <= before.names
+    return before is None or run.scenario != before.scenario or not run.names.all_in(before.names)

@@ -31,8 +31,8 @@ from grader.recording.mcap_writer import (
     RawMessage,
 )
 from grader.recording.model import Message, Recording
+from grader.recording.old_names import names_of_run
 from grader.recording.submission import SubmissionRecord, record_of
-from grader.spec.names import old_names
 
 _LISTS = {name: GenericAlias(list, (kind,)) for name, kind in FACTS.items()}
 
@@ -220,5 +220,5 @@ def _frame(record: Metadata) -> dict[str, Any]:
         # From when there was one robot in a simulation.
         frame["scenes"] = {"": scene}
     if "names" not in frame:
-        frame["names"] = old_names(frame["environment"])
+        frame["names"] = names_of_run(frame["environment"])
     return frame

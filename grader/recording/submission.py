@@ -6,7 +6,6 @@ files nor ROS. All paths are relative to the submission, with forward slashes.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +13,8 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from grader.errors import UsageError
-from grader.spec.names import NO_NAMES, Names, Thing, WrongName
+from grader.recording.old_names import names_of_record
+from grader.spec.names import NO_NAMES, Names, Thing
 
 PYTHON, CPP = "Python", "C++"
 """What programs of students are written in."""
@@ -426,23 +426,27 @@ class SubmissionRecord:
 
     def language(self, package: PackageRecord) -> str:
         """The language of its programs: Python, C++, or nothing if it has none, as interfaces."""
-        own = (path for path in self.files if path.startswith(package.file("")))
-        of_python = any(one.language == PYTHON for one in package.sources)
+        files = (path for path in self.files if path.startswith(package.file("")))
+        is_compiled = any(path.endswith(_OF_CPP) for path in files)
+        of_python = any(source.language == PYTHON for source in package.sources)
         imported = {item.module for item in package.imports}
-        is_compiled = any(path.endswith(_OF_CPP) for path in own)
         if package.build_type == "ament_python" or "rclpy" in imported:
             return PYTHON
-        return CPP if is_compiled else PYTHON if of_python else ""
+        if is_compiled:
+            return CPP
+        return PYTHON if of_python else ""
 
     def spoken(self, names: Iterable[str]) -> str:
         """The language to speak of packages in: C++ if their programs are all in it, or Python.
 
         If they have no programs, those of the whole submission decide.
         """
-        about = [package for name in names if (package := self.package(name))]
-        found = {self.language(one) for one in about} - {""}
-        found = found or {self.language(one) for one in self.packages} - {""}
-        return CPP if found == {CPP} else PYTHON
+        named = [package for name in names if (package := self.package(name))]
+        for packages in (named, self.packages):
+            languages = {self.language(package) for package in packages} - {""}
+            if languages:
+                return CPP if languages == {CPP} else PYTHON
+        return PYTHON
 
     def package(self, name: str) -> PackageRecord | None:
         """The package of that name, or what stands in for it; else None."""
@@ -451,17 +455,13 @@ class SubmissionRecord:
 
 
 _RECORD = TypeAdapter(SubmissionRecord)
-# Records of before called the names of packages so, in pairs.
-_STAND_INS = "stand_ins"
 
 
 def record_of(data: bytes) -> SubmissionRecord:
     """The record in some JSON; a ValidationError says that it holds none."""
-    if f'"{_STAND_INS}":[['.encode() not in data:
-        return _RECORD.validate_json(data)
-    old = json.loads(data)
-    names = Names.of(WrongName(Thing.PACKAGE, own, asked) for asked, own in old[_STAND_INS])
-    return replace(_RECORD.validate_python(old), names=names)
+    record = _RECORD.validate_json(data)
+    names = names_of_record(data)
+    return replace(record, names=names) if names else record
 
 
 def read_record(file: Path) -> SubmissionRecord:

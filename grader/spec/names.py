@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
+# The services and topics that an action consists of, below ``/_action/``.
 _OF_ACTION = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
 
 
 class Thing(str, Enum):
-    """What has a name; how a wrong one is put right depends on nothing else."""
+    """A kind of thing with a name: how a run puts a wrong name right depends on nothing else."""
 
     PACKAGE = "package"
     """Another one is judged and run in its place."""
     FILE = "file"
-    """Of the install space, such as ``lib/bot/driver``: another one is run in its place."""
+    """Of the install space, such as ``lib/bot/driver``; another one is run in its place."""
     INTERFACE = "interface"
     """Another one is judged and used in its place."""
     NODE = "node"
+    """Put right by a rule of ``--ros-args -r``, as are topics, services and actions."""
     TOPIC = "topic"
     SERVICE = "service"
     ACTION = "action"
@@ -47,25 +49,36 @@ class WrongName:
             # Jazzy has no rule for an action, but for each service and topic of it.
             ends = (f"/_action/{end}" for end in _OF_ACTION)
             return tuple(f"{self.own}{end}:={self.asked}{end}" for end in ends)
-        if self.thing is Thing.NODE:
-            (old_space, _, old), (space, _, new) = (
-                name.rpartition("/") for name in (self.own, self.asked)
-            )
-            renamed = (f"{old}:__node:={new}",) if old != new else ()
-            return renamed + ((f"{new}:__ns:={space or '/'}",) if old_space != space else ())
-        return ()
+        return self._rules_for_node() if self.thing is Thing.NODE else ()
+
+    def _rules_for_node(self) -> tuple[str, ...]:
+        own_space, _, own_base = self.own.rpartition("/")
+        asked_space, _, asked_base = self.asked.rpartition("/")
+        rules = []
+        if own_base != asked_base:
+            rules.append(f"{own_base}:__node:={asked_base}")
+        if own_space != asked_space:
+            # ROS applies this rule after that of the name: the node has its right name already.
+            rules.append(f"{asked_base}:__ns:={asked_space or '/'}")
+        return tuple(rules)
 
     def explains(self, other: WrongName) -> bool:
-        """Whether the other name is wrong because it stands in this node's name or namespace."""
-        space = self.own.rpartition("/")[0]
-        moved = space if space != self.asked.rpartition("/")[0] else ""
-        inside = [f"{one}/" for one in (self.own, moved) if one]
-        return self.thing is Thing.NODE is not other.thing and other.own.startswith(tuple(inside))
+        """Whether the other name is wrong only because it lies below this node.
+
+        The private topic ``/bott/speed`` follows the node ``/bott``, and ``/lab/cmd_vel`` a node
+        that is in the namespace ``/lab`` and should not be.
+        """
+        if self.thing is not Thing.NODE or other.thing is Thing.NODE:
+            return False
+        own_space, asked_space = self.own.rpartition("/")[0], self.asked.rpartition("/")[0]
+        if other.own.startswith(f"{self.own}/"):
+            return True
+        return own_space not in ("", asked_space) and other.own.startswith(f"{own_space}/")
 
 
 @dataclass(frozen=True)
 class Names:
-    """What a student calls otherwise than it was asked for, in order and each once."""
+    """All names that a student got wrong, in order and each once."""
 
     wrong: tuple[WrongName, ...] = ()
 
@@ -80,41 +93,29 @@ class Names:
     def __or__(self, other: Names) -> Names:
         return Names.of((*self.wrong, *other.wrong))
 
-    def __le__(self, other: Names) -> bool:
+    def all_in(self, other: Names) -> bool:
+        """Whether each of them is among some other names too."""
         return set(self.wrong) <= set(other.wrong)
 
     def own(self, thing: Thing, asked: str) -> str:
-        """What the student calls a thing that was asked for."""
-        return next(
-            (one.own for one in self.wrong if (one.thing, one.asked) == (thing, asked)), asked
-        )
+        """What the student calls a thing that was asked for: the same, if that is not wrong."""
+        for name in self.wrong:
+            if (name.thing, name.asked) == (thing, asked):
+                return name.own
+        return asked
 
-    def own_file(self, folder: str, name: str) -> str:
+    def own_file(self, folder: str, asked: str) -> str:
         """What the student calls a file that is asked for anywhere below a folder."""
-        found = (one for one in self.wrong if one.thing is Thing.FILE)
-        below = (one for one in found if one.asked.startswith(f"{folder}/"))
-        same = (one.own for one in below if one.asked.rpartition("/")[2] == name)
-        return next(same, name).rpartition("/")[2]
+        for name in self.wrong:
+            is_below = name.thing is Thing.FILE and name.asked.startswith(f"{folder}/")
+            if is_below and name.asked.rpartition("/")[2] == asked:
+                return name.own.rpartition("/")[2]
+        return asked.rpartition("/")[2]
 
     @property
     def rules(self) -> tuple[str, ...]:
         """The rules of ``--ros-args -r`` that put them right."""
-        return tuple(rule for one in self.wrong for rule in one.rules)
+        return tuple(rule for name in self.wrong for rule in name.rules)
 
 
 NO_NAMES = Names()
-
-
-def old_names(environment: Mapping[str, str]) -> Names:
-    """The names in a recording of before, which holds them as texts such as ``/a:=/b``."""
-    given = environment.get("parameters", "").split()
-    pairs = [text.split(":=") for text in environment.get("remaps", "").split()]
-    return Names.of(WrongName(_old_thing(asked, given), own, asked) for own, asked in pairs)
-
-
-def _old_thing(asked: str, parameters: Iterable[str]) -> Thing:
-    if asked.startswith("/"):
-        return Thing.TOPIC
-    if "/" in asked:
-        return Thing.FILE
-    return Thing.PARAMETER if asked in parameters else Thing.PACKAGE

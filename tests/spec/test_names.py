@@ -1,14 +1,10 @@
-"""Wrong names: what ROS itself puts right, and what a recording of before says."""
+"""Wrong names, and what ROS itself puts right."""
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
-from grader.recording.model import to_json
-from grader.recording.submission import PackageRecord, SubmissionRecord, record_of
-from grader.spec.names import NO_NAMES, Names, Thing, WrongName, old_names
+from grader.spec.names import Names, Thing, WrongName
 
 
 @pytest.mark.parametrize(
@@ -46,30 +42,6 @@ def test_an_action_is_put_right_by_all_that_it_consists_of():
 def test_what_stands_in_the_namespace_of_a_node_follows_it(node, other, follows):
     moved = WrongName(Thing.NODE, *node)
     assert moved.explains(WrongName(Thing.TOPIC, other, "/asked")) is follows
-
-
-def test_names_of_a_recording_of_before_are_read_once():
-    text = "/cmdvel:=/cmd_vel lib/bot/go:=lib/bot/run pkg:=bot velocity:=speed"
-    assert old_names({"remaps": text, "parameters": "speed"}) == Names.of(
-        [
-            WrongName(Thing.TOPIC, "/cmdvel", "/cmd_vel"),
-            WrongName(Thing.FILE, "lib/bot/go", "lib/bot/run"),
-            WrongName(Thing.PACKAGE, "pkg", "bot"),
-            WrongName(Thing.PARAMETER, "velocity", "speed"),
-        ]
-    )
-    assert old_names({}) == NO_NAMES
-
-
-def test_packages_of_a_record_of_before_still_stand_in_for_others():
-    record = SubmissionRecord("ana", "ab" * 32, packages=(PackageRecord("week3", "week3"),))
-    before = {**json.loads(to_json(record)), "stand_ins": [["bot", "week3"]]}
-    del before["names"]
-    found = record_of(json.dumps(before, separators=(",", ":")).encode())
-    assert found.package("bot") == record.packages[0]
-    assert record_of(to_json(found)) == found
-    before["stand_ins"] = []
-    assert record_of(json.dumps(before, separators=(",", ":")).encode()) == record
 
 
 def test_a_file_is_called_otherwise_wherever_it_is_below_its_folder():

@@ -110,12 +110,12 @@ def why_rejected(recording: Recording) -> Finding | None:
     rejected = [item for item in recording.incidents if item.kind == "command_rejected"]
     if not rejected:
         return None
-    first = rejected[0]
-    verb = "was" if len(rejected) == 1 else "were"
+    first, topic = rejected[0], code(command_topic(recording))
+    were = "was" if len(rejected) == 1 else "were"
     return mistaken(
         "not_finite",
-        f"{counted(len(rejected), 'command')} on {code(command_topic(recording))} {verb} not finite "
-        f"(first: {first.text}); the robot stops instead",
+        f"{counted(len(rejected), 'command')} on {topic} {were} not finite (first: {first.text}); "
+        "the robot stops instead",
         evidence_at(recording, "command rejected", first.time_ns),
     )
 
