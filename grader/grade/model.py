@@ -8,10 +8,10 @@ from decimal import ROUND_HALF_UP, Decimal
 from typing import Any
 
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.model import Assignment, Visibility
+from grader.assignment.model import Assignment, Scenario, Visibility
 from grader.findings.finding import Finding, Status
 from grader.recording.submission import SubmissionRecord
-from grader.spec.names import Names, Thing
+from grader.spec.names import Names, Thing, WrongName
 
 STEP = Decimal("0.01")
 """What partial credit is rounded to; sums are exact: 0.1 + 0.2 is 0.3."""
@@ -131,34 +131,30 @@ class Grade:
         A topic that is wrong only because the name or the namespace of its node is, is left out: it
         follows its node.
         """
-        programs = {
+        programs: dict[str | None, set[tuple[str | None, str]]] = {
             scenario.id: {(launch.package, launch.program) for launch in scenario.launch}
             for scenario in self.assignment.scenarios
         }
-        # A launch file says itself how its nodes and their topics are called.
-        of_files = {
-            scenario.id
-            for scenario in self.assignment.scenarios
-            if not any(launch.executable for launch in scenario.launch)
-        }
         asked = {result.asked_name for result in self.results}
-        wrong = [
-            (one, programs.get(item.scenario or ""), result.put_right)
-            for result in self.results
-            for item in result.findings
-            for one in item.finding.names.wrong
-            if (one.thing, one.own) not in asked
-        ]
-        untried = [one for one, _, is_put_right in wrong if not is_put_right]
+        found: list[tuple[WrongName, str | None]] = []
+        untried: list[WrongName] = []
+        for result in self.results:
+            for item in result.findings:
+                wrong = [w for w in item.finding.names.wrong if (w.thing, w.own) not in asked]
+                found += [(name, item.scenario) for name in wrong]
+                untried += [] if result.put_right else wrong
+
+        def applies(name: WrongName, where: str | None, scenario: Scenario) -> bool:
+            if where in programs and programs[where].isdisjoint(programs[scenario.id]):
+                return False
+            # A launch file says itself how its nodes and their topics are called.
+            if name.rules and not any(launch.executable for launch in scenario.launch):
+                return False
+            return not any(other.explains(name) for other in untried)
+
         return {
-            name: Names.of(
-                one
-                for one, others, _ in wrong
-                if others is None or not others.isdisjoint(launched)
-                if not (one.rules and name in of_files)
-                if not any(other.explains(one) for other in untried)
-            )
-            for name, launched in programs.items()
+            scenario.id: Names.of(name for name, where in found if applies(name, where, scenario))
+            for scenario in self.assignment.scenarios
         }
 
     def disturbed_scenarios(self, status: Status) -> tuple[str, ...]:

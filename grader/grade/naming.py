@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
+from typing import NamedTuple
 
 from grader.assignment.contract.expand import expanded
 from grader.assignment.load import LoadedAssignment
@@ -81,6 +82,17 @@ def with_chosen_names(
     return ChosenNames(_with_own_types(loaded, submission), submission, unnamed, chosen)
 
 
+class _Choice(NamedTuple):
+    """What stands for a free name, why that is not right, and where it is right, why it is taken.
+
+    The author's example stands for what is not found.
+    """
+
+    value: str
+    wrong: Finding | None = None
+    why: str = ""
+
+
 def _with_chosen(
     loaded: LoadedAssignment, submission: SubmissionRecord, recordings: Mapping[str, Recording]
 ) -> tuple[LoadedAssignment, tuple[Unnamed, ...], tuple[Chosen, ...]]:
@@ -91,32 +103,26 @@ def _with_chosen(
     wrong = _wrong_answer(variables, submission)
     if wrong is not None:
         return loaded, (Unnamed(wrong, frozenset(variables)),), ()
-    given, values = dict(submission.given), dict[str, str]()
     answers = {name: variables[name].whole(value) for name, value in submission.answers}
-    lost: dict[str, Unnamed] = {}
+    values: dict[str, str] = {}
+    unnamed: dict[str, Unnamed] = {}
     chosen: list[Chosen] = []
     for name, variable in variables.items():
-        told = given.get(name)
-        if told is not None and re.fullmatch(variable.part, told):
-            values[name] = told
+        given = _given(name, variable, submission)
+        if given is not None:
+            values[name] = given
             continue
-        if told or variable.match is None:
-            raise UsageError(_not_given(name, variable, told))
         search = Search(loaded, submission, recordings, name, variable, {**answers, **values})
-        above = next((one.finding for other, one in lost.items() if _is_of(variable, other)), None)
-        values[name], why_not, why = (
-            (str(variable.example), above, "")
-            if above is not None and name not in answers
-            else _choice(search, answers.get(name))
-        )
-        if why_not is not None:
+        choice = _choice(search, answers.get(name), unnamed)
+        values[name] = choice.value
+        if choice.wrong is not None:
             shows_in_runs = variable.is_of_runs or search.is_of_what_was_not_built()
             can_run = shows_in_runs or not _is_used_in_runs(name, loaded)
-            lost[name] = Unnamed(why_not, frozenset((name,)), can_run)
-        elif why:
-            chosen.append(Chosen(name, values[name], why))
+            unnamed[name] = Unnamed(choice.wrong, frozenset((name,)), can_run)
+        elif choice.why:
+            chosen.append(Chosen(name, choice.value, choice.why))
     try:
-        return with_values(loaded, values), tuple(lost.values()), tuple(chosen)
+        return with_values(loaded, values), tuple(unnamed.values()), tuple(chosen)
     except AssignmentError as error:
         names = codes(f"{name}: {value}" for name, value in values.items())
         seen = f"with {names}, {error.problems[0].message}"
@@ -126,24 +132,34 @@ def _with_chosen(
         return loaded, (Unnamed(wrong, frozenset(variables)),), ()
 
 
-def _choice(search: Search, answer: str | None) -> tuple[str, Finding | None, str]:
-    """What stands for a free name, why that is not right, and where it is right, why it is taken.
+def _given(name: str, variable: Variable, submission: SubmissionRecord) -> str | None:
+    """The value that the roster or ``--set`` gives, or None where a search may find one."""
+    value = dict(submission.given).get(name)
+    if value is not None and re.fullmatch(variable.part, value):
+        return value
+    if value or variable.match is None:
+        raise UsageError(_not_given(name, variable, value))
+    return None
 
-    The author's example stands for what is not found.
-    """
+
+def _choice(search: Search, answer: str | None, unnamed: Mapping[str, Unnamed]) -> _Choice:
+    """What stands for a free name: what the submission says, or what is found in it."""
     variable = search.variable
     if answer is not None:
-        return answer, search.why_wrong(answer), f"as {code(ANSWERS_FILE)} says"
+        return _Choice(answer, search.why_wrong(answer), f"as {code(ANSWERS_FILE)} says")
+    example = str(variable.example)
+    for name, item in unnamed.items():
+        # Of what is not known nothing can be found, such as an executable of a package.
+        if f"{{{name}}}" in f"{variable.match} {variable.of} {variable.where}":
+            return _Choice(example, item.finding)
     found = search.chosen()
     if found is not None:
-        return found, None, search.reason if variable.where is not None else ""
-    example = str(variable.example)
+        return _Choice(found, why=search.reason if variable.where is not None else "")
     if search.is_open:
-        return example, search.why_open(), ""
+        return _Choice(example, search.why_open())
     # Why a run does not show it, or why it was not built, is told by the checks of that.
     is_told = variable.is_of_runs or search.is_of_what_was_not_built()
-    why_none = search.why_none() if search.others or not is_told else None
-    return example, why_none, ""
+    return _Choice(example, search.why_none() if search.others or not is_told else None)
 
 
 def _is_used_in_runs(name: str, loaded: LoadedAssignment) -> bool:
@@ -152,39 +168,44 @@ def _is_used_in_runs(name: str, loaded: LoadedAssignment) -> bool:
     return source is not None and f"{{{name}}}" in json.dumps(source.data.get("scenarios"))
 
 
-def _is_of(variable: Variable, name: str) -> bool:
-    """Whether what is looked for is described by another name."""
-    return f"{{{name}}}" in f"{variable.match} {variable.of} {variable.where}"
-
-
 def _wrong_answer(
     variables: Mapping[str, Variable], submission: SubmissionRecord
 ) -> Finding | None:
     """What is wrong with the file in which a submission says what is meant, or None."""
-    wrong, answers = submission.answers_problem, dict(submission.answers)
-    for name, value in () if wrong else submission.answers:
-        variable = variables.get(name)
-        if variable is None:
-            wrong = f"there is no name {name!r} to choose.{nearest_or_all(name, variables)}"
-        elif variable.match is None or variable.column is not None:
-            wrong = f"{name!r} is not yours to choose: it is given"
-        elif not re.fullmatch(variable.part, value):
-            wrong = f"{name!r} cannot be {value!r}: its form is {variable.match}"
-        else:
-            same = [one for one in alike(name, variables) if one != name and one in answers]
-            whole = variable.whole(value)
-            if other := next((one for one in same if variable.whole(answers[one]) == whole), None):
-                wrong = f"{name!r} and {other!r} cannot both be {whole!r}"
+    wrong = submission.answers_problem
+    if not wrong:
+        reasons = (_why_not_yours(name, variables, submission) for name, _ in submission.answers)
+        # The last one: a later line of the file may come of an earlier one.
+        wrong = next((reason for reason in reversed([*reasons]) if reason), None)
     if not wrong:
         return None
     asked = f"a line such as `name: value` for each name in {code(ANSWERS_FILE)}"
     return Finding(wrong, "Correct the file.", verdict=Verdict.ASKS, expected=asked)
 
 
-def _not_given(name: str, variable: Variable, told: str | None) -> str:
+def _why_not_yours(
+    name: str, variables: Mapping[str, Variable], submission: SubmissionRecord
+) -> str:
+    """What is wrong with one line of that file, or nothing."""
+    variable, answers = variables.get(name), dict(submission.answers)
+    value = answers[name]
+    if variable is None:
+        return f"there is no name {name!r} to choose.{nearest_or_all(name, variables)}"
+    if variable.match is None or variable.column is not None:
+        return f"{name!r} is not yours to choose: it is given"
+    if not re.fullmatch(variable.part, value):
+        return f"{name!r} cannot be {value!r}: its form is {variable.match}"
+    whole = variable.whole(value)
+    for other in alike(name, variables):
+        if other != name and other in answers and variable.whole(answers[other]) == whole:
+            return f"{name!r} and {other!r} cannot both be {whole!r}"
+    return ""
+
+
+def _not_given(name: str, variable: Variable, value: str | None) -> str:
     origin = f"the column {variable.column!r} of the roster" if variable.column else "--set"
     kind = "digits" if isinstance(variable.example, int) else "letters, digits and underscores"
-    wrong = f"holds {told!r}, and not only {kind}" if told else "says nothing here"
+    wrong = f"holds {value!r}, and not only {kind}" if value else "says nothing here"
     return f"{origin} {wrong}; it stands for {{{name}}} (for one submission: --set {name}=VALUE)"
 
 
@@ -209,8 +230,11 @@ def _other_packages(loaded: LoadedAssignment, submission: SubmissionRecord) -> I
             if package.name not in taken and package.manifest_error is None
         ]
         having = [one.name for one in others if programs.intersection(programs_of(one))]
-        only = having[0] if len(having) == 1 else None
-        if own := only or nearest(name, having or [one.name for one in others]):
+        if len(having) == 1:
+            own: str | None = having[0]
+        else:
+            own = nearest(name, having or [package.name for package in others])
+        if own is not None:
             taken.add(own)
             yield WrongName(Thing.PACKAGE, own, name)
 
@@ -228,24 +252,29 @@ def _other_interfaces(
             continue
         if not isinstance(find_definition(submission, name), Finding):
             continue
-        paths = [PurePosixPath(one.file) for one in package.definitions]
-        folder = PurePosixPath(package.file(name.kind))
-        names = [one.stem for one in paths if (one.parent, one.suffix) == (folder, f".{name.kind}")]
-        others = [one for one in names if str(replace(name, name=one)) not in asked]
-        other = meant(name.name, others)
-        if other and re.fullmatch(INTERFACE, own := f"{package.name}/{name.kind}/{other}"):
+        paths = [PurePosixPath(item.file) for item in package.definitions]
+        place = PurePosixPath(package.file(name.kind)), f".{name.kind}"
+        names = [path.stem for path in paths if (path.parent, path.suffix) == place]
+        other = meant(
+            name.name, [one for one in names if str(replace(name, name=one)) not in asked]
+        )
+        own = f"{package.name}/{name.kind}/{other}"
+        if other is not None and re.fullmatch(INTERFACE, own):
             yield WrongName(Thing.INTERFACE, own, parameters.interface)
 
 
 def _with_own_types(loaded: LoadedAssignment, submission: SubmissionRecord) -> LoadedAssignment:
     """The assignment with the student's names of interfaces: the probe cannot rename them."""
     own = {}
-    for one in submission.names.wrong:
-        if one.thing is Thing.INTERFACE:
-            own[one.asked] = one.own
-        elif (package := submission.package(one.asked)) and package.definitions:
-            own[f"{one.asked}/"] = f"{one.own}/"
+    for name in submission.names.wrong:
+        package = submission.package(name.asked)
+        if name.thing is Thing.INTERFACE:
+            own[name.asked] = name.own
+        elif package is not None and package.definitions:
+            own[f"{name.asked}/"] = f"{name.own}/"
+    if not own:
+        return loaded
     try:
-        return with_values(loaded, {**loaded.values, **own}) if own else loaded
+        return with_values(loaded, {**loaded.values, **own})
     except AssignmentError:
         return loaded
