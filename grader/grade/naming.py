@@ -174,9 +174,8 @@ def _wrong_answer(
     """What is wrong with the file in which a submission says what is meant, or None."""
     wrong = submission.answers_problem
     if not wrong:
-        reasons = (_why_not_yours(name, variables, submission) for name, _ in submission.answers)
-        # The last one: a later line of the file may come of an earlier one.
-        wrong = next((reason for reason in reversed([*reasons]) if reason), None)
+        for name, _ in submission.answers:
+            wrong = _why_not_yours(name, variables, submission) or wrong
     if not wrong:
         return None
     asked = f"a line such as `name: value` for each name in {code(ANSWERS_FILE)}"
@@ -255,9 +254,8 @@ def _other_interfaces(
         paths = [PurePosixPath(item.file) for item in package.definitions]
         place = PurePosixPath(package.file(name.kind)), f".{name.kind}"
         names = [path.stem for path in paths if (path.parent, path.suffix) == place]
-        other = meant(
-            name.name, [one for one in names if str(replace(name, name=one)) not in asked]
-        )
+        free = [other for other in names if str(replace(name, name=other)) not in asked]
+        other = meant(name.name, free)
         own = f"{package.name}/{name.kind}/{other}"
         if other is not None and re.fullmatch(INTERFACE, own):
             yield WrongName(Thing.INTERFACE, own, parameters.interface)
