@@ -6,10 +6,10 @@ from hypothesis import strategies as st
 from grader.diagnosis.process.raised import (
     fatal_failure,
     interrupted_call,
-    parse_failures,
     student_place,
     submission_path,
 )
+from grader.diagnosis.process.tracebacks import parse_failures
 from tests.checks.builder import (
     BOT,
     INSTALLED,

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 from grader.diagnosis.explanation import explanation, remedy
 from grader.diagnosis.process.process_exit import NotDone, process_ended
-from grader.diagnosis.process.raised import in_brackets, own_frames, parse_failures, raised_at
+from grader.diagnosis.process.raised import in_brackets, own_frames, raised_at
 from grader.diagnosis.process.standing import Stand, slow_callback, unkept_future, where_it_stands
+from grader.diagnosis.process.tracebacks import parse_failures
 from grader.findings.finding import Evidence, Finding, evidence_at, moment, until_the_end
 from grader.findings.words import SPIN, codes
 from grader.measure import declarations

@@ -9,81 +9,27 @@ from itertools import takewhile
 
 from grader.diagnosis.process.crash import parse_crashes
 from grader.diagnosis.process.failure import Failure, Frame
+from grader.diagnosis.process.tracebacks import FRAME, parse_assertions, parse_failures
 from grader.findings.words import code
 from grader.measure import declarations
 from grader.recording.model import Recording
 from grader.recording.submission import SourceError, SubmissionRecord
 
-_HEADER = "Traceback (most recent call last):"
-_LINKS = (
-    "During handling of the above exception, another exception occurred:",
-    "The above exception was the direct cause of the following exception:",
-)
-_IGNORED = "Exception ignored in"
-_FRAME = re.compile(r'\s+File "(?P<file>[^"]+)", line (?P<line>\d{1,7})(?:, in (?P<where>.+))?')
-_RAISED = re.compile(r"(?P<type>[A-Za-z_][A-Za-z0-9_.]{0,200})(?:: (?P<message>.*))?")
-_ASSERTED = re.compile(r".+: Assertion (?P<message>.+ failed\.)")
 _CALLED = re.compile(r"(\w+)\(\)")
 _NOT_CALLABLE = re.compile(r"'(\w+)' object is not callable")
 _INSTALL_FOLDERS = ("site-packages", "dist-packages")
 _OF_CPP = (".cpp", ".cc", ".cxx", ".c", ".hpp", ".hh", ".hxx", ".h")
 
 
-def parse_failures(lines: Sequence[str]) -> tuple[Failure, ...]:
-    """Find every traceback in the output of one process."""
-    found: list[Failure] = []
-    linked = ignored = False
-    index = 0
-    while index < len(lines):
-        line = lines[index]
-        if line.strip() == _HEADER or _FRAME.fullmatch(line):
-            start = index + 1 if line.strip() == _HEADER else index
-            failure, index = _parse_one(lines, start, linked, ignored)
-            if failure is not None:
-                found.append(failure)
-                linked = ignored = False
-            continue
-        linked = linked or line.strip() in _LINKS
-        ignored = ignored or line.startswith(_IGNORED)
-        index += 1
-    return tuple(found)
-
-
-def _parse_one(
-    lines: Sequence[str], index: int, linked: bool, ignored: bool
-) -> tuple[Failure | None, int]:
-    """Read frames from ``index`` on, then the exception's line; return where to go on."""
-    frames: list[Frame] = []
-    while index < len(lines):
-        line = lines[index]
-        match = _FRAME.fullmatch(line)
-        if match:
-            frames.append(Frame(match["file"], int(match["line"]), match["where"] or ""))
-        elif line[:1].isspace():
-            if frames and not frames[-1].source:
-                last = frames[-1]
-                frames[-1] = Frame(last.file, last.line, last.where, line.strip())
-        else:
-            break
-        index += 1
-    raised = _RAISED.fullmatch(lines[index].rstrip()) if index < len(lines) and frames else None
-    if not raised:
-        return None, index
-    short = raised["type"].rpartition(".")[2]
-    return Failure(short, raised["message"] or "", tuple(frames), linked, ignored), index + 1
-
-
 def failures(recording: Recording, process: str) -> tuple[Failure, ...]:
     """Every failure that a process wrote to stderr: tracebacks, or what ends compiled programs."""
     of_process = (line for line in recording.log if line.process == process)
     lines = [line.text for line in of_process if line.stream == "stderr"]
-    if declarations.is_compiled(recording, process):
-        return parse_failures(lines) or parse_crashes(lines)
-    # The C code that converts a message ends the process without a traceback.
-    asserted = (_ASSERTED.fullmatch(line) for line in lines)
-    return parse_failures(lines) or tuple(
-        Failure("Assertion", one["message"], ()) for one in asserted if one
-    )
+    tracebacks = parse_failures(lines)
+    if tracebacks:
+        return tracebacks
+    is_compiled = declarations.is_compiled(recording, process)
+    return parse_crashes(lines) if is_compiled else parse_assertions(lines)
 
 
 def fatal_failure(recording: Recording, process: str) -> Failure | None:
@@ -92,13 +38,15 @@ def fatal_failure(recording: Recording, process: str) -> Failure | None:
     Of ``ValueError``, then another error while that one was handled, the ``ValueError`` is
     the one to correct; but not if rclpy handled it itself, to say it in better words.
     """
-    found = [failure for failure in failures(recording, process) if not failure.ignored]
-    first = len(found) - 1
-    while first > 0 and found[first].linked:
+    printed = [failure for failure in failures(recording, process) if not failure.ignored]
+    first = len(printed) - 1
+    while first > 0 and printed[first].linked:
         first -= 1
-    chain = found[max(first, 0) :]
-    own = (one for one in chain if _student_frame(one, recording.submission) is not None)
-    return next(own, chain[0] if chain else None)
+    last_chain = printed[max(first, 0) :]
+    for failure in last_chain:
+        if _student_frame(failure, recording.submission) is not None:
+            return failure
+    return last_chain[0] if last_chain else None
 
 
 @dataclass(frozen=True)
@@ -117,26 +65,27 @@ def interrupted_call(recording: Recording, process: str) -> Interrupted | None:
     A process that was in ``rclpy.spin`` was where it should be: that place is not returned,
     unless a callback spins.
     """
-    found = [item for item in failures(recording, process) if item.type == "KeyboardInterrupt"]
-    frame = _student_frame(found[-1], recording.submission) if found else None
+    interrupts = [one for one in failures(recording, process) if one.type == "KeyboardInterrupt"]
+    frame = _student_frame(interrupts[-1], recording.submission) if interrupts else None
     if frame is None:
         return None
-    callers = found[-1].frames[: found[-1].frames.index(frame)]
-    is_called = any("/rclpy/" in caller.file for caller in callers)
-    if not is_called and "spin" in frame.source:
+    frames = interrupts[-1].frames
+    in_callback = any("/rclpy/" in caller.file for caller in frames[: frames.index(frame)])
+    if not in_callback and "spin" in frame.source:
         return None
-    path = submission_path(frame.file, recording.submission) or frame.file
     message = f"{code(frame.where)} was here when it was stopped"
-    return Interrupted(SourceError(path, frame.line, message), frame.where, frame.source, is_called)
+    place = _place_of(frame, message, recording.submission)
+    return Interrupted(place, frame.where, frame.source, in_callback)
 
 
 def student_place(failure: Failure, submission: SubmissionRecord) -> SourceError | None:
     """The deepest frame in the student's own files, with its path in the submission."""
     frame = _student_frame(failure, submission)
-    if frame is None:
-        return None
-    path = submission_path(frame.file, submission) or frame.file
-    return SourceError(path, frame.line, str(failure))
+    return _place_of(frame, str(failure), submission) if frame is not None else None
+
+
+def _place_of(frame: Frame, message: str, submission: SubmissionRecord) -> SourceError:
+    return SourceError(submission_path(frame.file, submission) or frame.file, frame.line, message)
 
 
 def raised_at(failure: Failure, recording: Recording) -> SourceError | None:
@@ -144,72 +93,80 @@ def raised_at(failure: Failure, recording: Recording) -> SourceError | None:
 
     In spin() it is that of the callback, in publish() that which set the field.
     """
-    submission, place = recording.submission, student_place(failure, recording.submission)
-    frame = _student_frame(failure, submission)
+    place = student_place(failure, recording.submission)
+    frame = _student_frame(failure, recording.submission)
     if frame is None or place is None or frame is failure.frames[-1]:
         return place
-    if "spin" not in frame.source:
-        return _set_at(place, recording) or place
-    called = (
-        defined_at(name, str(failure), submission) for name in _CALLED.findall(failure.message)
-    )
-    if found := next(filter(None, called), None):
-        return found
-    # What is no function was given to a timer in place of one.
-    given = _NOT_CALLABLE.match(failure.message)
-    for timer in recording.declared("timer") if given else ():
-        path = submission_path(str(timer.data.get("file")), submission)
+    if "spin" in frame.source:
+        return _callback_at(failure, recording) or _timer_at(failure, recording) or place
+    return _field_set_at(place, recording) or place
+
+
+def _callback_at(failure: Failure, recording: Recording) -> SourceError | None:
+    """The function that the message names, as in ``tick() takes 1 positional argument``."""
+    for name in _CALLED.findall(failure.message):
+        place = defined_at(name, str(failure), recording.submission)
+        if place is not None:
+            return place
+    return None
+
+
+def _timer_at(failure: Failure, recording: Recording) -> SourceError | None:
+    """Where a timer was created with something that is no function as its callback."""
+    match = _NOT_CALLABLE.match(failure.message)
+    for timer in recording.declared("timer") if match is not None else ():
+        path = submission_path(str(timer.data.get("file")), recording.submission)
         line = timer.data.get("line")
-        if given and timer.data.get("callback") == given[1] and path and isinstance(line, int):
+        if match and timer.data.get("callback") == match[1] and path and isinstance(line, int):
             return SourceError(path, line, str(failure))
-    return place
+    return None
 
 
-def _set_at(published: SourceError, recording: Recording) -> SourceError | None:
-    """The line that gave a field a value of another type, as the process declares the field."""
-    told = (one.data.get("field") for one in recording.declared("exiting"))
-    field = str(next(filter(None, told), "")).split(".")[::-1]
-    best: tuple[tuple[int, bool, bool, int], SourceError] | None = None
+def _field_set_at(published: SourceError, recording: Recording) -> SourceError | None:
+    """The line that gave a field a value of another type, as the process declares the field.
+
+    Of several, that which names most of the path of the field, such as ``twist.linear.x``; then
+    one in the file that publishes, before it does so.
+    """
+    declared = (str(one.data.get("field") or "") for one in recording.declared("exiting"))
+    field = next(filter(None, declared), "").split(".")
+    candidates: list[tuple[tuple[int, bool, bool, int], SourceError]] = []
     for package in recording.submission.packages:
         for file in package.sources:
             for target, line in file.sets:
-                parts = zip(target.split(".")[:0:-1], field, strict=False)
-                alike = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], parts))
-                # Of two in the same file the one before the message is published.
-                own = file.path == published.file
-                rank = (alike, own, own and line <= (published.line or 0), line)
-                if alike and (best is None or rank > best[0]):
-                    best = rank, SourceError(file.path, line, published.message)
-    return best and best[1]
+                ends = zip(reversed(target.split(".")[1:]), reversed(field), strict=False)
+                equal_steps = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], ends))
+                if equal_steps:
+                    in_file = file.path == published.file
+                    is_before = in_file and line <= (published.line or 0)
+                    place = SourceError(file.path, line, published.message)
+                    candidates.append(((equal_steps, in_file, is_before, line), place))
+    return max(candidates, key=lambda candidate: candidate[0])[1] if candidates else None
 
 
 def defined_at(name: str, message: str, submission: SubmissionRecord) -> SourceError | None:
     """The line where the student's program defines a function or a method."""
-    last = name.rpartition(".")[2]
-    return next(
-        (
-            SourceError(file.path, one.line, message)
-            for package in submission.packages
-            for file in package.sources
-            for one in file.functions
-            if one.name.rpartition(".")[2] == last
-        ),
-        None,
-    )
+    short = name.rpartition(".")[2]
+    for package in submission.packages:
+        for file in package.sources:
+            for function in file.functions:
+                if function.name.rpartition(".")[2] == short:
+                    return SourceError(file.path, function.line, message)
+    return None
 
 
 def own_frames(lines: Sequence[str], submission: SubmissionRecord) -> list[str]:
     """Printed lines, of a traceback only the frames in the student's files, if it has any."""
     kept: list[str] = []
-    in_foreign = has_own = False
+    is_foreign = has_own = False
     for line in lines:
-        frame = _FRAME.fullmatch(line)
+        frame = FRAME.fullmatch(line)
         if frame:
-            own = submission_path(frame["file"], submission) is not None
-            in_foreign, has_own = not own, has_own or own
+            is_foreign = submission_path(frame["file"], submission) is None
+            has_own = has_own or not is_foreign
         elif not line[:1].isspace():
-            in_foreign = False
-        if not in_foreign:
+            is_foreign = False
+        if not is_foreign:
             kept.append(line)
     return kept if has_own else list(lines)
 
@@ -220,8 +177,10 @@ def in_brackets(place: SourceError | None) -> str:
 
 
 def _student_frame(failure: Failure, submission: SubmissionRecord) -> Frame | None:
-    own = (frame for frame in reversed(failure.frames) if submission_path(frame.file, submission))
-    return next(own, None)
+    for frame in reversed(failure.frames):
+        if submission_path(frame.file, submission):
+            return frame
+    return None
 
 
 def submission_path(installed: str, submission: SubmissionRecord) -> str | None:
@@ -231,17 +190,17 @@ def submission_path(installed: str, submission: SubmissionRecord) -> str | None:
     knows the path of its source instead.
     """
     if installed.endswith(_OF_CPP):
-        named = (path for path in submission.files if f"/{installed}".endswith(f"/{path}"))
-        within = (path for path in submission.files if path.endswith(f"/{installed}"))
-        return max(named, key=len, default=None) or next(within, None)
-    known = [pair for package in submission.packages for pair in package.files]
-    known += [
-        (f"share/{package.name}/{new}", old)
+        ending_it = [path for path in submission.files if f"/{installed}".endswith(f"/{path}")]
+        ended_by_it = [path for path in submission.files if path.endswith(f"/{installed}")]
+        return max(ending_it, key=len, default=ended_by_it[0] if ended_by_it else None)
+    origins = [pair for package in submission.packages for pair in package.files]
+    origins += [
+        (f"share/{package.name}/{path}", origin)
         for package in submission.packages
-        for new, old in package.shared
-        if old
+        for path, origin in package.shared
+        if origin
     ]
-    fitting = [pair for pair in known if _ends_with(installed, pair[0])]
+    fitting = [pair for pair in origins if _ends_with(installed, pair[0])]
     return max(fitting, key=lambda pair: len(pair[0]))[1] if fitting else None
 
 
