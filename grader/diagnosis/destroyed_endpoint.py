@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from grader.diagnosis.explanation import remedy
 from grader.diagnosis.process.process_exit import ended_early, exited
 from grader.findings.finding import Finding, evidence_at
 from grader.findings.words import code
 from grader.measure import declarations
 from grader.recording.interaction import Service, executor_services
-from grader.recording.model import NS, Endpoint, Kind, Recording
+from grader.recording.model import NS, Call, Endpoint, Kind, Recording
 
 # A program that is about to end may destroy what it has first.
 _LONG_NS = NS
@@ -23,7 +25,8 @@ def why_unsubscribed(
         sent_ns: When something was sent that they did not get; by default any time will do.
     """
     subscriptions = recording.student_endpoints(Kind.SUBSCRIPTION, topic)
-    if sent_ns is not None and any((item.vanished_ns or 0) > sent_ns for item in subscriptions):
+    last_ns = max((item.vanished_ns or 0 for item in subscriptions), default=0)
+    if sent_ns is not None and last_ns > sent_ns:
         return None
     return _why_destroyed(recording, seen, f"the subscription to {code(topic)}", subscriptions)
 
@@ -35,16 +38,16 @@ def why_unpublished(recording: Recording, topic: str, seen: str) -> Finding | No
 
 
 def _why_destroyed(
-    recording: Recording, seen: str, what: str, found: tuple[Endpoint | Service, ...]
+    recording: Recording, seen: str, what: str, items: tuple[Endpoint | Service, ...]
 ) -> Finding | None:
     """The cause if the student's code destroyed all of some endpoints.
 
     What vanished with its process, or because the scenario ended that, was not destroyed.
     """
-    ends = [item.vanished_ns for item in found if item.vanished_ns is not None]
-    if not found or len(ends) < len(found):
+    vanished_ns = [item.vanished_ns for item in items if item.vanished_ns is not None]
+    if not items or len(vanished_ns) < len(items):
         return None
-    return _destroyed_at(recording, seen, what, {item.node for item in found}, max(ends))
+    return _destroyed_at(recording, seen, what, {item.node for item in items}, max(vanished_ns))
 
 
 def why_dropped(recording: Recording, kind: Kind, topic: str) -> Finding | None:
@@ -55,27 +58,34 @@ def why_dropped(recording: Recording, kind: Kind, topic: str) -> Finding | None:
     last_ns = declarations.dropped_ns(recording, kind, topic)
     if last_ns is None or last_ns > recording.stop_ns - _LONG_NS:
         return None
-    made = [one for one in recording.declared(kind.value) if one.data.get("topic") == topic]
-    nodes = {str(one.data.get("node")) for one in made}
-    own = {name for node in nodes for name in executor_services(node)}
-    asked = any(call.requested_ns < last_ns and call.service not in own for call in recording.calls)
+    created = [one for one in recording.declared(kind.value) if one.data.get("topic") == topic]
+    nodes = {str(one.data.get("node")) for one in created}
+    calls = _calls_of_scenario(recording, nodes)
+    is_asked = any(call.requested_ns < last_ns for call in calls)
     spun_ns = min((one.time_ns for one in recording.declared("spin")), default=last_ns)
-    if spun_ns < last_ns and (asked or recording.goals or any(recording.sent.values())):
+    if spun_ns < last_ns and (is_asked or recording.goals or any(recording.sent.values())):
         return None
     what = f"the {kind.value} {'on' if kind is Kind.PUBLISHER else 'to'} {code(topic)}"
     return _destroyed_at(recording, "it was there only for a moment", what, nodes, last_ns)
 
 
-def why_withdrawn(recording: Recording, what: str, found: tuple[Service, ...]) -> Finding | None:
+def why_withdrawn(recording: Recording, what: str, servers: tuple[Service, ...]) -> Finding | None:
     """The cause if the student's code destroyed a server before it answered anything."""
-    names = {item.name for item in found}
-    own = {name for item in found for name in executor_services(item.node)}
-    used = any(call.answered_ns and call.service not in own for call in recording.calls)
-    used = used or any(goal.answered_ns and goal.action in names for goal in recording.goals)
-    ends = [item.vanished_ns for item in found if item.vanished_ns is not None]
-    if used or not ends or max(ends) > recording.stop_ns - _LONG_NS:
+    names = {server.name for server in servers}
+    calls = _calls_of_scenario(recording, {server.node for server in servers})
+    goals = [goal for goal in recording.goals if goal.action in names]
+    if any(call.answered_ns for call in calls) or any(goal.answered_ns for goal in goals):
         return None
-    return _why_destroyed(recording, "it was there only for a moment", what, found)
+    vanished_ns = [server.vanished_ns for server in servers if server.vanished_ns is not None]
+    if not vanished_ns or max(vanished_ns) > recording.stop_ns - _LONG_NS:
+        return None
+    return _why_destroyed(recording, "it was there only for a moment", what, servers)
+
+
+def _calls_of_scenario(recording: Recording, nodes: Iterable[str]) -> list[Call]:
+    """Calls that the scenario asks for, without those by which the probe watches the executors."""
+    watching = {name for node in nodes for name in executor_services(node)}
+    return [call for call in recording.calls if call.service not in watching]
 
 
 def _destroyed_at(
@@ -84,12 +94,14 @@ def _destroyed_at(
     """The cause, unless the process ended itself or the scenario did something to it."""
     for node in nodes:
         process = declarations.process_of(recording, node)
-        if ended_early(recording, process) if process is not None else exited(recording):
-            return None
-        if any(
-            done.time_ns <= last_ns and (process is None or process.name == done.process)
-            for done in recording.interventions
-        ):
+        has_ended = exited(recording) if process is None else ended_early(recording, process)
+        done_to_it = [
+            intervention
+            for intervention in recording.interventions
+            if intervention.time_ns <= last_ns
+            and (process is None or process.name == intervention.process)
+        ]
+        if has_ended or done_to_it:
             return None
     when_s = recording.since_launch_s(last_ns)
     return Finding(

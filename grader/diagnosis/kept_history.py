@@ -44,17 +44,20 @@ class OtherHistory(Symptom[Finding]):
     @classmethod
     def of(cls, recording: Recording, topic: str, last: int, join: Join) -> OtherHistory:
         """What a late joiner got, and what had been published before it joined."""
-        got = recording.joined.get(join.name, ())
-        heard = recording.on(topic)
-        history = _published_until(got, join.joined_ns)
-        before = _published_until(heard, join.joined_ns) if heard else history
-        number = len(before)
+        received, recorded = recording.joined.get(join.name, ()), recording.on(topic)
+        history = _published_until(received, join.joined_ns)
+        before = _published_until(recorded, join.joined_ns) if recorded else history
         # Where nothing else was subscribed, the writer's numbers tell.
-        if not heard:
-            number = published(history) if history else published(got[:1]) - 1 if got else 0
+        if recorded:
+            number = len(before)
+        elif history:
+            number = published(history)
+        else:
+            number = published(received[:1]) - 1 if received else 0
         # What is kept arrives with the match, so that what was published later is live.
-        first_ns = min((item.received_ns for item in got), default=join.joined_ns)
-        meanwhile = sum(join.joined_ns < item.stamp_ns <= first_ns for item in heard or got)
+        first_ns = min((item.received_ns for item in received), default=join.joined_ns)
+        times_ns = [item.stamp_ns for item in recorded or received]
+        meanwhile = len([one for one in times_ns if join.joined_ns < one <= first_ns])
         return cls(recording, topic, last, join, history, before, number, max(0, last - meanwhile))
 
     @property
@@ -183,9 +186,9 @@ def never_matched(symptom: TooFewKept) -> Finding | None:
 @explanation(TooFewKept, UnpublishedBefore)
 def publisher_destroyed(symptom: OtherHistory) -> Finding | None:
     """The program destroyed a publisher before, and what a publisher keeps is lost with it."""
-    ends = [item.vanished_ns or math.inf for item in symptom.publishers]
-    gone = sum(end_ns <= symptom.join.joined_ns for end_ns in ends)
-    if gone in (0, len(ends)):
+    joined_ns, publishers = symptom.join.joined_ns, symptom.publishers
+    gone = len([one for one in publishers if (one.vanished_ns or math.inf) <= joined_ns])
+    if gone in (0, len(publishers)):
         return None
     number = counted(gone, "publisher was", "publishers were")
     lost = "what a publisher keeps is lost with it"
@@ -215,13 +218,13 @@ def several_publishers(symptom: TooManyKept) -> Finding | None:
 def other_depth(symptom: OtherHistory) -> Finding:
     """The publisher's queue has another depth, or keeps all messages."""
     queues = declarations.queues(symptom.recording, Kind.PUBLISHER, symptom.topic)
-    why = f": the publisher keeps {len(symptom.history)}"
-    if len(symptom.history) > symptom.last and any(one.history == "keep_all" for one in queues):
+    number = len(symptom.history)
+    if number > symptom.last and any(queue.history == "keep_all" for queue in queues):
         why = ": the publisher's history is keep_all, declared by the process"
     elif symptom.depth not in (None, symptom.last):
         why = f": the publisher's depth is {symptom.depth}, declared by the process"
-    elif len(symptom.history) < symptom.last:
-        why = ""
+    else:
+        why = f": the publisher keeps {number}" if number >= symptom.last else ""
     return Finding(f"{symptom.seen}{why}", symptom.hint, symptom.evidence)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from grader.diagnosis.explanation import mistaken, remedy
 from grader.diagnosis.process.exception_table import import_of
@@ -35,8 +36,20 @@ def why_unknown_imports(package: PackageRecord) -> Finding | None:
     return None
 
 
-_Fault = tuple[str, str, SourceError, tuple[str, str]]
-"""What is seen, what to do (nothing: add a tag), where, and what is there and what to write."""
+class _Fault(NamedTuple):
+    """One thing that is wrong with the dependencies in package.xml.
+
+    Attributes:
+        what: What is there, for the table.
+        write: What to write instead.
+        hint: What to do; empty where ``write`` is a tag to add.
+    """
+
+    seen: str
+    place: SourceError
+    what: str
+    write: str
+    hint: str = ""
 
 
 def why_wrong_dependencies(submission: SubmissionRecord, package: PackageRecord) -> Finding | None:
@@ -44,26 +57,27 @@ def why_wrong_dependencies(submission: SubmissionRecord, package: PackageRecord)
     faults = [*_missing(package), *_unknown(submission, package)]
     if not faults:
         return None
-    seen, hints, places, rows = zip(*faults, strict=True)
-    tags = codes(write for (_, write), hint in zip(rows, hints, strict=True) if not hint)
-    add = [remedy("not_declared", tags=tags)] if tags else []
-    return Finding(
-        "; ".join(seen),
-        " ".join([*add, *filter(None, hints)]),
-        Evidence(places=places, tables=(Table("package.xml", ("what", "write"), rows),)),
-    )
+    tags = codes(fault.write for fault in faults if not fault.hint)
+    hints = [remedy("not_declared", tags=tags)] if tags else []
+    hints += [fault.hint for fault in faults if fault.hint]
+    rows = tuple((fault.what, fault.write) for fault in faults)
+    table = Table("package.xml", ("what", "write"), rows)
+    places = tuple(fault.place for fault in faults)
+    seen = "; ".join(fault.seen for fault in faults)
+    return Finding(seen, " ".join(hints), Evidence(places=places, tables=(table,)))
 
 
 def _is_elsewhere(package: PackageRecord, item: Import) -> bool:
     """Whether all names that an import takes are known to be another package's."""
-    source = next((one for one in package.sources if one.path == item.file), None)
-    taken = [
+    begin = f"from {item.module}."
+    names = [
         dotted.rpartition(".")[2]
-        for _, dotted in (source.names if source else ())
+        for source in package.sources
+        if source.path == item.file
+        for _, dotted in source.names
         if dotted.startswith(f"{item.module}.")
     ]
-    right = [import_of(name) or f"from {item.module}." for name in taken]
-    return bool(right) and not any(line.startswith(f"from {item.module}.") for line in right)
+    return bool(names) and not any((import_of(name) or begin).startswith(begin) for name in names)
 
 
 def _missing(package: PackageRecord) -> Iterator[_Fault]:
@@ -78,18 +92,18 @@ def _missing(package: PackageRecord) -> Iterator[_Fault]:
         if not _is_elsewhere(package, item):
             needed.setdefault(item.module, item)
     for item in needed.values():
-        why = _IDLE.get(kinds.get(item.module, "").partition("/")[0], "")
+        idle = _IDLE.get(kinds.get(item.module, "").partition("/")[0], "")
         tag = f"<depend>{item.module}</depend>"
         verb, participle = "imports", "imported"
         if item.file.endswith(CODE):
             verb, participle = "includes", "included"
         elif item.file.endswith("CMakeLists.txt"):
             verb, participle = "uses", "used"
-        yield (
-            f"{item.file}:{item.line} {verb} {code(item.module)}{why}",
-            "",
+        yield _Fault(
+            f"{item.file}:{item.line} {verb} {code(item.module)}{idle}",
             SourceError(package.file("package.xml"), line, f"add {code(tag)} here"),
-            (f"{participle} in {item.file}:{item.line}", tag),
+            what=f"{participle} in {item.file}:{item.line}",
+            write=tag,
         )
 
 
@@ -101,14 +115,14 @@ def _unknown(submission: SubmissionRecord, package: PackageRecord) -> Iterator[_
         if entry.known is not False or entry.name in own:
             continue
         match = nearest(entry.name, imported) or meant(entry.name)
-        yield (
+        write, hint = "remove it", remedy("no_such_dependency", name=code(entry.name))
+        if match:
+            write = f"<{entry.kind}>{match}</{entry.kind}>"
+            hint = remedy("misspelt_dependency", match=code(match), name=code(entry.name))
+        yield _Fault(
             f"package.xml names {code(entry.name)}, which does not exist",
-            remedy("misspelt_dependency", match=code(match), name=code(entry.name))
-            if match
-            else remedy("no_such_dependency", name=code(entry.name)),
             SourceError(package.file("package.xml"), entry.line, f"{entry.name} does not exist"),
-            (
-                f"<{entry.kind}>{entry.name}</{entry.kind}> does not exist",
-                f"<{entry.kind}>{match}</{entry.kind}>" if match else "remove it",
-            ),
+            what=f"<{entry.kind}>{entry.name}</{entry.kind}> does not exist",
+            write=write,
+            hint=hint,
         )

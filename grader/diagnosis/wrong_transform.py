@@ -97,21 +97,22 @@ def refused_by_tf2(symptom: NoTransform) -> Finding | None:
     own = symptom.recording.student_endpoints(Kind.PUBLISHER, symptom.topic)
     requested = Qos("reliable", "transient_local" if is_static(symptom.topic) else "volatile")
     refused = [", ".join(refusals(one.qos, requested)) for one in own]
-    seen = f"tf2 gets nothing from the publisher on {code(symptom.topic)}"
+    if not any(refused):
+        return None
+    seen = f"tf2 gets nothing from the publisher on {code(symptom.topic)} ({max(refused)})"
     evidence = Evidence(moments=endpoints_seen(symptom.recording, own))
-    return Finding(f"{seen} ({max(refused)})", symptom.hint, evidence) if any(refused) else None
+    return Finding(seen, symptom.hint, evidence)
 
 
 @explanation(NoTransform)
 def overwritten(symptom: NoTransform) -> Finding | None:
     """Late joiners miss it on /tf_static: its publisher keeps only messages that came later."""
     recording, topic = symptom.recording, symptom.topic
-    queues = declarations.queues(recording, Kind.PUBLISHER, topic)
-    ends = (one for one in recording.endpoints if one.topic == topic)
-    alone = len(queues) == len([one for one in ends if one.kind is Kind.PUBLISHER]) == 1
-    depth = queues[0].depth if alone and queues[0].history == "keep_last" else None
-    kept = recording.on(topic)[-(depth or 0) :]
-    if not is_static(topic) or not symptom.wanted or symptom.wanted[-1].message in kept:
+    depth = _depth_of_only_publisher(recording, topic)
+    if not depth or not is_static(topic) or not symptom.wanted:
+        return None
+    kept = recording.on(topic)[-depth:]
+    if symptom.wanted[-1].message in kept:
         return None
     return mistaken(
         "overwritten",
@@ -119,6 +120,16 @@ def overwritten(symptom: NoTransform) -> Finding | None:
         f"{counted(len(kept), 'message')}, and published others after it",
         when_sent(recording, symptom.wanted[-1], "sent"),
     )
+
+
+def _depth_of_only_publisher(recording: Recording, topic: str) -> int | None:
+    """How many messages the one publisher on a topic keeps; None of several, or for all."""
+    queues = declarations.queues(recording, Kind.PUBLISHER, topic)
+    ends = [one for one in recording.endpoints if one.topic == topic]
+    publishers = [one for one in ends if one.kind is Kind.PUBLISHER]
+    if len(queues) != 1 or len(publishers) != 1 or queues[0].history != "keep_last":
+        return None
+    return queues[0].depth
 
 
 @explanation(NoTransform)
@@ -139,18 +150,22 @@ def exchanged_frames(symptom: NoTransform) -> Finding | None:
 def no_transform_at_all(symptom: NoTransform) -> Finding | None:
     """Nothing is published on the topic, or only by others, such as the simulated robot."""
     recording, topic = symptom.recording, symptom.topic
-    found = why_no_endpoint(recording, Kind.PUBLISHER, topic)
-    found = found or never_matched(NoMessages(recording, topic))
-    return found or (None if recording.on(topic) else why_silent(recording, topic))
+    cause = why_no_endpoint(recording, Kind.PUBLISHER, topic)
+    cause = cause or never_matched(NoMessages(recording, topic))
+    if cause is not None or recording.on(topic):
+        return cause
+    return why_silent(recording, topic)
 
 
 @explanation(NoTransform)
 def other_frame(symptom: NoTransform) -> Finding | None:
     """The frame has another parent, or a name is misspelt."""
-    names = {" ".join(names): one for names, one in symptom.edges.items()}
-    likely = names.get(nearest(f"{symptom.parent} {symptom.child}", names) or "")
-    found = next((one for one in symptom.there if one.child == symptom.child), likely)
-    return symptom.instead(found, "is there instead")
+    for transform in symptom.there:
+        if transform.child == symptom.child:
+            return symptom.instead(transform, "is there instead")
+    by_names = {" ".join(frames): one for frames, one in symptom.edges.items()}
+    match = nearest(f"{symptom.parent} {symptom.child}", by_names)
+    return symptom.instead(by_names[match], "is there instead") if match is not None else None
 
 
 @explanation(NoTransform, general=True)
@@ -181,10 +196,10 @@ def no_quaternion(symptom: BadTransform) -> Finding | None:
 def wrong_stamp(symptom: BadTransform) -> Finding | None:
     """The stamp is 0, always the same, or of another clock."""
     sent_ns, stamp_ns = symptom.one.message.stamp_ns, symptom.one.stamp_ns
-    stolen_s = symptom.recording.stolen_s(min(stamp_ns, sent_ns), sent_ns)
+    if is_static(symptom.one.message.topic) or stamp_ns in symptom.known:
+        return None
     late_s = (sent_ns - stamp_ns) / NS
-    counts = not is_static(symptom.one.message.topic) and stamp_ns not in symptom.known
-    if not counts or abs(late_s) <= _STAMP_S + stolen_s:
+    if abs(late_s) <= _STAMP_S + symptom.recording.stolen_s(min(stamp_ns, sent_ns), sent_ns):
         return None
     off = f"{format_duration(abs(late_s))} {'before' if late_s > 0.0 else 'after'}"
     seen = f"the stamp is {off} the moment of publishing: always the same, or of another clock"
@@ -197,8 +212,11 @@ def wrong_stamp(symptom: BadTransform) -> Finding | None:
 
 def why_gone(recording: Recording, topic: str, seen: str) -> Finding | None:
     """Why no publisher on a topic stayed until the end, or None if one did."""
-    own = recording.student_endpoints(Kind.PUBLISHER, topic)
-    processes = [declarations.process_of(recording, one.node) for one in own]
-    stays = any(one is not None and not ended_early(recording, one) for one in processes)
     destroyed = why_unpublished(recording, topic, seen)
-    return destroyed or (None if stays else why_ended(recording, seen))
+    if destroyed is not None:
+        return destroyed
+    for publisher in recording.student_endpoints(Kind.PUBLISHER, topic):
+        process = declarations.process_of(recording, publisher.node)
+        if process is not None and not ended_early(recording, process):
+            return None
+    return why_ended(recording, seen)

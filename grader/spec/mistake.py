@@ -27,57 +27,55 @@ def mistakes(
     """
     unknown: list[tuple[Place, str]] = []
     missing: list[tuple[Place, str]] = []
-    meant: set[tuple[Place, str | None]] = set()
-    others: dict[Place, list[str]] = {}
-    for found in error.errors(include_url=False):
+    meant_keys: set[tuple[Place, str | None]] = set()
+    wrong: dict[Place, list[str]] = {}
+    details: list[Any] = error.errors(include_url=False)
+    for detail in details:
         place: Place = ()
-        for step in found["loc"]:
+        for step in detail["loc"]:
             if exists((*place, step)):
                 place = (*place, step)
-        key = str(found["loc"][-1]) if found["loc"] else ""
-        if found["type"] == "missing":
+        key = str(detail["loc"][-1]) if detail["loc"] else ""
+        if detail["type"] == "missing":
             missing.append((place, key))
-        elif found["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-            allowed = _keys(model, found["loc"][:-1])
-            meant.add((place[:-1], nearest(key, allowed)))
+        elif detail["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+            allowed = _keys(model, detail["loc"][:-1])
+            meant_keys.add((place[:-1], nearest(key, allowed)))
             advice = nearest_or_all(key, sorted(allowed), "Allowed here")
             unknown.append((place, f"unknown key {key!r}.{advice}"))
-        elif not _is_echo(dict(found)):
-            others.setdefault(place, []).append(_text(found["type"], dict(found)))
+        elif not _is_echo(detail):
+            wrong.setdefault(place, []).append(_text(detail))
     # What is wrong inside a value is told, so its form is meant: not another one of a union.
-    told = [*(place for place, _ in unknown), *((*place, key) for place, key in missing), *others]
+    told = [*(place for place, _ in unknown), *((*place, key) for place, key in missing), *wrong]
     meant_forms = {place[:end] for place in told for end in range(len(place))}
-    return [
-        *unknown,
-        *(
-            (place, f"the key {key!r} is missing")
-            for place, key in missing
-            if (place, key) not in meant
-        ),
-        *(
-            (place, "; or ".join(dict.fromkeys(texts)))
-            for place, texts in others.items()
-            if place not in meant_forms
-        ),
-    ]
+    found = unknown
+    for place, key in missing:
+        if (place, key) not in meant_keys:
+            found.append((place, f"the key {key!r} is missing"))
+    for place, texts in wrong.items():
+        if place not in meant_forms:
+            found.append((place, "; or ".join(dict.fromkeys(texts))))
+    return found
 
 
-def _is_echo(found: dict[str, Any]) -> bool:
+def _is_echo(detail: dict[str, Any]) -> bool:
     """Whether a list is called too short only because its entries have mistakes."""
-    value = found["input"]
-    is_short = found["type"] == "too_short" and isinstance(value, list | tuple)
-    return is_short and len(value) >= found["ctx"]["min_length"]
+    value = detail["input"]
+    if detail["type"] != "too_short" or not isinstance(value, list | tuple):
+        return False
+    return len(value) >= int(detail["ctx"]["min_length"])
 
 
-def _text(kind: str, found: dict[str, Any]) -> str:
-    value, context = found["input"], found.get("ctx", {})
+def _text(detail: dict[str, Any]) -> str:
+    """One detail of pydantic's in words."""
+    kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
     if kind in _EXPECTED:
         return f"expected {_EXPECTED[kind]}, not {_shown(value)}{_quotes(kind, value)}"
     if kind in ("literal_error", "enum"):
         words = context["expected"]
         allowed = [part.strip("'") for part in words.replace(" or ", ", ").split(", ")]
         advice = did_you_mean(value, allowed) if isinstance(value, str) else ""
-        return f"expected {words}, not {_shown(value)}" + (advice and f".{advice}")
+        return f"expected {words}, not {_shown(value)}{'.' if advice else ''}{advice}"
     if kind in _BOUNDS:
         word, key = _BOUNDS[kind]
         return f"must be {word} {context[key]:g}, not {_shown(value)}"
@@ -85,7 +83,7 @@ def _text(kind: str, found: dict[str, Any]) -> str:
         word, key = ("least", "min_length") if kind == "too_short" else ("most", "max_length")
         count = context[key]
         return f"expected at {word} {count} {'entry' if count == 1 else 'entries'}"
-    message = str(found["msg"])
+    message = str(detail["msg"])
     if kind in ("value_error", "quantity"):
         return message.removeprefix("Value error, ")
     return message[0].lower() + message[1:]
@@ -135,26 +133,28 @@ def _shown(value: object) -> str:
 
 def _keys(model: type[BaseModel], loc: Place) -> set[str]:
     """Keys that are allowed at a location, as far as the annotations tell."""
-    current: list[type[Any]] = [model]
+    models: list[type[Any]] = [model]
     for step in loc:
         if isinstance(step, int):
             continue
         inner = [
-            found
-            for one in current
-            for name, field in one.__pydantic_fields__.items()
+            nested
+            for outer in models
+            for name, field in outer.__pydantic_fields__.items()
             if step == (field.alias or name)
-            for found in _models_in(field.annotation)
+            for nested in _models_in(field.annotation)
         ]
         # Anything else than a field is the tag of a union, or a key of a mapping of models.
-        tagged = [one for one in current if step == one.__name__]
-        current = inner or tagged or current
+        tagged = [outer for outer in models if step == outer.__name__]
+        models = inner or tagged or models
     return {
-        field.alias or name for one in current for name, field in one.__pydantic_fields__.items()
+        field.alias or name
+        for nested in models
+        for name, field in nested.__pydantic_fields__.items()
     }
 
 
 def _models_in(annotation: Any) -> list[type[Any]]:
     if isinstance(annotation, type) and hasattr(annotation, "__pydantic_fields__"):
         return [annotation]
-    return [found for part in get_args(annotation) for found in _models_in(part)]
+    return [model for part in get_args(annotation) for model in _models_in(part)]
