@@ -14,26 +14,30 @@ def why_not_in_bag(recording: Recording, topic: str) -> Finding | None:
     """Why a bag has no message on a topic to judge; None if it has."""
     if recording.on(topic) or recording.bag is None or recording.unreadable.get(topic):
         return None
-    here = code(recording.bag)
-    ends = [one for one in recording.endpoints if one.topic == topic]
-    wanted = {one.type for one in ends if one.owner is Owner.PROBE}
-    found = {one.type for one in recording.student_endpoints(Kind.PUBLISHER, topic)}
-    wanted -= found
+    bag, name = code(recording.bag), code(topic)
+    types = {one.type for one in recording.student_endpoints(Kind.PUBLISHER, topic)}
     if recording.misdefined(topic):
-        types = codes(found)
-        seen = f"{here} has {code(topic)} with another definition of {types} than Jazzy's"
-        return mistaken("other_definition_in_bag", seen, type=types)
-    if found and wanted:
-        seen = f"{here} has {codes(found)} on {code(topic)}, not {codes(wanted)}"
-        return mistaken("other_type_in_bag", seen, topic=code(topic))
-    if found:
-        return mistaken("not_in_bag", f"{here} has no message on {code(topic)}", topic=code(topic))
-    there = [
-        one.name
+        seen = f"{bag} has {name} with another definition of {codes(types)} than Jazzy's"
+        return mistaken("other_definition_in_bag", seen, type=codes(types))
+    readers = [one for one in recording.endpoints if one.owner is Owner.PROBE]
+    other_types = {one.type for one in readers if one.topic == topic} - types
+    if types and other_types:
+        seen = f"{bag} has {codes(types)} on {name}, not {codes(other_types)}"
+        return mistaken("other_type_in_bag", seen, topic=name)
+    if types:
+        return mistaken("not_in_bag", f"{bag} has no message on {name}", topic=name)
+    return mistaken("not_in_bag", f"{bag} has no {name}; {_what_it_has(recording)}", topic=name)
+
+
+def _what_it_has(recording: Recording) -> str:
+    """The topics of the bag that is judged, in words."""
+    topics = [
+        topic.name
         for bag in recording.submission.bags or ()
-        for one in bag.topics
-        if bag.path == recording.bag and one.messages
+        for topic in bag.topics
+        if bag.path == recording.bag and topic.messages
     ]
-    more = " and others" if len(there) > _MOST_SHOWN else ""
-    others = f"; it has {codes(there[:_MOST_SHOWN])}{more}" if there else "; it is empty"
-    return mistaken("not_in_bag", f"{here} has no {code(topic)}{others}", topic=code(topic))
+    if not topics:
+        return "it is empty"
+    more = " and others" if len(topics) > _MOST_SHOWN else ""
+    return f"it has {codes(topics[:_MOST_SHOWN])}{more}"

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from statistics import median_high
 from typing import Any
 
 from grader.diagnosis.explanation import Symptom, explanation, mistaken
@@ -38,31 +39,32 @@ class NotFollowing(Symptom[Finding]):
     wrong: list[Sample]
 
     @cached_property
-    def some(self) -> list[Sample]:
+    def examples(self) -> list[Sample]:
         """Wrong messages, not too many."""
-        return self.wrong[:: max(1, len(self.wrong) // _MOST_EXPLAINED)]
+        return _thinned(self.wrong)
 
     @cached_property
-    def bad(self) -> list[int]:
-        """The fields that are wrong in one of them."""
+    def wrong_fields(self) -> list[int]:
+        """The fields that are wrong in one of the examples."""
         return [
             index
             for index in range(len(self.derived.fields))
-            if not all(self.derived.fitting(one.errors, index) for one in self.some)
+            if not all(self.derived.fitting(sample.errors, index) for sample in self.examples)
         ]
 
     @cached_property
     def ages_s(self) -> list[float] | None:
-        """How old the values of each of some are, if all of them are those of an older source."""
-        ages, derived = [], self.derived
-        for sample in self.some:
+        """How old the values of each example are, if all of them are those of an older source."""
+        ages_s, derived = [], self.derived
+        for sample in self.examples:
             older = derived.fitting(derived.errors(sample.values, range(sample.window[0])))
             if not older:
                 return None
-            ages.append((sample.message.stamp_ns - derived.sources[older[-1]].stamp_ns) / NS)
-        still = spread([one.values[0] for one in self.some]) <= derived.tolerances[0]
+            ages_s.append((sample.message.stamp_ns - derived.sources[older[-1]].stamp_ns) / NS)
+        first_values = [sample.values[0] for sample in self.examples]
         # A value that never changes is old as well, but that says less.
-        return None if still and len(ages) > 1 else ages
+        never_changes = len(ages_s) > 1 and spread(first_values) <= derived.tolerances[0]
+        return None if never_changes else ages_s
 
 
 @explanation(NotFollowing)
@@ -71,18 +73,16 @@ def older_values(symptom: NotFollowing) -> Finding | None:
     ages_s, source = symptom.ages_s, symptom.source
     if ages_s is None:
         return None
-    late_s = sorted(ages_s)[len(ages_s) // 2]
+    age = format_duration(median_high(ages_s))
     return mistaken(
-        "older_values",
-        f"the values are those of {source} {format_duration(late_s)} earlier",
-        source=source,
+        "older_values", f"the values are those of {source} {age} earlier", source=source
     )
 
 
 @explanation(NotFollowing)
 def different_moments(symptom: NotFollowing) -> Finding | None:
     """The fields are filled from different messages."""
-    if symptom.bad:
+    if symptom.wrong_fields:
         return None
     return mistaken("different_moments", f"the values are of different moments of {symptom.source}")
 
@@ -90,48 +90,54 @@ def different_moments(symptom: NotFollowing) -> Finding | None:
 @explanation(NotFollowing, general=True)
 def other_values(symptom: NotFollowing) -> Finding:
     """Fields hold something else: another field, a quaternion, degrees, a wrong sign."""
-    derived, bad, source = symptom.derived, symptom.bad, symptom.source
-    sample = symptom.wrong[len(symptom.wrong) // 2]
+    derived, sample = symptom.derived, symptom.wrong[len(symptom.wrong) // 2]
     newest = derived.table[sample.window[-1]]
-    seen = symptom.judged[:: max(1, len(symptom.judged) // _MOST_EXPLAINED)]
     by_clause: dict[str, list[str]] = {}
-    for index in bad:
-        text = f"{code(derived.fields[index])} = {sample.values[index]:.4g} instead of "
-        text += f"{newest[index]:.4g}"
-        by_clause.setdefault(_clause(derived, seen, symptom.some, index), []).append(text)
+    for index in symptom.wrong_fields:
+        field, value = code(derived.fields[index]), f"{sample.values[index]:.4g}"
+        text = f"{field} = {value} instead of {newest[index]:.4g}"
+        by_clause.setdefault(_what_it_is(symptom, index), []).append(text)
     return mistaken(
         "other_values",
         "; ".join(listing(texts) + clause for clause, texts in by_clause.items()),
-        fields=codes(derived.fields[index] for index in bad),
-        source=source,
-        values=codes(derived.values[index] for index in bad),
+        fields=codes(derived.fields[index] for index in symptom.wrong_fields),
+        source=symptom.source,
+        values=codes(derived.values[index] for index in symptom.wrong_fields),
     )
 
 
-def _clause(derived: DerivedMessages, seen: list[Sample], wrong: list[Sample], index: int) -> str:
+def _what_it_is(symptom: NotFollowing, index: int) -> str:
     """What stands in a wrong field, as a clause; empty where the messages do not tell.
 
     It must be in nearly all messages, and in nearly all of those in which the field is wrong: of a
     number that is not negative, what has lost its sign is right as well.
     """
-    numbers = [sample.values[index] for sample in seen]
+    derived, judged = symptom.derived, _thinned(symptom.judged)
+    numbers = [sample.values[index] for sample in judged]
     if not all(map(math.isfinite, numbers)):
-        short = ", or not there at all: the array is too short"
-        return f": not a finite number{short if '[' in derived.fields[index] else ''}"
+        is_in_array = "[" in derived.fields[index]
+        short = ", or not there at all: the array is too short" if is_in_array else ""
+        return f": not a finite number{short}"
     if len(numbers) > 1 and spread(numbers) <= 0.0:
         return ": no change from message to message"
-    wrong = [sample for sample in wrong if not derived.fitting(sample.errors, index)]
-    rows = sorted({row for sample in (*seen, *wrong) for row in sample.window})
+    wrong = [one for one in symptom.examples if not derived.fitting(one.errors, index)]
+    rows = sorted({row for sample in (*judged, *wrong) for row in sample.window})
     tolerance = derived.tolerances[index]
-    found = [_mistakes(derived.values[index], derived.sources[row].value) for row in rows]
+    by_source = [_mistakes(derived.values[index], derived.sources[row].value) for row in rows]
     # Arrays of the sources may have other lengths, which come last: those are left out.
-    for same_mistake in zip(*found, strict=False):
+    for same_mistake in zip(*by_source, strict=False):
         series = {row: number for row, (_, number) in zip(rows, same_mistake, strict=True)}
-        if spread(list(series.values())) > tolerance and all(
-            _share(samples, index, series, tolerance) >= _NEARLY_ALL for samples in (seen, wrong)
-        ):
+        if spread(list(series.values())) <= tolerance:
+            continue
+        shares = [_share(samples, index, series, tolerance) for samples in (judged, wrong)]
+        if min(shares) >= _NEARLY_ALL:
             return f": it is {same_mistake[0][0]}"
     return ""
+
+
+def _thinned(samples: list[Sample]) -> list[Sample]:
+    """Some of many messages, in equal distances."""
+    return samples[:: max(1, len(samples) // _MOST_EXPLAINED)]
 
 
 def spread(numbers: Sequence[float]) -> float:

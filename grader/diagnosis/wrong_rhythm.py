@@ -19,13 +19,17 @@ from grader.measure.period import Interval, PeriodLimits, PeriodVerdict
 from grader.recording.model import NS, Kind, Recording
 from grader.spec.unit import format_duration
 
+# How far a declared period may be off a measured one, as a share of that.
 _SAME = 0.05
 # Share of the period from which on a call of a callback is what makes the next one late.
 _LONG = 0.5
 # How far intervals may be off a multiple of a timer's period, as a share of that.
 _OFF = 0.2
+# A period in another unit is off by a power of 10.
 _POWERS = (1e-6, 1e-3, 0.01, 0.1, 10.0, 100.0, 1e3, 1e6)
+# So many publishers or timers for one topic are a mistake; more of them are something else.
 _TIMES = range(2, 6)
+# How far the average may be off a whole number of messages in each period, as a share of that.
 _TIMES_TOLERANCE = 0.08
 
 
@@ -63,9 +67,11 @@ def several_in_each_period(symptom: WrongRhythm) -> Finding | None:
         return None
     ratio = symptom.limits.period_s / average_s
     times = round(ratio)
-    # A burst that the observation cut in two leaves the average off by some messages.
-    cut = 0.0 if symptom.verdict.regular else times * (times - 1) / len(symptom.measured)
-    if times not in _TIMES or abs(ratio - times) > _TIMES_TOLERANCE * times + cut:
+    allowed = _TIMES_TOLERANCE * times
+    if not symptom.verdict.regular:
+        # A burst that the observation cut in two leaves the average off by some messages.
+        allowed += times * (times - 1) / len(symptom.measured)
+    if times not in _TIMES or abs(ratio - times) > allowed:
         return None
     words = f"messages come {times} times as often as expected"
     publishers = symptom.recording.student_endpoints(Kind.PUBLISHER, symptom.topic)
@@ -74,8 +80,9 @@ def several_in_each_period(symptom: WrongRhythm) -> Finding | None:
     if len(symptom.timers_s) == 1 and symptom.declares(average_s):
         words += f": the process declared a timer of {format_duration(symptom.timers_s[0])}"
         return Finding(words, seconds_hint(symptom.limits.period_s))
-    several = f", and the process declared {len(symptom.timers_s)} timers"
-    return mistaken("one_timer", words + (several if len(symptom.timers_s) > 1 else ""))
+    if len(symptom.timers_s) > 1:
+        words += f", and the process declared {len(symptom.timers_s)} timers"
+    return mistaken("one_timer", words)
 
 
 @explanation(WrongRhythm, concept="executors")
@@ -93,16 +100,16 @@ def condition_in_a_faster_timer(symptom: WrongRhythm) -> Finding | None:
     """A timer is faster, and a condition in its callback lets only every n-th call publish."""
     wanted_s = symptom.limits.period_s
     for timer_s in symptom.timers_s:
-        calls = [round(one.seconds / timer_s) for one in symptom.measured]
-        off_s = max(
-            abs(one.seconds - n * timer_s) for one, n in zip(symptom.measured, calls, strict=True)
-        )
+        intervals_s = [interval.seconds for interval in symptom.measured]
+        calls = [round(interval_s / timer_s) for interval_s in intervals_s]
+        pairs = zip(intervals_s, calls, strict=True)
+        off_s = max(abs(interval_s - number * timer_s) for interval_s, number in pairs)
         if 2.0 * timer_s <= wanted_s and min(calls) > 1 and off_s <= _OFF * timer_s:
-            some = listing(map(str, sorted(set(calls))), "or")
+            numbers = listing(map(str, sorted(set(calls))), "or")
             return mistaken(
                 "condition_in_a_faster_timer",
                 f"the process declared a timer of {format_duration(timer_s)}, and publishes in "
-                f"one of {some} calls",
+                f"one of {numbers} calls",
                 seconds=f"{wanted_s:g}",
             )
     return None
@@ -119,17 +126,18 @@ def irregular(symptom: WrongRhythm) -> Finding | None:
 @explanation(WrongRhythm)
 def other_timer(symptom: WrongRhythm) -> Finding | None:
     """The timer has another period, such as 10 times the expected one, or 0 from int(0.3)."""
-    median_s = symptom.verdict.median_s
-    ratio = median_s / symptom.limits.period_s
-    words = []
-    for power in _POWERS:
-        if math.isclose(ratio, power, rel_tol=0.1):
-            words.append(f"{power:g} times the expected period")
-    same = symptom.declares(median_s)
-    if median_s <= symptom.limits.period_s and declarations.timer_of_zero(symptom.recording):
-        same = [0.0]
-    words += [f"the process declared a timer of {format_duration(item)}" for item in same[:1]]
-    return Finding("; ".join(words), seconds_hint(symptom.limits.period_s)) if words else None
+    median_s, wanted_s = symptom.verdict.median_s, symptom.limits.period_s
+    clauses = [
+        f"{power:g} times the expected period"
+        for power in _POWERS
+        if math.isclose(median_s / wanted_s, power, rel_tol=0.1)
+    ]
+    timers_s = symptom.declares(median_s)
+    if median_s <= wanted_s and declarations.timer_of_zero(symptom.recording):
+        timers_s = [0.0]
+    if timers_s:
+        clauses.append(f"the process declared a timer of {format_duration(timers_s[0])}")
+    return Finding("; ".join(clauses), seconds_hint(wanted_s)) if clauses else None
 
 
 @explanation(WrongRhythm)

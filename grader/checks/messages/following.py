@@ -131,7 +131,7 @@ def _held_up(recording: Recording, parameters: Follows, symptom: NotFollowing) -
     What waits in the queues of several nodes after a delay takes as long again.
     """
     stolen_s = 0.0
-    for sample, age_s in zip(symptom.some, symptom.ages_s or (), strict=False):
+    for sample, age_s in zip(symptom.examples, symptom.ages_s or (), strict=False):
         now_ns = sample.message.stamp_ns
         stolen_s = recording.stolen_s(now_ns - round(2.0 * age_s * NS), now_ns)
         if age_s - parameters.within > stolen_s:
@@ -144,7 +144,7 @@ def _held_up(recording: Recording, parameters: Follows, symptom: NotFollowing) -
 def _failure(recording: Recording, symptom: NotFollowing) -> Finding:
     sample = symptom.wrong[len(symptom.wrong) // 2]
     derived, judged, cause = symptom.derived, symptom.judged, cause_of(symptom)
-    shown = symptom.bad or range(len(derived.fields))
+    shown = symptom.wrong_fields or range(len(derived.fields))
     plots = (_plot(recording, derived, judged, index) for index in shown)
     label = f"message {sample.number} is wrong"
     evidence = evidence_at(recording, label, sample.message.stamp_ns, *plots)

@@ -17,6 +17,7 @@ from sim.motion import wrap_angle
 
 # A shorter way has no direction.
 _WAY_M = 0.1
+# Less than this is no turn: a robot drifts by some degrees.
 _TURN_RAD = math.radians(15.0)
 
 
@@ -52,6 +53,11 @@ class PlaceMissed(Symptom[Finding]):
         """How far each step is from the beginning of the way."""
         first = self.way[0]
         return [math.hypot(step.x_m - first.x_m, step.y_m - first.y_m) for step in self.way]
+
+    def first_beyond(self, gone_m: float) -> Truth:
+        """The first step that is so far from the beginning of the way."""
+        steps = zip(self.way, self.gone_m, strict=True)
+        return next(step for step, step_gone_m in steps if step_gone_m >= gone_m)
 
     def bearing_rad(self, x_m: float, y_m: float) -> float:
         """The direction of a point as the robot looks at the beginning, counter-clockwise."""
@@ -93,21 +99,25 @@ def turned_wrongly(symptom: PlaceMissed) -> Finding | None:
     """It turned to the wrong side, too far or too little, and drove off."""
     distance_m = symptom.distance_m(symptom.way[0])
     far_m = min(max(symptom.gone_m), distance_m)
-    there = symptom.way[next(i for i, one in enumerate(symptom.gone_m) if one >= far_m)]
-    turned = symptom.bearing_rad(there.x_m, there.y_m)
-    needed = symptom.bearing_rad(symptom.x_m, symptom.y_m)
+    # The direction in which it drove is seen best where it should have been at the place.
+    far = symptom.first_beyond(far_m)
+    turned_rad = symptom.bearing_rad(far.x_m, far.y_m)
+    needed_rad = symptom.bearing_rad(symptom.x_m, symptom.y_m)
     room_rad = max(_TURN_RAD, math.atan2(symptom.reach_m, distance_m))
-    if far_m < _WAY_M or abs(wrap_angle(turned - needed)) <= room_rad:
+    if far_m < _WAY_M or abs(wrap_angle(turned_rad - needed_rad)) <= room_rad:
         return None
-    how, mistake = "too far" if abs(turned) > abs(needed) else "too little", "other_turn"
-    if min(abs(turned), abs(needed)) > _TURN_RAD and turned * needed < 0.0:
+    are_turns = min(abs(turned_rad), abs(needed_rad)) > _TURN_RAD
+    if are_turns and turned_rad * needed_rad < 0.0:
         how, mistake = "to the wrong side", "other_side"
-    instead = _to(needed) if abs(needed) > _TURN_RAD else "straight ahead"
+    else:
+        how = "too far" if abs(turned_rad) > abs(needed_rad) else "too little"
+        mistake = "other_turn"
+    instead = _to(needed_rad) if abs(needed_rad) > _TURN_RAD else "straight ahead"
     return symptom.cause(
-        f"on its way to {symptom.name} it turned {how}: {_to(turned)} instead of {instead}",
+        f"on its way to {symptom.name} it turned {how}: {_to(turned_rad)} instead of {instead}",
         remedy(mistake),
         "drives off in another direction",
-        next(step for step, one in zip(symptom.way, symptom.gone_m, strict=True) if one >= _WAY_M),
+        symptom.first_beyond(_WAY_M),
     )
 
 

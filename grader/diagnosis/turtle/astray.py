@@ -14,19 +14,21 @@ from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.not_called import at_its_place
 from grader.diagnosis.process.process_exit import NotDone, process_ended
 from grader.diagnosis.process.standing import stuck
-from grader.findings.finding import Evidence, Finding, evidence_at
+from grader.findings.finding import Evidence, Finding, moment
 from grader.findings.words import code, counted
 from grader.measure.motion.command import VelocityCommand, number
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
-from sim.motion import Twist
+from sim.motion import REST, Twist
 
 _DEGREES_RAD_S = 25.0
 """Faster than four turns in a second: the number is probably meant in degrees."""
 _DEGREES_RAD = 6.5
 """More than a full turn."""
 _TURNS = 2.0
+"""So many full turns on one spot are no way to a heading."""
 _SPOT_M = 0.1
+"""A turtle that stays within this turns on the spot."""
 
 
 def why_no_turtles(recording: Recording) -> Finding | None:
@@ -68,7 +70,7 @@ class TurtleAstray(NotDone):
     @cached_property
     def way(self) -> tuple[Truth, ...]:
         """Its truth."""
-        return tuple(one for one in self.recording.truth if one.robot == self.turtle)
+        return tuple(step for step in self.recording.truth if step.robot == self.turtle)
 
     @cached_property
     def sent(self) -> tuple[VelocityCommand, ...]:
@@ -78,17 +80,15 @@ class TurtleAstray(NotDone):
     @cached_property
     def jumps(self) -> tuple[float, ...]:
         """Headings of its teleports."""
-        events = self.recording.turtles
-        return tuple(
-            one.yaw_rad for one in events if one.kind == "teleported" and one.turtle == self.turtle
-        )
+        events = [event for event in self.recording.turtles if event.turtle == self.turtle]
+        return tuple(event.yaw_rad for event in events if event.kind == "teleported")
 
     def cause(self, name: str, words: str, time_ns: int | None = None, **values: object) -> Finding:
         """What it did instead, and when."""
         evidence = self.shown
         if time_ns is not None:
-            at = evidence_at(self.recording, words, time_ns)
-            evidence = Evidence(moments=(*at.moments, *evidence.moments), plots=evidence.plots)
+            moments = (moment(self.recording, words, time_ns), *evidence.moments)
+            evidence = Evidence(moments=moments, plots=evidence.plots)
         return mistaken(name, f"{self.what}; {words}", evidence, **values)
 
 
@@ -123,32 +123,29 @@ def callback_hangs(symptom: TurtleAstray) -> Finding | None:
 @explanation(TurtleAstray)
 def angle_in_degrees(symptom: TurtleAstray) -> Finding | None:
     """An angle is given in degrees."""
-    fast = [one for one in symptom.sent if abs(one.twist.angular_rad_s) > _DEGREES_RAD_S]
-    if fast:
-        value = fast[0].twist.angular_rad_s
-        words = f"angular.z was {value:g} rad/s"
-        return symptom.cause("turtle_degrees", words, fast[0].time_ns, value=f"{value:g}")
-    far = [one for one in symptom.jumps if abs(one) > _DEGREES_RAD]
-    if far:
-        words = f"it was teleported to a heading of {far[0]:g} rad"
-        return symptom.cause("turtle_degrees", words, value=f"{far[0]:g}")
+    for command in symptom.sent:
+        rate = f"{command.twist.angular_rad_s:g}"
+        if abs(command.twist.angular_rad_s) > _DEGREES_RAD_S:
+            words = f"angular.z was {rate} rad/s"
+            return symptom.cause("turtle_degrees", words, command.time_ns, value=rate)
+    for heading_rad in symptom.jumps:
+        if abs(heading_rad) > _DEGREES_RAD:
+            words = f"it was teleported to a heading of {heading_rad:g} rad"
+            return symptom.cause("turtle_degrees", words, value=f"{heading_rad:g}")
     return None
 
 
 @explanation(TurtleAstray)
 def command_ran_out(symptom: TurtleAstray) -> Finding | None:
     """A command was published once, and turtles stop after a second."""
-    outs = [
-        one
-        for one in symptom.recording.incidents
-        if one.kind == "command_timeout" and one.robot == symptom.turtle
-    ]
-    moving = [one for one in symptom.sent if one.twist != Twist(0.0, 0.0)]
-    if not outs or len(outs) < len(moving):
+    incidents = [one for one in symptom.recording.incidents if one.robot == symptom.turtle]
+    timeouts = [incident for incident in incidents if incident.kind == "command_timeout"]
+    to_move = [command for command in symptom.sent if command.twist != REST]
+    if not timeouts or len(timeouts) < len(to_move):
         return None
-    times = counted(len(outs), "time")
+    times = counted(len(timeouts), "time")
     words = f"it stopped by itself {times}, 1 s after a command on {code(symptom.topic)}"
-    return symptom.cause("turtle_ran_out", words, outs[0].time_ns)
+    return symptom.cause("turtle_ran_out", words, timeouts[0].time_ns)
 
 
 @explanation(TurtleAstray)
@@ -163,12 +160,12 @@ def hit_the_wall(symptom: TurtleAstray) -> Finding | None:
 @explanation(TurtleAstray)
 def turns_for_ever(symptom: TurtleAstray) -> Finding | None:
     """It turns round and round on the spot: the difference of two headings is not wrapped."""
-    turned_rad, place = 0.0, symptom.way[:1]
+    turned_rad, spot = 0.0, next(iter(symptom.way), None)
     for before, step in pairwise(symptom.way):
-        if math.dist((step.x_m, step.y_m), (place[0].x_m, place[0].y_m)) > _SPOT_M:
-            turned_rad, place = 0.0, (step,)
+        if spot is None or math.dist((step.x_m, step.y_m), (spot.x_m, spot.y_m)) > _SPOT_M:
+            turned_rad, spot = 0.0, step
         turned_rad += math.remainder(step.yaw_rad - before.yaw_rad, math.tau)
         if abs(turned_rad) > _TURNS * math.tau:
             words = f"it turned more than {_TURNS:g} times round on the spot"
-            return symptom.cause("turtle_spins", words, place[0].time_ns)
+            return symptom.cause("turtle_spins", words, spot.time_ns)
     return None
