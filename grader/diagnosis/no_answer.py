@@ -71,7 +71,8 @@ class NoAnswer(NotCalled, concept="executors"):
     @property
     def ended(self) -> Sequence[Process]:
         """The process of the node, if it did; any where that is not known."""
-        return [one for one in exited(self.recording) if one in (self.processes or [one])]
+        ended = exited(self.recording)
+        return [one for one in ended if one in self.processes] if self.processes else ended
 
     @property
     def since_ns(self) -> int:
@@ -87,20 +88,23 @@ class NoAnswer(NotCalled, concept="executors"):
     @property
     def spins(self) -> bool | None:
         """Whether the executor answered a call of its own since then; None if it got none."""
+        services, latest_ns = executor_services(self.node), self.recording.stop_ns - NS
         calls = [
             call
             for call in self.recording.calls
-            if call.service in executor_services(self.node)
-            and self.asked_ns <= call.requested_ns <= self.recording.stop_ns - NS
+            if call.service in services and self.asked_ns <= call.requested_ns <= latest_ns
         ]
-        answered = any((call.answered_ns or 0) > self.asked_ns for call in calls)
-        return answered if calls else None
+        if not calls:
+            return None
+        return any((call.answered_ns or 0) > self.asked_ns for call in calls)
 
     def placed(self, cause: Finding) -> Finding:
         """A cause with the time of the call, and with where the process did not go on."""
         evidence = evidence_at(self.recording, "call, not answered in time", self.asked_ns)
-        stands = [where_it_stands(self.recording, one.name) for one in self.processes]
-        return at_its_place(replace(cause, evidence=evidence), self.what, *stands or [None])
+        timed = replace(cause, evidence=evidence)
+        process = declarations.process_of(self.recording, self.node)
+        stand = where_it_stands(self.recording, process.name) if process is not None else None
+        return at_its_place(timed, self.what, stand)
 
 
 def why_late(
@@ -125,7 +129,9 @@ def why_late(
 @explanation(NoAnswer, after=(never_spun,), before=(blocked_executor,))
 def busy_with_something_else(symptom: NoAnswer) -> Finding | None:
     """The executor is busy with what was asked before, such as a goal."""
-    return None if symptom.spins or not symptom.while_busy else symptom.placed(symptom.while_busy)
+    if symptom.spins or symptom.while_busy is None:
+        return None
+    return symptom.placed(symptom.while_busy)
 
 
 @explanation(NoAnswer, general=True)

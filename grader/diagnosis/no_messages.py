@@ -101,9 +101,12 @@ class OnTopic(Symptom[Finding]):
     @property
     def since_ns(self) -> int:
         """When the last message came, or the first one was sent that should be answered."""
-        last_ns = [one.stamp_ns for one in self.recording.on(self.topic)[-1:]]
-        asked_ns = [sent[0].stamp_ns for name in self.asked if (sent := self.recording.sent[name])]
-        return min(last_ns or asked_ns, default=self.recording.launched_ns)
+        messages = self.recording.on(self.topic)
+        if messages:
+            return messages[-1].stamp_ns
+        sent = [self.recording.sent[name] for name in self.asked]
+        first_ns = [messages[0].stamp_ns for messages in sent if messages]
+        return min(first_ns, default=self.recording.launched_ns)
 
     @property
     def watched_s(self) -> float:
@@ -122,10 +125,12 @@ class NoMessages(OnTopic, NotCalled):
 
     def guilty(self) -> Finding | None:
         """The same, or no answer in a time of its own in which a node answers."""
+        guilty = super().guilty()
         is_asked = self.since_ns > self.recording.launched_ns
         had_time = left_s(self.recording, self.since_ns, self.recording.stop_ns) >= _OWN_S
-        late = callback_raised(self) or no_answer(self) if is_asked and had_time else None
-        return super().guilty() or late
+        if guilty is None and is_asked and had_time:
+            return callback_raised(self) or no_answer(self)
+        return guilty
 
 
 @dataclass(frozen=True)
@@ -239,18 +244,20 @@ def no_endpoint(symptom: OnTopic) -> Finding | None:
 @explanation(NoMessages, NotDelivered, concept="interfaces")
 def other_type(symptom: OnTopic) -> Finding | None:
     """The publisher and the subscription have different message types or definitions."""
-    wanted = sorted({item.type for item in symptom.others})
-    found = sorted({item.type for item in symptom.own})
+    own_types = sorted({item.type for item in symptom.own})
+    right_types = sorted({item.type for item in symptom.others})
     misdefined = symptom.recording.misdefined(symptom.topic) and symptom.kind is Kind.PUBLISHER
-    if not wanted or not found or (set(wanted) & set(found) and not misdefined):
+    if not own_types or not right_types:
         return None
-    other = "with another definition" if misdefined else f"not {codes(wanted, last='or')}"
+    if not misdefined and set(own_types) & set(right_types):
+        return None
+    other = "with another definition" if misdefined else f"not {codes(right_types, last='or')}"
     return mistaken(
         "other_type",
         f"{symptom.seen}: the {symptom.kind.value} on {code(symptom.topic)} has the type "
-        f"{codes(found)}, {other}",
-        Evidence(moments=endpoints_seen(symptom.recording, symptom.own)),
-        type=code(type_in_code(wanted[0])),
+        f"{codes(own_types)}, {other}",
+        Evidence(moments=symptom.moments),
+        type=code(type_in_code(right_types[0])),
     )
 
 
@@ -287,10 +294,9 @@ def why_refused(symptom: OnTopic) -> Finding | None:
 def nothing_sent(symptom: NotDelivered) -> Finding | None:
     """The process ended or destroyed its subscription before a message was sent."""
     recording, topic = symptom.recording, symptom.topic
-    carried = recording.carried(topic)
-    if carried and any(
-        (item.vanished_ns or math.inf) > carried[0].stamp_ns for item in symptom.own
-    ):
+    messages = recording.carried(topic)
+    gone_ns = max((item.vanished_ns or math.inf for item in symptom.own), default=0)
+    if messages and gone_ns > messages[0].stamp_ns:
         return None
     return (
         why_ended(recording)
@@ -302,10 +308,11 @@ def nothing_sent(symptom: NotDelivered) -> Finding | None:
 @explanation(NoMessages, before=(process_ended,))
 def never_matched(symptom: NoMessages) -> Finding | None:
     """Because the machine was busy, the publisher and the probe did not discover each other."""
-    if not was_held_up(symptom.recording) or not any(
-        item.data.get("topic") == symptom.topic and item.data.get("matched") is False
-        for item in symptom.recording.declared("held")
-    ):
+    held = [one.data for one in symptom.recording.declared("held")]
+    is_unmatched = any(
+        data.get("topic") == symptom.topic and data.get("matched") is False for data in held
+    )
+    if not is_unmatched or not was_held_up(symptom.recording):
         return None
     return Finding.undecided(
         f"the subscription of rosgrade did not match the publisher on {code(symptom.topic)} in "
@@ -324,8 +331,9 @@ def publisher_destroyed(symptom: OnTopic) -> Finding | None:
 def nothing_to_answer(symptom: NoMessages) -> Finding | None:
     """The messages that the node should answer did not reach it."""
     causes = [why_not_delivered(symptom.recording, name) for name in symptom.asked]
-    cause = causes[0] if causes and all(causes) else None
-    return cause and cause.after(
+    if not causes or causes[0] is None or None in causes:
+        return None
+    return causes[0].after(
         f"{symptom.seen}, because the messages that the node should answer, on "
         f"{code(symptom.asked[0])}, never reached it"
     )
@@ -335,12 +343,11 @@ def nothing_to_answer(symptom: NoMessages) -> Finding | None:
 def no_answer(symptom: NoMessages) -> Finding | None:
     """The subscription's callback gets a message, but does not publish."""
     recording = symptom.recording
-    name = next((name for name in symptom.asked if recording.sent[name]), None)
-    if name is None:
-        return None
-    sent = recording.sent[name]
-    seen = (
-        f"{symptom.seen}, although {counted(len(sent), 'message')} on {code(name)} reached the node"
-    )
-    evidence = evidence_at(recording, f"sent on {name}", sent[0].stamp_ns)
-    return symptom.placed(mistaken("no_answer", seen, evidence))
+    for name in symptom.asked:
+        sent = recording.sent[name]
+        if sent:
+            messages = f"{counted(len(sent), 'message')} on {code(name)}"
+            seen = f"{symptom.seen}, although {messages} reached the node"
+            evidence = evidence_at(recording, f"sent on {name}", sent[0].stamp_ns)
+            return symptom.placed(mistaken("no_answer", seen, evidence))
+    return None

@@ -27,7 +27,8 @@ _AFTER = {
     "canceled": "ignores_status",
 }
 """The mistake where nothing follows something that ended so."""
-_MOST_ROWS = 50
+# What a report shows of them.
+_MOST_ROWS, _MOST_MOMENTS = 50, 8
 
 
 @dataclass(frozen=True)
@@ -82,16 +83,17 @@ def why_not_asked(recording: Recording, server: str, needed: int) -> Finding:
 @explanation(NotAsked, before=(process_ended,))
 def no_client(symptom: NotAsked) -> Finding | None:
     """There is no client: it is missing, or its name is misspelt."""
+    if symptom.asked or symptom.nodes:
+        return None
     word = ACTION_CLIENT if symptom.is_action else CLIENT
-    there = symptom.asked or symptom.nodes
-    return None if there else why_not_offered(symptom.recording, word, symptom.server)
+    return why_not_offered(symptom.recording, word, symptom.server)
 
 
 @explanation(NotAsked, after=(callback_raised,), before=(never_spun,), concept="executors")
 def waits_in_a_callback(symptom: NotAsked) -> Finding | None:
     """call() or spin_until_future_complete() in a callback waits for an answer, and blocks it."""
     blocked = blocked_executor(symptom) if symptom.asked else None
-    return blocked and replace(blocked, hint=remedy("waits_in_a_callback"))
+    return replace(blocked, hint=remedy("waits_in_a_callback")) if blocked is not None else None
 
 
 @explanation(NotAsked, after=(blocked_executor,))
@@ -120,12 +122,14 @@ def evidence(recording: Recording, asked: tuple[Asked, ...]) -> Evidence:
     """What was asked, and what became of it."""
     header = ("asked at", "fields", "status", "answer", "ended at")
     moments, rows = [], []
-    for one in asked[:_MOST_ROWS]:
-        at_s, fields = recording.since_launch_s(one.asked_ns), brief(one.fields)
-        moments.append(Moment(f"asked: {fields}", at_s))
-        answer = words(one.answer) if one.answer is not None else ""
-        end_ns = one.ended_ns
-        end = f"{recording.since_launch_s(end_ns):.2f} s" if end_ns is not None else ""
-        rows.append((f"{at_s:.2f} s", fields, one.status or "open", answer, end))
+    for item in asked[:_MOST_ROWS]:
+        asked_s, fields = recording.since_launch_s(item.asked_ns), brief(item.fields)
+        moments.append(Moment(f"asked: {fields}", asked_s))
+        answer = end = ""
+        if item.answer is not None:
+            answer = words(item.answer)
+        if item.ended_ns is not None:
+            end = f"{recording.since_launch_s(item.ended_ns):.2f} s"
+        rows.append((f"{asked_s:.2f} s", fields, item.status or "open", answer, end))
     table = Table("What was asked", header, tuple(rows))
-    return Evidence(moments=tuple(moments[:8]), tables=(table,) if rows else ())
+    return Evidence(moments=tuple(moments[:_MOST_MOMENTS]), tables=(table,) if rows else ())

@@ -36,9 +36,12 @@ def held_up_below(
 ) -> Finding | None:
     """The machine's doing, if with the time that it took there may have been as many as needed."""
     begin_ns, end_ns = span_ns
-    stolen_s, own_s = recording.stolen_s(begin_ns, end_ns), left_s(recording, begin_ns, end_ns)
-    enough = number * (end_ns - begin_ns) / NS >= needed * own_s
-    return Finding.held_up(seen, stolen_s) if stolen_s > 0.0 and enough else None
+    stolen_s = recording.stolen_s(begin_ns, end_ns)
+    if stolen_s <= 0.0:
+        return None
+    # At the same rate in the whole of the time.
+    is_enough = number * (end_ns - begin_ns) / NS >= needed * left_s(recording, begin_ns, end_ns)
+    return Finding.held_up(seen, stolen_s) if is_enough else None
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,9 @@ class NotCalled(NotDone, concept="executors"):
         if stolen_s < _STARVED * (end_ns - begin_ns) / NS:
             return None
         guilty = self.guilty()
-        return guilty.doubted() if guilty else Finding.held_up(self.seen, stolen_s)
+        if guilty is not None:
+            return guilty.doubted()
+        return Finding.held_up(self.seen, stolen_s)
 
     def guilty(self) -> Finding | None:
         """What is wrong although the machine took time, if that shows."""
@@ -90,8 +95,11 @@ class NotCalled(NotDone, concept="executors"):
 
     def placed(self, cause: Finding) -> Finding:
         """A cause with the line at which a process did not go on, if one did not."""
-        stands = (where_it_stands(self.recording, one.name) for one in self.processes)
-        return at_its_place(cause, cause.observed, next(filter(None, stands), None))
+        for process in self.processes:
+            stand = where_it_stands(self.recording, process.name)
+            if stand is not None:
+                return at_its_place(cause, cause.observed, stand)
+        return cause
 
 
 class CalledLate(NotCalled, concept="executors"):
@@ -145,26 +153,25 @@ def never_spun(symptom: NotCalled) -> Finding | None:
     recording = symptom.recording
     if not symptom.needs_spin:
         return None
-    names = [one.name for one in symptom.processes]
-    process = next((name for name in names if declarations.never_spun(recording, name)), None)
+    for process in symptom.processes:
+        if declarations.never_spun(recording, process.name):
+            cause = Finding(
+                f"{symptom.seen}: {SPIN} was never called, so no callback runs",
+                remedy("never_spun"),
+                Evidence(moments=(until_the_end(recording, f"{SPIN} was still not called"),)),
+                concept="executors",
+            )
+            return at_its_place(cause, symptom.seen, where_it_stands(recording, process.name))
     nodes = sorted(set(symptom.nodes))
-    if process is None:
-        if not nodes or not all(declarations.in_no_executor(recording, node) for node in nodes):
-            return None
-        return Finding(
-            f"{symptom.seen}: an executor spins, but {codes(nodes)} was not added to it, so none "
-            "of its callbacks runs",
-            remedy("in_no_executor"),
-            Evidence(moments=(until_the_end(recording, "no executor had the node"),)),
-            concept="executors",
-        )
-    cause = Finding(
-        f"{symptom.seen}: {SPIN} was never called, so no callback runs",
-        remedy("never_spun"),
-        Evidence(moments=(until_the_end(recording, f"{SPIN} was still not called"),)),
+    if not nodes or not all(declarations.in_no_executor(recording, node) for node in nodes):
+        return None
+    return Finding(
+        f"{symptom.seen}: an executor spins, but {codes(nodes)} was not added to it, so none of "
+        "its callbacks runs",
+        remedy("in_no_executor"),
+        Evidence(moments=(until_the_end(recording, "no executor had the node"),)),
         concept="executors",
     )
-    return at_its_place(cause, symptom.seen, where_it_stands(recording, process))
 
 
 @explanation(NotCalled)
@@ -178,9 +185,10 @@ def blocked_executor(symptom: NotCalled) -> Finding | None:
         for call in _calls(symptom)
         if left_s(recording, call.requested_ns, recording.stop_ns) >= ANSWER_S
     ]
-    call = next((call for call in calls if call.answered_ns is None), None)
-    if call is None or any((one.answered_ns or 0) >= symptom.since_ns for one in calls):
+    unanswered = [call for call in calls if call.answered_ns is None]
+    if not unanswered or any((call.answered_ns or 0) >= symptom.since_ns for call in calls):
         return None
+    call = unanswered[0]
     process = declarations.process_of(recording, min(symptom.nodes))
     since_s = recording.since_launch_s(call.requested_ns)
     cause = Finding(
@@ -202,9 +210,11 @@ def slow_callbacks(symptom: CalledLate) -> Finding | None:
         (call, left_s(recording, call.requested_ns, call.answered_ns or recording.stop_ns))
         for call in _calls(symptom)
     ]
+    if len(waits) < 2:
+        return None
     # The longest but one: a single answer may have been lost on its way.
-    call, wait_s = sorted(waits, key=lambda item: item[1])[-2] if len(waits) > 1 else (None, 0.0)
-    if call is None or wait_s <= _SLOW_S:
+    call, wait_s = sorted(waits, key=lambda item: item[1])[-2]
+    if wait_s <= _SLOW_S:
         return None
     cause = Finding(
         f"{symptom.late}: the callbacks keep each other waiting, and calls to the node's parameter "
@@ -232,20 +242,18 @@ def why_raised(
             and line.stream == "stderr"
             and begin_ns <= line.time_ns <= recording.stop_ns
         ]
-        failures = parse_failures([line.text for line in lines])
-        raised = next((item for item in reversed(failures) if not item.ignored), None)
-        if raised is None:
+        texts = [line.text for line in lines]
+        raised = [failure for failure in parse_failures(texts) if not failure.ignored]
+        if not raised:
             continue
-        place = raised_at(raised, recording)
+        place = raised_at(raised[-1], recording)
         return Finding(
-            f"{what}: an exception was raised meanwhile, {raised}{in_brackets(place)}",
+            f"{what}: an exception was raised meanwhile, {raised[-1]}{in_brackets(place)}",
             remedy("named_line" if place else "read_message"),
             Evidence(
                 moments=(moment(recording, "the exception", lines[-1].time_ns),),
                 places=(place,) if place else (),
-                log=tuple(
-                    own_frames([line.text for line in lines], recording.submission)[-_LOG_LINES:]
-                ),
+                log=tuple(own_frames(texts, recording.submission)[-_LOG_LINES:]),
             ),
         )
     return None
@@ -261,6 +269,6 @@ def at_its_place(cause: Finding, seen: str, stand: Stand | None) -> Finding:
 
 def _calls(symptom: NotCalled) -> list[Call]:
     """Calls to the services that rclpy and rclcpp make for the nodes, which found a server."""
-    made = {name for node in symptom.nodes for name in executor_services(node)}
-    made.discard(symptom.unanswered)
-    return [call for call in symptom.recording.calls if call.service in made and not call.error]
+    services = {name for node in symptom.nodes for name in executor_services(node)}
+    services.discard(symptom.unanswered)
+    return [call for call in symptom.recording.calls if call.service in services and not call.error]
