@@ -71,7 +71,9 @@ def why_touched(recording: Recording) -> Finding | None:
 def no_scan_for_long(symptom: Contact) -> Finding | None:
     """No scan came for a long time."""
     scan = newest(symptom.recording, symptom.step.time_ns)
-    since_ns = symptom.step.time_ns - scan.stamp_ns if scan is not None else 0
+    if scan is None:
+        return None
+    since_ns = symptom.step.time_ns - scan.stamp_ns
     if since_ns <= _BLIND_NS:
         return None
     return mistaken("no_scan_for_long", f"; the last scan had come {since_ns / NS:.2f} s before")
@@ -80,8 +82,10 @@ def no_scan_for_long(symptom: Contact) -> Finding | None:
 @explanation(Contact)
 def old_command(symptom: Contact) -> Finding | None:
     """The last command was to drive, and the robot keeps it."""
-    since_ns = symptom.step.time_ns - symptom.sent[-1].time_ns if symptom.sent else 0
-    if since_ns <= _HELD_NS or not symptom.before.command_m_s:
+    if not symptom.sent or not symptom.before.command_m_s:
+        return None
+    since_ns = symptom.step.time_ns - symptom.sent[-1].time_ns
+    if since_ns <= _HELD_NS:
         return None
     return mistaken("old_command", f", sent {since_ns / NS:.2f} s before")
 
@@ -117,5 +121,5 @@ def _was_hit(truth: tuple[Truth, ...], index: int) -> bool:
     step = truth[index]
     if not (step.contact or "").startswith("moving") or step.command_m_s:
         return False
-    rested = [one for one in truth[:index] if step.time_ns - one.time_ns <= _RESTED_NS]
-    return all(map(is_at_rest, rested))
+    just_before = [one for one in truth[:index] if step.time_ns - one.time_ns <= _RESTED_NS]
+    return all(map(is_at_rest, just_before))

@@ -31,7 +31,7 @@ class Reading:
 
     words: str
     mistake: str
-    of: Callable[[float], float]
+    read: Callable[[float], float]
 
     def __str__(self) -> str:
         """What was seen, to follow a colon."""
@@ -58,35 +58,40 @@ def misread_yaw(run: Approach, position_m: float) -> Reading | None:
     """
     scene = run.recording.scene
     limit_rad_s = scene.max_angular_rad_s if scene is not None else math.inf
-    ways = [
+    # A command may answer the newest odometry, or one that is some messages behind it.
+    by_delay = [
         before_arrival(run, answers(run.recording, behind), position_m)
         for behind in range(MOST_BEHIND + 1)
     ]
-    for way in ways:
-        yaws = [answer.pose.yaw_rad for answer in way]
-        if len(way) < _LEAST_COMMANDS or max(yaws) - min(yaws) < _TURNED_RAD:
+    for pairs in by_delay:
+        yaws_rad = [pair.pose.yaw_rad for pair in pairs]
+        if len(pairs) < _LEAST_COMMANDS or max(yaws_rad) - min(yaws_rad) < _TURNED_RAD:
             return None
-        if _r2(run, way, lambda yaw_rad: yaw_rad, limit_rad_s) > _RIGHT_R2:
+        if _r2(run, pairs, lambda yaw_rad: yaw_rad, limit_rad_s) > _RIGHT_R2:
             return None
-    fits = [(_r2(run, way, one.of, limit_rad_s), one) for way in ways for one in _READINGS]
-    r2, best = max(fits, key=lambda item: item[0])
+    fits = [
+        (_r2(run, pairs, reading.read, limit_rad_s), reading)
+        for pairs in by_delay
+        for reading in _READINGS
+    ]
+    r2, best = max(fits, key=lambda fit_of_reading: fit_of_reading[0])
     return best if r2 >= _GOOD_R2 else None
 
 
 def _r2(
-    run: Approach, way: Sequence[Answer], read: Callable[[float], float], limit_rad_s: float
+    run: Approach, pairs: Sequence[Answer], read: Callable[[float], float], limit_rad_s: float
 ) -> float:
     """How well the commands are in proportion to the error, wrapped or not; at most 1."""
-    found = -math.inf
+    best = -math.inf
     for wrap in (wrap_angle, lambda error_rad: error_rad):
         samples = [
             Sample(
-                wrap(run.direction_rad(item.pose) - read(item.pose.yaw_rad)),
-                item.command.twist.angular_rad_s,
+                wrap(run.direction_rad(pair.pose) - read(pair.pose.yaw_rad)),
+                pair.command.twist.angular_rad_s,
             )
-            for item in way
+            for pair in pairs
         ]
         line = fit(samples, limit_rad_s)
         if line.gain > 0.0 and line.used >= _LEAST_COMMANDS:
-            found = max(found, line.r2)
-    return found
+            best = max(best, line.r2)
+    return best

@@ -19,7 +19,12 @@ from grader.recording.model import NS, Ending
 from grader.recording.simulated import Truth
 from grader.spec.unit import format_duration
 
+# A turn away from the goal is one by more than this.
 _ASTRAY_RAD = math.radians(30.0)
+# No way to a goal needs so many full turns.
+_MANY_TURNS = 1.5
+# Share of the run that the machine may take from it.
+_STARVED = 0.25
 
 
 @dataclass(frozen=True)
@@ -110,8 +115,8 @@ def no_cpu_time(symptom: GoalMissed) -> Finding | None:
     """The machine gave the run too little CPU time; this is an error and costs no points."""
     recording, truth = symptom.run.recording, symptom.run.truth
     lost_s = stolen_s(recording, truth[0].time_ns, truth[-1].time_ns)
-    is_starved = lost_s > 0.25 * symptom.watched_s and recording.ending is Ending.TIMEOUT
-    if symptom.is_at_rest or not is_starved:
+    is_starved = lost_s > _STARVED * symptom.watched_s
+    if symptom.is_at_rest or not is_starved or recording.ending is not Ending.TIMEOUT:
         return None
     return Finding.held_up(symptom.seen, lost_s)
 
@@ -126,13 +131,11 @@ def off_course(symptom: GoalMissed | HeadingMissed) -> Finding | None:
 def wrong_place(symptom: GoalMissed) -> Finding | None:
     """It drove to another place: x and y swapped, a wrong sign, or counted from its start."""
     goal, last, first = symptom.run.goal, symptom.last, symptom.run.truth[0]
+    if not symptom.is_at_rest:
+        return None
+    from_start = "the goal measured from where the robot started"
     places = (
-        (
-            first.x_m + goal.x_m,
-            first.y_m + goal.y_m,
-            "the goal measured from where the robot started",
-            "from_the_start",
-        ),
+        (first.x_m + goal.x_m, first.y_m + goal.y_m, from_start, "from_the_start"),
         (goal.y_m, goal.x_m, "the goal with x and y swapped", "swapped"),
         (goal.x_m, -goal.y_m, "the goal with the sign of y changed", "wrong_sign"),
         (-goal.x_m, goal.y_m, "the goal with the sign of x changed", "wrong_sign"),
@@ -140,7 +143,7 @@ def wrong_place(symptom: GoalMissed) -> Finding | None:
     for x_m, y_m, words, mistake in places:
         is_another = math.hypot(goal.x_m - x_m, goal.y_m - y_m) > 2.0 * symptom.position_m
         is_there = math.hypot(last.x_m - x_m, last.y_m - y_m) <= symptom.position_m
-        if symptom.is_at_rest and is_another and is_there:
+        if is_another and is_there:
             return symptom.cause(f": that is {words}", remedy(mistake))
     return None
 
@@ -148,8 +151,12 @@ def wrong_place(symptom: GoalMissed) -> Finding | None:
 @explanation(GoalMissed, concept="executors")
 def loop_in_a_callback(symptom: GoalMissed) -> Finding | None:
     """A callback does not return: its loop never sees newer odometry."""
-    stand = None if symptom.is_at_rest else stuck(symptom.run.recording)
-    return None if stand is None else at_its_place(symptom.cause("", ""), symptom.seen, stand)
+    if symptom.is_at_rest:
+        return None
+    stand = stuck(symptom.run.recording)
+    if stand is None:
+        return None
+    return at_its_place(symptom.cause("", ""), symptom.seen, stand)
 
 
 @explanation(GoalMissed, concept="angles")
@@ -162,18 +169,19 @@ def yaw_misread(symptom: GoalMissed) -> Finding | None:
 @explanation(GoalMissed, concept="angles")
 def angle_not_wrapped(symptom: GoalMissed) -> Finding | None:
     """It turns the long way: the angle error is not wrapped to -pi .. pi."""
+    if symptom.is_at_rest:
+        return None
     run = symptom.run
     far = [step for step in run.truth if run.distance_m(step) > symptom.position_m]
     detours = list(long_turns(far, run.bearing_error_rad, _ASTRAY_RAD))
     turns = abs(turned_rad(run.truth)) / math.tau
-    if symptom.is_at_rest or (not detours and turns < 1.5):
+    if detours:
+        times = "once" if len(detours) == 1 else f"{len(detours)} times"
+        turned = f"on its way it turned away from the goal, the long way round, {times}"
+    elif turns >= _MANY_TURNS:
+        turned = f"it made {turns:.1f} full turns"
+    else:
         return None
-    times = "once" if len(detours) == 1 else f"{len(detours)} times"
-    turned = (
-        f"on its way it turned away from the goal, the long way round, {times}"
-        if detours
-        else f"it made {turns:.1f} full turns"
-    )
     return symptom.cause(f": {turned}", remedy("angle_not_wrapped", remedy=remedy("long_turn")))
 
 

@@ -29,13 +29,14 @@ def why_unsteered(recording: Recording) -> Finding | None:
     """The longest time without a command in which the robot moved on; None if it is short."""
     end_ns = recording.truth[-1].time_ns
     sent = commands(recording)
-    ends_ns = [*(item.time_ns for item in sent[1:]), end_ns]
-    moving = [
-        (item.time_ns, next_ns)
-        for item, next_ns in zip(sent, ends_ns, strict=bool(sent))
-        if not is_zero(item.twist)
+    ends_ns = [*(command.time_ns for command in sent[1:]), end_ns]
+    # Without any command there is one end too many.
+    moving_ns = [
+        (command.time_ns, next_ns)
+        for command, next_ns in zip(sent, ends_ns, strict=False)
+        if not is_zero(command.twist)
     ]
-    begin_ns, next_ns = max(moving, key=lambda span: span[1] - span[0], default=(0, 0))
+    begin_ns, next_ns = max(moving_ns, key=lambda span: span[1] - span[0], default=(0, 0))
     long_s = (next_ns - begin_ns) / NS
     if long_s - recording.stolen_s(begin_ns, next_ns) < _UNSTEERED_S:
         return None

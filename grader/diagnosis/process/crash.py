@@ -34,23 +34,18 @@ _NOISE = re.compile(r"__cxx11::|^std::_Nested_exception<(.+)>$")
 
 def parse_crashes(lines: Iterable[str]) -> tuple[Failure, ...]:
     """Find what ended compiled programs in the output of one process."""
-    found: list[Failure] = []
+    failures: list[Failure] = []
     for line in lines:
-        beginning = next(filter(None, (one.fullmatch(line) for one in _BEGINNINGS)), None)
-        if beginning is None:
-            if found:
-                found[-1] = _with(found[-1], line)
-            continue
-        failure = _failure(beginning.groupdict())
-        # That it aborts is no news after what made it abort.
-        if failure.type != "SIGABRT" or not found:
-            found.append(failure)
-    return tuple(found)
-
-
-def _failure(said: dict[str, str]) -> Failure:
-    type_ = _NOISE.sub(r"\1", said.get("type", "SIGABRT"))
-    return Failure(type_, said.get("message", ""), (), compiled=True)
+        match = next(filter(None, (pattern.fullmatch(line) for pattern in _BEGINNINGS)), None)
+        if match is not None:
+            groups = match.groupdict()
+            type_ = _NOISE.sub(r"\1", groups.get("type", "SIGABRT"))
+            # That it aborts is no news after what made it abort.
+            if type_ != "SIGABRT" or not failures:
+                failures.append(Failure(type_, groups.get("message", ""), (), compiled=True))
+        elif failures:
+            failures[-1] = _with(failures[-1], line)
+    return tuple(failures)
 
 
 def _with(failure: Failure, line: str) -> Failure:

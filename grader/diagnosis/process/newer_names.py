@@ -10,6 +10,7 @@ from grader.recording.model import Recording
 from grader.spec.source import Model, read_source
 
 _JAZZY_PYTHON = (3, 12)
+_OLD_NUMPY = "numpy 1.26 (for Python 3.12 and older)"
 # How Python says that something has no such name.
 _LACKS = (
     re.compile(r"cannot import name '(?P<name>\w+)' from '(?P<home>[\w.]+)'"),
@@ -39,10 +40,14 @@ def newer_name(failure: Failure, recording: Recording) -> tuple[str, str] | None
     if failure.type not in _ERRORS:
         return None
     removed = _REMOVED.match(failure.message)
-    found = next(filter(None, (words.match(failure.message) for words in _LACKS)), None)
-    home, name = (found["home"], found["name"]) if found else ("numpy", removed and removed[1])
-    if removed or name in TABLE.dropped.get(home, "").split():
-        return f"numpy.{name}", "numpy 1.26 (for Python 3.12 and older)"
+    lacks = next(filter(None, (pattern.match(failure.message) for pattern in _LACKS)), None)
+    if removed is not None:
+        return f"numpy.{removed[1]}", _OLD_NUMPY
+    if lacks is None:
+        return None
+    home, name = lacks["home"], lacks["name"]
+    if name in TABLE.dropped.get(home, "").split():
+        return f"numpy.{name}", _OLD_NUMPY
     version = recording.environment.get("python", "")
     if not version or tuple(map(int, version.split(".")[:2])) >= _JAZZY_PYTHON:
         return None

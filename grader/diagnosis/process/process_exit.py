@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
@@ -66,11 +66,11 @@ def ended_early(recording: Recording, process: Process) -> bool:
     """
     if process.exited_ns is None:
         return False
-    if process.stopped_by != "itself":
-        exiting_ns = declarations.exiting_ns(recording, process.name)
-        was_leaving = exiting_ns is not None and exiting_ns < recording.stop_ns
-        return process.exited_ns >= recording.stop_ns and was_leaving
-    return recording.ending is Ending.EXITED or process.exited_ns < recording.stop_ns
+    if process.stopped_by == "itself":
+        return recording.ending is Ending.EXITED or process.exited_ns < recording.stop_ns
+    exiting_ns = declarations.exiting_ns(recording, process.name)
+    was_leaving = exiting_ns is not None and exiting_ns < recording.stop_ns
+    return was_leaving and process.exited_ns >= recording.stop_ns
 
 
 def exited(recording: Recording) -> tuple[Process, ...]:
@@ -109,8 +109,10 @@ def signal_of(exit_code: int) -> signal.Signals | None:
 def why_ended(recording: Recording, seen: str = "") -> Finding | None:
     """The cause if a process ended early, after what was seen of it; None if none did."""
     ended = exited(recording)
-    cause = why_it_exited(recording, ended[0]) if ended else None
-    return cause.after(seen) if cause is not None and seen else cause
+    if not ended:
+        return None
+    cause = why_it_exited(recording, ended[0])
+    return cause.after(seen) if seen else cause
 
 
 def why_crashed(recording: Recording) -> Finding | None:
@@ -208,8 +210,10 @@ class NotDone(Symptom[Finding]):
 def process_ended(symptom: NotDone) -> Finding | None:
     """The process ended."""
     ended = symptom.ended
-    cause = why_it_exited(symptom.recording, ended[0]) if ended else None
-    return cause.after(symptom.seen) if cause and symptom.seen else cause
+    if not ended:
+        return None
+    cause = why_it_exited(symptom.recording, ended[0])
+    return cause.after(symptom.seen) if symptom.seen else cause
 
 
 @explanation(ProcessExit)
@@ -240,11 +244,10 @@ def limit_exceeded(symptom: ProcessExit) -> Finding | None:
 @explanation(ProcessExit)
 def launch_file_not_installed(symptom: ProcessExit) -> Finding | None:
     """The launch file is not installed: data_files in setup.py or install() in CMake lacks it."""
-    lines = (_NO_LAUNCH_FILE.search(line) for line in symptom.evidence.log)
-    found = next(filter(None, lines), None)
-    if found is None or symptom.failure is not None:
+    match = _first_match(_NO_LAUNCH_FILE, symptom.evidence.log)
+    if match is None or symptom.failure is not None:
         return None
-    name, package = found["file"], found["package"]
+    name, package = match["file"], match["package"]
     return mistaken(
         "launch_file_not_installed",
         f"{symptom.seen}: the package {code(package)} installed no {code(name)}",
@@ -257,20 +260,23 @@ def launch_file_not_installed(symptom: ProcessExit) -> Finding | None:
 @explanation(ProcessExit)
 def parameter_file_unreadable(symptom: ProcessExit) -> Finding | None:
     """ROS cannot read a parameter file, such as one with `ros_parameters` for `ros__parameters`."""
-    lines = (_PARAMETER_FILE.search(line) for line in symptom.evidence.log)
-    found = next(filter(None, lines), None)
-    if found is None:
+    match = _first_match(_PARAMETER_FILE, symptom.evidence.log)
+    if match is None:
         return None
-    parts, line = PurePosixPath(found["file"]).parts, int(found["line"] or 0) or None
-    own = [PurePosixPath(path) for path in symptom.recording.submission.files]
-    alike = [path for path in own if path.parts[-2:] == parts[-2:]]
-    file = str(alike[0]) if alike else parts[-1]
-    is_key = "ros__parameters" in found["why"]
+    installed, why = PurePosixPath(match["file"]), match["why"]
+    line = int(match["line"]) if match["line"] else None
+    files = [PurePosixPath(path) for path in symptom.recording.submission.files]
+    alike = [str(path) for path in files if path.parts[-2:] == installed.parts[-2:]]
+    file = alike[0] if alike else installed.name
     return mistaken(
-        "no_ros_parameters" if is_key else "broken_parameters",
-        f"{symptom.seen}: ROS cannot read the parameter file {code(file)}: {found['why']}",
-        replace(symptom.evidence, places=(SourceError(file, line, found["why"]),)),
+        "no_ros_parameters" if "ros__parameters" in why else "broken_parameters",
+        f"{symptom.seen}: ROS cannot read the parameter file {code(file)}: {why}",
+        replace(symptom.evidence, places=(SourceError(file, line, why),)),
     )
+
+
+def _first_match(pattern: re.Pattern[str], lines: Iterable[str]) -> re.Match[str] | None:
+    return next(filter(None, map(pattern.search, lines)), None)
 
 
 @explanation(ProcessExit)
@@ -292,14 +298,12 @@ def service_without_response(symptom: ProcessExit) -> Finding | None:
     if not failure or failure.type != "TypeError" or failure.frames[-1].where != "send_response":
         return None
     # The deepest line of the student's is that of spin(), which is right.
-    recording, name = symptom.recording, symptom.process.name
-    services = {one.name for one in recording.services}
-    calls = [
-        str(one.data.get("callback"))
-        for one in recording.declared("ran")
-        if one.process == name and one.data.get("serves") in services
+    recording, services = symptom.recording, {one.name for one in symptom.recording.services}
+    runs = [one for one in recording.declared("ran") if one.process == symptom.process.name]
+    callbacks = [
+        str(one.data.get("callback")) for one in runs if one.data.get("serves") in services
     ]
-    place = defined_at(calls[-1], str(failure), recording.submission) if calls else None
+    place = defined_at(callbacks[-1], str(failure), recording.submission) if callbacks else None
     return mistaken(
         "service_without_response",
         f"{symptom.seen} with {failure}: a service's callback did not return a response"
@@ -314,36 +318,42 @@ def hides_what_node_has(symptom: ProcessExit) -> Finding | None:
     failure = symptom.failure
     if not failure or not failure.frames or "/rclpy/" not in failure.frames[-1].file:
         return None
-    places = [
-        (function.name.rpartition(".")[2], SourceError(source.path, function.line, str(failure)))
-        for package in symptom.recording.submission.packages
-        for source in package.sources
-        for owner in source.classes
-        for function in source.functions
-        if any(base.endswith("Node") for base in owner.bases)
-        and function.name.rpartition(".")[0] == owner.name
-    ]
+    places = list(_methods_of_nodes(symptom.recording, str(failure)))
     if symptom.place:
         assigned = (_SET.match(frame.source) for frame in failure.frames)
         places += [(match[1], symptom.place) for match in assigned if match]
-    name, place = next((pair for pair in places if _OF_NODE.fullmatch(pair[0])), ("", None))
-    if place is None:
-        return None
-    return mistaken(
-        "hides_what_node_has",
-        f"{symptom.seen} with {failure}: your class replaces {code(name)} of Node"
-        f"{in_brackets(place)}",
-        replace(symptom.evidence, places=(place,)),
-        name=code(name),
-    )
+    for name, place in places:
+        if _OF_NODE.fullmatch(name):
+            return mistaken(
+                "hides_what_node_has",
+                f"{symptom.seen} with {failure}: your class replaces {code(name)} of Node"
+                f"{in_brackets(place)}",
+                replace(symptom.evidence, places=(place,)),
+                name=code(name),
+            )
+    return None
+
+
+def _methods_of_nodes(recording: Recording, message: str) -> Iterator[tuple[str, SourceError]]:
+    """The names of methods in the student's classes of nodes, and where they are."""
+    for package in recording.submission.packages:
+        for source in package.sources:
+            for owner in source.classes:
+                if any(base.endswith("Node") for base in owner.bases):
+                    for function in source.functions:
+                        space, _, name = function.name.rpartition(".")
+                        if space == owner.name:
+                            yield name, SourceError(source.path, function.line, message)
 
 
 @explanation(ProcessExit)
 def machine_lacks_it(symptom: ProcessExit) -> Finding | None:
     """It needs something of ROS 2 or of its Python that the machine lacks; this costs no points."""
     failure, recording = symptom.failure, symptom.recording
-    lacking = failure and (newer_name(failure, recording) or lacking_here(failure, recording))
-    if not lacking:
+    if failure is None:
+        return None
+    lacking = newer_name(failure, recording) or lacking_here(failure, recording)
+    if lacking is None:
         return None
     name, needs = lacking
     return Finding.ours(

@@ -56,79 +56,89 @@ def where_it_stands(
     Args:
         in_callback: Only if rclpy had called it: a loop in main() is no callback.
     """
-    found = at_the_end(recording, process)
-    place = _place(recording, found) if found is not None else None
-    if found is None or place is None:
-        call = interrupted_call(recording, process)
-        if call is None or (in_callback and not call.in_callback):
-            return None
-        line, text = call.place.line or 0, call.text
-        words = _words(call.function, line, text, "when it was stopped", call.in_callback)
-        return Stand(call.place, words, _hint(text, "", call.in_callback), call.in_callback)
-    if not found.in_callback and (in_callback or not never_spun(recording, process)):
+    standing = at_the_end(recording, process)
+    place = _place(recording, standing) if standing is not None else None
+    if standing is None or place is None:
+        return _interrupted_stand(recording, process, in_callback)
+    if not standing.in_callback and (in_callback or not never_spun(recording, process)):
         return None
-    since = f"from {recording.since_launch_s(found.began_ns):.2f} s after launch on"
-    words = _words(found.function, place.line or 0, _text(found), since, found.in_callback)
-    return _stand(found, place, words)
+    since = f"from {recording.since_launch_s(standing.began_ns):.2f} s after launch on"
+    text, function = _text(standing), standing.function
+    words = _words(function, place.line or 0, text, since, standing.in_callback)
+    return _stand(standing, place, words)
+
+
+def _interrupted_stand(recording: Recording, process: str, in_callback: bool) -> Stand | None:
+    """The same by the traceback that SIGINT caused."""
+    call = interrupted_call(recording, process)
+    if call is None or (in_callback and not call.in_callback):
+        return None
+    line, text = call.place.line or 0, call.text
+    words = _words(call.function, line, text, "when it was stopped", call.in_callback)
+    return Stand(call.place, words, _hint(text, "", call.in_callback), call.in_callback)
 
 
 def stuck(recording: Recording) -> Stand | None:
     """Where a callback did not return until the end, or what comes before spin(); or None."""
     for process in recording.processes:
         spins = not never_spun(recording, process.name)
-        found = where_it_stands(recording, process.name, in_callback=spins)
-        if found is not None:
-            return found
+        stand = where_it_stands(recording, process.name, in_callback=spins)
+        if stand is not None:
+            return stand
     return None
 
 
 def slow_callback(recording: Recording, process: str | None = None) -> Stand | None:
     """Where the callback was that took the longest; None where all were short."""
-    found = longest_callback(recording, process)
-    place = _place(recording, found) if found is not None else None
-    if found is None or place is None:
+    standing = longest_callback(recording, process)
+    place = _place(recording, standing) if standing is not None else None
+    if standing is None or place is None:
         return unkept_future(recording)
-    took = format_duration(round((found.seen_ns - found.began_ns) / NS, 1))
-    words = f"{code(found.function)} takes {took} or more: {_at(place.line or 0, _text(found))}"
-    return _stand(found, place, words)
+    took = format_duration(round((standing.seen_ns - standing.began_ns) / NS, 1))
+    where = _in_line(place.line or 0, _text(standing))
+    return _stand(standing, place, f"{code(standing.function)} takes {took} or more: {where}")
 
 
 def unkept_future(recording: Recording) -> Stand | None:
     """Where a callback in C++ waits in the destructor of a future, as its compiler warned."""
     build = recording.submission.build
-    found = _UNKEPT.search(build.log) if build is not None else None
-    if found is None:
+    match = _UNKEPT.search(build.log) if build is not None else None
+    if match is None:
         return None
+    line = int(match["line"])
     words = "the future that `std::async` returns waits in its destructor until the work is done"
-    place = SourceError(found["file"], int(found["line"]), "this future is not kept")
-    return Stand(
-        place, f"{words}: {_at(int(found['line']), '')}", remedy("unkept_future"), in_callback=True
-    )
+    place = SourceError(match["file"], line, "this future is not kept")
+    hint = remedy("unkept_future")
+    return Stand(place, f"{words}: {_in_line(line, '')}", hint, in_callback=True)
 
 
-def _stand(found: Standing, place: SourceError, words: str) -> Stand:
-    hint = _hint(found.text, found.loop_text if found.loop else "", found.in_callback)
-    return Stand(place, words, hint, found.in_callback, (found.seen_ns - found.began_ns) / NS)
+def _stand(standing: Standing, place: SourceError, words: str) -> Stand:
+    loop_text = standing.loop_text if standing.loop else ""
+    hint = _hint(standing.text, loop_text, standing.in_callback)
+    lasted_s = (standing.seen_ns - standing.began_ns) / NS
+    return Stand(place, words, hint, standing.in_callback, lasted_s)
 
 
-def _waits(text: str) -> bool:
-    return any(re.search(pattern, text) for pattern in _WAITS)
+def _is_kept_by_loop(standing: Standing) -> bool:
+    """Whether the loop around the line keeps the call, and not the line, which waits for ever."""
+    line_waits = any(re.search(pattern, standing.text) for pattern in _WAITS)
+    return bool(standing.loop) and not line_waits
 
 
-def _text(found: Standing) -> str:
-    """The line that keeps a call: the one that waits for ever, or the loop, or where it is."""
-    text = found.text if not found.loop or _waits(found.text) else found.loop_text
-    return text[:_LONGEST_TEXT]
+def _text(standing: Standing) -> str:
+    """The line that keeps a call."""
+    return (standing.loop_text if _is_kept_by_loop(standing) else standing.text)[:_LONGEST_TEXT]
 
 
-def _place(recording: Recording, found: Standing) -> SourceError | None:
-    at_line = not found.loop or _waits(found.text)
-    file, line = (found.file, found.line) if at_line else (found.loop_file, found.loop)
+def _place(recording: Recording, standing: Standing) -> SourceError | None:
+    file, line = standing.file, standing.line
+    if _is_kept_by_loop(standing):
+        file, line = standing.loop_file, standing.loop
     path = submission_path(file, recording.submission)
-    return SourceError(path, line, f"{code(found.function)} stands here") if path else None
+    return SourceError(path, line, f"{code(standing.function)} stands here") if path else None
 
 
-def _at(line: int, text: str) -> str:
+def _in_line(line: int, text: str) -> str:
     return f"it is in line {line}" + (f", {code(text)}" if text else "")
 
 
@@ -136,7 +146,7 @@ def _words(function: str, line: int, text: str, when: str, in_callback: bool) ->
     what = f"{code(function)} does not return"
     if not in_callback:
         what = f"{SPIN} is not reached, because {what}"
-    return f"{what}: {_at(line, text)}, {when}"
+    return f"{what}: {_in_line(line, text)}, {when}"
 
 
 def _hint(text: str, loop: str, in_callback: bool) -> str:
