@@ -18,8 +18,9 @@ from grader.findings.value import EXACT
 from grader.findings.words import code, counted, listing
 from grader.recording.model import Call, Kind, Owner, Recording
 
-# By their ids in lifecycle_msgs/msg/Transition.
-_TRANSITIONS = ("create", "configure", "cleanup", "activate", "deactivate", *("shutdown",) * 3)
+# By their ids in lifecycle_msgs/msg/Transition, which has a shutdown from each of three states.
+_LABELS = ("create", "configure", "cleanup", "activate", "deactivate", "shutdown")
+_TRANSITIONS = dict(enumerate((*_LABELS, "shutdown", "shutdown")))
 _OUTCOMES = {True: "succeeded", False: "failed", None: "was not answered"}
 
 
@@ -59,13 +60,14 @@ def why_never_in_state(recording: Recording, node: str, state: str) -> Finding:
     seen = f"{code(node)} was never {state}" + (f": {listing(steps, 'then')}" if steps else "")
     if any(map(_succeeded, changes)) and not recording.on(f"{node}/transition_event"):
         return Finding.undecided(f"{seen}, but the probe received none of its events")
-    # What failed later, or ended the process, came of the first.
-    bad = next((one for one in changes if not _succeeded(one)), None)
-    if bad is None:
+    failed = [one for one in changes if not _succeeded(one)]
+    if not failed:
         return why_never(recording, seen)
-    if bad.answered_ns is None:
-        asked = (bad.service, bad.requested_ns, ANSWER_S)
-        return cause_of(NoAnswer(recording, seen, SERVICE, *asked))
+    # What failed later, or ended the process, came of the first.
+    first = failed[0]
+    if first.answered_ns is None:
+        silence = NoAnswer(recording, seen, SERVICE, first.service, first.requested_ns, ANSWER_S)
+        return cause_of(silence)
     return mistaken("failed_transition", seen, Evidence(moments=(until_the_end(recording),)))
 
 
@@ -73,7 +75,7 @@ def transition(call: Call) -> str:
     """The label of the transition that a call of ``change_state`` asks for."""
     asked: Mapping[str, Any] = (call.request or {}).get("transition", {})
     number = asked.get("id", 0)
-    return asked.get("label") or dict(enumerate(_TRANSITIONS)).get(number, str(number))
+    return asked.get("label") or _TRANSITIONS.get(number, str(number))
 
 
 def why_not_managed(recording: Recording, node: str) -> Finding | None:

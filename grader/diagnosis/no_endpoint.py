@@ -144,12 +144,14 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Finding | N
     """Why the student has no such endpoint on a topic, or None if there is one."""
     if recording.student_endpoints(kind, topic):
         return None
-    others = [item for item in recording.endpoints if item.topic == topic]
+    others = [end for end in recording.endpoints if end.topic == topic]
+    has_other_publisher = any(
+        end.owner is not Owner.STUDENT and end.kind is Kind.PUBLISHER for end in others
+    )
     # Messages came that only the student can have published.
-    known = any(item.owner is not Owner.STUDENT and item.kind is kind for item in others)
-    if kind is Kind.PUBLISHER and recording.on(topic) and not known:
+    if kind is Kind.PUBLISHER and recording.on(topic) and not has_other_publisher:
         return None
-    types = tuple(sorted({item.type for item in others if item.owner is Owner.PROBE}))
+    types = tuple(sorted({end.type for end in others if end.owner is Owner.PROBE}))
     return cause_of(NoEndpoint(recording, ENDPOINTS[kind], topic, types))
 
 
@@ -182,18 +184,21 @@ def meant_endpoint(
     Args:
         type_: The right type; by default what the probe has or asks under the name.
     """
-    asked = [(e.topic, e.type) for e in recording.endpoints if e.owner is not Owner.STUDENT]
     if word is SERVICE:
         asked = [(call.service, call.type) for call in recording.calls]
     elif word is ACTION:
         asked = [(goal.action, goal.type) for goal in recording.goals]
-    wanted = {type_} if type_ else {type for other, type in asked if other == name}
-    found = {
+    else:
+        ends = (end for end in recording.endpoints if end.owner is not Owner.STUDENT)
+        asked = [(end.topic, end.type) for end in ends]
+    right_types = {type_} if type_ else {type for other, type in asked if other == name}
+    right_names = dict(asked)
+    candidates = {
         item.name
         for item in _of_students(recording, word)
-        if item.type in wanted and item.name not in dict(asked) and _NAME.fullmatch(item.name)
+        if item.type in right_types and item.name not in right_names and _NAME.fullmatch(item.name)
     }
-    return found.pop() if len(found) == 1 else None
+    return candidates.pop() if len(candidates) == 1 else None
 
 
 @explanation(NoEndpoint)
@@ -205,12 +210,12 @@ def no_node(symptom: NoEndpoint) -> Finding | None:
 @explanation(NoEndpoint, concept="interfaces")
 def other_interface(symptom: NoEndpoint) -> Finding | None:
     """The service or action has another type."""
-    own = next((one for one in symptom.there if one.name == symptom.name), None)
-    if own is None or not symptom.types:
+    same = [item for item in symptom.there if item.name == symptom.name]
+    if not same or not symptom.types:
         return None
     return mistaken(
         "other_interface",
-        f"the {symptom.word.noun} {code(own.name)} has the type {code(own.type)}",
+        f"the {symptom.word.noun} {code(symptom.name)} has the type {code(same[0].type)}",
         symptom.evidence,
         type=code(type_in_code(symptom.types[0])),
     )
@@ -221,29 +226,32 @@ def misspelt_name(symptom: NoEndpoint) -> Finding | None:
     """Its name is misspelt, private, in a namespace, or in wrong upper or lower case."""
     ended, wanted = symptom.ended, symptom.name
     # What a process that lives has is no misspelling of what another never came to create.
-    suspects = [
-        item
+    names = [
+        item.name
         for item in symptom.there
         if not ended or declarations.process_of(symptom.recording, item.node) in (None, *ended)
     ]
-    match, mistake, why = None, "misspelt_name", ""
-    for item in suspects:
-        prefix = item.name.removesuffix(wanted)
-        if item.name.lower() == wanted.lower():
-            match, why = item.name, ": upper and lower case differ"
-        elif prefix != item.name:
-            match, why = item.name, f": {code(prefix)} stands in front of the name"
+    match = nearest(wanted, names)
+    mistake, why = "misspelt_name", ""
+    for name in names:
+        if name.lower() == wanted.lower():
+            match, why = name, ": upper and lower case differ"
+        elif name.endswith(wanted):
+            match, why = name, f": {code(name.removesuffix(wanted))} stands in front of the name"
             mistake = "prefixed_name"
-    match = match or nearest(wanted, [item.name for item in suspects])
-    found = f"the node {symptom.word.does} {code(match or '')} instead of {code(wanted)}{why}"
-    return mistaken(mistake, found, symptom.evidence, create=symptom.create) if match else None
+    if match is None:
+        return None
+    seen = f"the node {symptom.word.does} {code(match)} instead of {code(wanted)}{why}"
+    return mistaken(mistake, seen, symptom.evidence, create=symptom.create)
 
 
 @explanation(NoEndpoint, after=(process_ended,))
 def dropped(symptom: NoEndpoint) -> Finding | None:
     """It ended with the constructor or the callback that created it."""
-    kind = next((kind for kind, word in ENDPOINTS.items() if word is symptom.word), None)
-    return why_dropped(symptom.recording, kind, symptom.name) if kind else None
+    for kind, word in ENDPOINTS.items():
+        if word is symptom.word:
+            return why_dropped(symptom.recording, kind, symptom.name)
+    return None
 
 
 @explanation(NoEndpoint)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -123,13 +122,11 @@ class NotLogged(CalledLate):
     @property
     def places(self) -> tuple[SourceError, ...]:
         """The callbacks that get the messages."""
-        declared = self.recording.declared("subscription")
-        names = {
-            str(one.data.get("callback")) for one in declared if one.data.get("topic") == self.topic
-        }
+        declared = [one.data for one in self.recording.declared("subscription")]
+        names = {str(data.get("callback")) for data in declared if data.get("topic") == self.topic}
         message = f"messages on {code(self.topic)} come here"
-        found = (defined_at(name, message, self.recording.submission) for name in sorted(names))
-        return tuple(filter(None, found))
+        places = (defined_at(name, message, self.recording.submission) for name in sorted(names))
+        return tuple(filter(None, places))
 
     def evidence(self, line: LogLine) -> Evidence:
         """A line with other values, and others near the messages."""
@@ -233,23 +230,25 @@ def no_f_string(symptom: NotLogged) -> Finding | None:
 @explanation(NotLogged)
 def wrong_sign_or_unit(symptom: NotLogged) -> Finding | None:
     """The lines show a value 10, 100 or 1000 times too large, in degrees, or with a wrong sign."""
-    found: list[tuple[str, str, LogLine]] = []
+    lines_by_mistake: dict[tuple[str, str], list[LogLine]] = {}
     for item in symptom.wanted:
         end_ns = item.due_ns + symptom.within_ns
         lines = [one for one in symptom.near if item.message.stamp_ns <= one.time_ns <= end_ns]
         for line, path in product(lines[:_LOG_LINES], item.values):
-            factors = (factor_words(n, item.values[path]) for n in numbers(line.text))
-            found += [(path, one, line) for one in factors if one]
-    counts = Counter((path, words) for path, words, _ in found)
-    (path, words), number = max(counts.items(), key=lambda one: one[1], default=(("", ""), 0))
-    if number < max(_ALIKE, symptom.needed):
+            for number in numbers(line.text):
+                words = factor_words(number, item.values[path])
+                if words:
+                    lines_by_mistake.setdefault((path, words), []).append(line)
+    if not lines_by_mistake:
         return None
-    line = next(one[2] for one in found if one[:2] == (path, words))
+    (path, words), lines = max(lines_by_mistake.items(), key=lambda entry: len(entry[1]))
+    if len(lines) < max(_ALIKE, symptom.needed):
+        return None
     return mistaken(
         "logs_other_unit",
         f"log lines follow messages on {code(symptom.topic)}, but {code(path)} in them {words}: "
-        f"{quote(line.text)}",
-        symptom.evidence(line),
+        f"{quote(lines[0].text)}",
+        symptom.evidence(lines[0]),
         field=code(f"msg.{path}"),
     )
 
@@ -260,9 +259,8 @@ def other_values(symptom: NotLogged) -> Finding | None:
     line, item, decimals = _meant(symptom), symptom.wanted[-1], symptom.decimals
     if line is None:
         return None
-    printed = [numbers(one.text) for one in symptom.near]
-    carried = {path for one in printed for path in shown(one, item, decimals)}
-    missing = [path for path in item.values if path not in carried] or list(item.values)
+    in_log = {path for one in symptom.near for path in shown(numbers(one.text), item, decimals)}
+    missing = [path for path in item.values if path not in in_log] or list(item.values)
     values = listing(f"{code(path)} = {_rounded(item.values[path], decimals)}" for path in missing)
     lines = "\n".join(logged_text(one.text) for one in symptom.near)
     pair = exchanged(lines, item.values, decimals)
@@ -285,15 +283,19 @@ def nothing_logged(symptom: NotLogged) -> Finding:
     """Nothing is logged when a message comes."""
     recording, topic = symptom.recording, symptom.topic
     lines = output_lines(recording)
-    seen = (
-        f"nothing is logged when messages come on {code(topic)}: the subscription is there, its "
-        "type and its QoS match"
-    )
     if symptom.own:
-        seen = symptom.seen
+        mistake, seen = "own_not_logged", symptom.seen
+    else:
+        mistake = "nothing_logged"
+        seen = (
+            f"nothing is logged when messages come on {code(topic)}: the subscription is there, "
+            "its type and its QoS match"
+        )
+    if lines:
+        seen += f"; the process wrote {quote(lines[0].text)}"
     return mistaken(
-        "own_not_logged" if symptom.own else "nothing_logged",
-        seen + (f"; the process wrote {quote(lines[0].text)}" if lines else ""),
+        mistake,
+        seen,
         Evidence(
             moments=first_seen(recording, recording.carried(topic)),
             places=symptom.places,
@@ -307,8 +309,9 @@ def _meant(symptom: NotLogged) -> LogLine | None:
     # What a process writes at Ctrl+C is no answer to a message.
     running = [line for line in symptom.near if line.time_ns <= symptom.recording.stop_ns]
     near = running or symptom.near
-    with_numbers = (line for line in reversed(near) if numbers(line.text))
-    return next(with_numbers, near[-1] if near else None)
+    with_numbers = [line for line in near if numbers(line.text)]
+    likely = with_numbers or near
+    return likely[-1] if likely else None
 
 
 def _rounded(value: float, decimals: int) -> str:

@@ -41,9 +41,10 @@ class NoNode(NotDone, concept="nodes"):
     @property
     def what(self) -> str:
         """What could not be started, as ``package/executable: why``; or an empty text."""
-        waits = self.recording.waits
-        start = next((wait.what for wait in waits if wait.what.startswith(_START)), "")
-        return start.removeprefix(_START)
+        for wait in self.recording.waits:
+            if wait.what.startswith(_START):
+                return wait.what.removeprefix(_START)
+        return ""
 
     @property
     def process(self) -> Process:
@@ -116,11 +117,11 @@ def meant_node(recording: Recording, name: str) -> str | None:
         for call in recording.calls
         if not call.service.endswith(tuple(EXECUTOR_SERVICES))
     }
-    there = {one.name for one in written_nodes(recording) if _NAME.fullmatch(one.name)} - asked
-    bases = {one: one.rpartition("/")[2] for one in there}
-    alike = meant(name.rpartition("/")[2], bases.values())
-    found = [one for one in there if bases[one] == alike]
-    return found[0] if len(found) == 1 else None
+    nodes = {node.name for node in written_nodes(recording) if _NAME.fullmatch(node.name)} - asked
+    bases = {node: node.rpartition("/")[2] for node in nodes}
+    meant_base = meant(name.rpartition("/")[2], bases.values())
+    candidates = [node for node in nodes if bases[node] == meant_base]
+    return candidates[0] if len(candidates) == 1 else None
 
 
 @explanation(NoNode)
@@ -132,7 +133,7 @@ def not_built(symptom: NoNode) -> Finding | None:
         return None
     if submission.package(package):
         cause = why_not_built(submission, package)
-        return cause and cause.after("nothing was launched")
+        return cause.after("nothing was launched") if cause is not None else None
     if symptom.what or build is None or build.succeeded:
         return None
     return mistaken(
@@ -158,13 +159,13 @@ def no_executable(symptom: NoNode) -> Finding | None:
     what, _, why = symptom.what.partition(": ")
     packages = symptom.recording.submission.packages
     installed = [name for package in packages for name in package.executables]
-    there = f"; installed are {codes(installed)}" if installed else ""
-    return mistaken(
-        next((one for words, one in _NOT_STARTED.items() if words in why), "no_executable"),
-        f"{code(what)} could not be started: {why}{there}"
-        if why
-        else f"nothing was launched, because the executable does not exist{there}",
-    )
+    seen = f"{code(what)} could not be started: {why}"
+    if not why:
+        seen = "nothing was launched, because the executable does not exist"
+    if installed:
+        seen += f"; installed are {codes(installed)}"
+    mistakes = [mistake for words, mistake in _NOT_STARTED.items() if words in why]
+    return mistaken(mistakes[0] if mistakes else "no_executable", seen)
 
 
 @explanation(NoNode, after=(process_ended,))
@@ -180,11 +181,12 @@ def main_does_not_come_to_it(symptom: NoNode) -> Finding:
     """main() creates no node: a loop, time.sleep() or input() comes before it."""
     recording, name = symptom.recording, symptom.process.name
     stand = where_it_stands(recording, name)
-    done = "created no node"
     if symptom.declares("init"):
         done = f"called {INIT} but created no node"
     elif declarations.traced(recording, name):
         done = f"never called {INIT}"
+    else:
+        done = "created no node"
     lines = tuple(line.text for line in recording.log if line.process == name)
     cause = mistaken(
         "main_does_not_come_to_it",

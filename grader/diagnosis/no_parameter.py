@@ -68,11 +68,12 @@ class NotDeclared(Symptom[Finding]):
 def why_not_declared(recording: Recording, node: str, name: str) -> Finding | None:
     """Why a node does not declare a parameter, or None if it does."""
     symptom = NotDeclared(recording, node, name)
-    lost = why_not_node(recording, node) or why_services_silent(recording, symptom.asked)
-    found = descriptor(recording, node, name)
-    if lost is not None or (found is not None and found.type != "not set"):
-        return lost
-    return cause_of(symptom)
+    cause = why_not_node(recording, node) or why_services_silent(recording, symptom.asked)
+    if cause is not None:
+        return cause
+    declaration = descriptor(recording, node, name)
+    is_declared = declaration is not None and declaration.type != "not set"
+    return None if is_declared else cause_of(symptom)
 
 
 @explanation(NotDeclared)
@@ -87,12 +88,14 @@ def services_not_asked(symptom: NotDeclared) -> Finding | None:
 @explanation(NotDeclared, general=True)
 def other_parameters(symptom: NotDeclared) -> Finding:
     """Its name is misspelt, it has no value, or only other parameters are declared, or none."""
-    match, there = nearest(symptom.name, symptom.there), symptom.there
-    if not there:
+    if not symptom.there:
         return symptom.cause("the node declares no parameters")
-    if symptom.name in there:
+    if symptom.name in symptom.there:
         return symptom.cause(f"{code(symptom.name)} is declared, but without a value")
-    return symptom.cause(f"declared {f'is {code(match)}' if match else f'are {codes(there)}'}")
+    match = nearest(symptom.name, symptom.there)
+    if match is not None:
+        return symptom.cause(f"declared is {code(match)}")
+    return symptom.cause(f"declared are {codes(symptom.there)}")
 
 
 def why_not_taken(recording: Recording, names: Iterable[str]) -> Finding | None:
@@ -101,13 +104,13 @@ def why_not_taken(recording: Recording, names: Iterable[str]) -> Finding | None:
     if not lacking:
         return why_for_no_node(recording)
     answered = [call for call in recording.calls if call.service.endswith("/list_parameters")]
-    there = sorted(
-        {one for node in recording.student_nodes for one in declared(recording, node.name)}
-    )
+    nodes = recording.student_nodes
+    there = sorted({name for node in nodes for name in declared(recording, node.name)})
+    them = "it" if len(lacking) == 1 else "them"
     others = f"; declared {'is' if len(there) == 1 else 'are'} {codes(there)}" if there else ""
     return mistaken(
         "not_taken",
-        f"the launch gives {codes(lacking)}, but no node declares {_it(lacking)}{others}",
+        f"the launch gives {codes(lacking)}, but no node declares {them}{others}",
         Evidence(moments=answered_at(recording, answered)),
         declare=declare_parameter(lacking[0]),
         get=get_parameter(lacking[0]),
@@ -121,16 +124,16 @@ def why_for_no_node(recording: Recording) -> Finding | None:
     """
     submission = recording.submission
     programs = {name for package in submission.packages for name in package.executables}
-    launched = {one.name.rpartition("/")[2] for one in recording.processes} - programs
-    nodes = [one.name for one in written_nodes(recording)]
+    launched = {process.name.rpartition("/")[2] for process in recording.processes} - programs
+    if not any(name.endswith(_LAUNCH_FILES) for name in launched):
+        return None
+    nodes = [node.name for node in written_nodes(recording)]
     entries = [(file.path, *entry) for file in submission.parameter_files for entry in file.nodes]
     lacking = {
         node.rpartition("/")[2]: node
         for node in nodes
         if not any(_addresses(key, node) for _, key, _ in entries)
     }
-    if not lacking or not any(name.endswith(_LAUNCH_FILES) for name in launched):
-        return None
     for path, key, line in entries:
         base = key.rpartition("/")[2]
         like = nearest(base, lacking)
@@ -156,44 +159,45 @@ def _addresses(key: str, node: str) -> bool:
     return re.fullmatch("/".join(steps), node.strip("/")) is not None
 
 
-def _it(names: list[str]) -> str:
-    return "it" if len(names) == 1 else "them"
-
-
 def why_services_silent(recording: Recording, calls: Iterable[Call]) -> Finding | None:
     """Why one of some calls to a node's parameter services has no answer, or None."""
     lost = next((call for call in calls if call.answered_ns is None), None)
     if lost is None:
         return None
-    service = code(lost.service.rpartition("/")[2])
+    server, asked_ns = lost.service, lost.requested_ns
+    service = code(server.rpartition("/")[2])
     if not lost.error:
         what = f"the node's parameter service {service} did not answer"
-        asked = (lost.service, lost.requested_ns, ANSWER_S)
-        return cause_of(NoAnswer(recording, what, SERVICE, *asked))
+        return cause_of(NoAnswer(recording, what, SERVICE, server, asked_ns, ANSWER_S))
     if lost.error != NO_SERVER:
         return Finding.ours(f"{service} could not be asked: {lost.error}")
     return mistaken(
         "no_parameter_services",
         f"the node has no service {service}",
-        evidence_at(recording, "asked", lost.requested_ns),
+        evidence_at(recording, "asked", asked_ns),
     )
 
 
 def why_not_asked(recording: Recording, node: str, what: str) -> Finding:
     """Why the probe asked a node's parameter services no more: an answer was late or lost."""
-    ended = why_ended(recording)
+    cause = why_ended(recording) or _why_last_call_late(recording, node)
+    return cause.after(what) if cause is not None else Finding.undecided(f"{what} by the probe")
+
+
+def _why_last_call_late(recording: Recording, node: str) -> Finding | None:
+    """Why the last call to a node's parameter services was answered late or not at all, or None."""
     calls = [
         call
         for call in recording.calls
         if call.service.rpartition("/")[0] == node and call.request and not call.error
     ]
-    for last in [] if ended else calls[-1:]:
-        server, asked_ns = last.service, last.requested_ns
-        seen = f"the node's parameter service {code(server.rpartition('/')[2])} did not answer"
-        shown = evidence_at(recording, "asked", asked_ns)
-        silence = NoAnswer(recording, seen, SERVICE, server, asked_ns, ANSWER_S)
-        ended = why_late(silence, last.answered_ns, "slow_node", shown)
-    return ended.after(what) if ended else Finding.undecided(f"{what} by the probe")
+    if not calls:
+        return None
+    server, asked_ns = calls[-1].service, calls[-1].requested_ns
+    seen = f"the node's parameter service {code(server.rpartition('/')[2])} did not answer"
+    silence = NoAnswer(recording, seen, SERVICE, server, asked_ns, ANSWER_S)
+    shown = evidence_at(recording, "asked", asked_ns)
+    return why_late(silence, calls[-1].answered_ns, "slow_node", shown)
 
 
 def answered_at(recording: Recording, calls: Iterable[Call]) -> tuple[Moment, ...]:
