@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fnmatch import fnmatchcase
 
 from grader.assignment.bag import BagOptions
@@ -20,51 +21,47 @@ def chosen_bag(
     Of several that fit, ``rosgrade.yaml`` says which one is meant: ``square: bags/second``.
     """
     expected = f"a bag {code(options.name)}" if options.name else "a bag"
-    if submission.bags is None and submission.problem is not None:
-        cause = mistaken("no_bag", f"nothing can be read: {submission.problem}")
-    elif submission.bags is None:
-        cause = Finding.ours("the bags were not read: grade again")
+    if submission.bags is not None:
+        bag = _chosen(options, scenario, submission.bags, dict(submission.answers))
+    elif submission.problem is not None:
+        bag = mistaken("no_bag", f"nothing can be read: {submission.problem}")
     else:
-        found = _chosen(options, scenario, submission.bags, dict(submission.answers))
-        if isinstance(found, BagRecord):
-            return found
-        cause = found
-    return Finding(cause.observed, cause.hint, verdict=cause.verdict, expected=expected)
+        bag = Finding.ours("the bags were not read: grade again")
+    return replace(bag, expected=expected) if isinstance(bag, Finding) else bag
 
 
 def same_bags(bag: BagRecord, submission: SubmissionRecord) -> list[str]:
     """Paths of other bags with the same messages: it was handed in more than once."""
-    every = submission.bags or ()
-    return [one.path for one in every if one.path != bag.path and _is_same(one, bag)]
+    others = (one for one in submission.bags or () if one.path != bag.path)
+    return [one.path for one in others if _is_same(one, bag)]
 
 
 def _chosen(
     options: BagOptions, scenario: str, bags: tuple[BagRecord, ...], answers: dict[str, str]
 ) -> BagRecord | Finding:
-    named = [one for one in bags if options.name is None or _is_called(one, options.name)]
+    candidates = [bag for bag in bags if options.name is None or _is_called(bag, options.name)]
     answer = answers.get(scenario)
     if answer is not None:
-        meant = [one for one in named if one.path == answer.rstrip("/")]
-        if not meant:
-            there = codes(one.path for one in named) or "no such bag"
+        there = codes(bag.path for bag in candidates) or "no such bag"
+        candidates = [bag for bag in candidates if bag.path == answer.rstrip("/")]
+        if not candidates:
             seen = f"{code(ANSWERS_FILE)} says {code(answer)}, and there is {there}"
             return Finding(seen, "Correct the file.", verdict=Verdict.ASKS)
-        named = meant
-    if not named:
+    if not candidates:
         nothing = "there is no bag, a folder with `metadata.yaml` and an `.mcap` or `.db3` file"
         if bags:
-            nothing = f"there is {codes(one.path for one in bags)}, and no other bag"
+            nothing = f"there is {codes(bag.path for bag in bags)}, and no other bag"
         return mistaken("no_bag", nothing)
-    read = [one for one in named if one.problem is None]
-    if not read:
-        return mistaken("broken_bag", f"{code(named[0].path)}: {named[0].problem}")
-    others = [one for one in read[1:] if not _is_same(one, read[0])]
-    if others:
-        seen = f"there are {codes(one.path for one in read)}, and only one of them can be judged"
-        line = code(f"{scenario}: {read[0].path}")
-        hint = f"Hand in one, or a file {code(ANSWERS_FILE)} too, with a line such as {line}."
-        return Finding(seen, hint, verdict=Verdict.ASKS)
-    return read[0]
+    readable = [bag for bag in candidates if bag.problem is None]
+    if not readable:
+        return mistaken("broken_bag", f"{code(candidates[0].path)}: {candidates[0].problem}")
+    first = readable[0]
+    if all(_is_same(bag, first) for bag in readable[1:]):
+        return first
+    seen = f"there are {codes(bag.path for bag in readable)}, and only one of them can be judged"
+    line = code(f"{scenario}: {first.path}")
+    hint = f"Hand in one, or a file {code(ANSWERS_FILE)} too, with a line such as {line}."
+    return Finding(seen, hint, verdict=Verdict.ASKS)
 
 
 def _is_called(bag: BagRecord, name: str) -> bool:

@@ -120,17 +120,20 @@ def with_what_is_lacking(finding: Finding, case: Case) -> Finding:
 
 def why_no_motion(case: Case) -> Finding | None:
     """Why a bag does not show the motion of the robot that a check judges; None if it does."""
-    needs = [one for one in case.bound.parameters.needs if isinstance(one, SimulatedRobot)]
+    needs = [need for need in case.bound.parameters.needs if isinstance(need, SimulatedRobot)]
     recording = case.recording
     if recording is None or recording.bag is None or recording.scene is None or not needs:
         return None
     topics = [recording.scene.odometry_topic]
-    topics += [recording.scene.command_topic for one in needs if one.commanded]
+    if any(need.commanded for need in needs):
+        topics.append(recording.scene.command_topic)
     cause = _lacking(recording, topics)
-    if cause is None and not recording.truth:
+    if cause is None and recording.truth:
+        return None
+    if cause is None:
         seen = f"{code(topics[0])} in {code(recording.bag)} says too little: fewer than two poses"
         cause = mistaken("short_bag", seen)
-    return cause and replace(cause, expected=case.bound.parameters.asked_of(recording))
+    return replace(cause, expected=case.bound.parameters.asked_of(recording))
 
 
 def with_what_the_bag_lacks(finding: Finding, case: Case) -> Finding:
@@ -143,8 +146,7 @@ def with_what_the_bag_lacks(finding: Finding, case: Case) -> Finding:
 
 
 def _lacking(recording: Recording, topics: Iterable[str]) -> Finding | None:
-    causes = (why_not_in_bag(recording, topic) for topic in topics)
-    return next((one for one in causes if one is not None), None)
+    return next(filter(None, (why_not_in_bag(recording, topic) for topic in topics)), None)
 
 
 def in_bag(finding: Finding, case: Case) -> Finding:
@@ -152,12 +154,14 @@ def in_bag(finding: Finding, case: Case) -> Finding:
     recording = case.recording
     if recording is None or recording.bag is None:
         return finding
-    told = [f"in the bag {code(recording.bag)}"]
+    remarks = [f"in the bag {code(recording.bag)}"]
     if case.bound.check.family == "timing" and BAG_RECEIVED in recording.environment:
-        told.append("by the times when it was recorded, which vary more than those of publishing")
+        remarks.append(
+            "by the times when it was recorded, which vary more than those of publishing"
+        )
     if any(isinstance(need, SimulatedRobot) for need in case.bound.parameters.needs):
-        told.append("the odometry counts as where the robot is")
-    expected = f"{finding.expected} ({'; '.join(told)})"
+        remarks.append("the odometry counts as where the robot is")
+    expected = f"{finding.expected} ({'; '.join(remarks)})"
     observed = finding.observed
     if finding.status is Status.FAILED and recording.bag_notes:
         observed = f"{observed}; about the bag: {'; '.join(recording.bag_notes)}"
@@ -169,10 +173,11 @@ def _judged_topics(case: Case) -> Iterator[str]:
     window = case.bound.spec.window
     for parameters in (case.bound.parameters, *(window.phases.values() if window else ())):
         for need in parameters.needs:
-            if isinstance(need, Recorded):
-                topic = getattr(parameters, need.topic)
-                yield from () if topic is None else (f"{topic}{need.suffix}",)
-    if topic := getattr(case.bound.parameters, "topic", None):
+            topic = getattr(parameters, need.topic) if isinstance(need, Recorded) else None
+            if isinstance(need, Recorded) and topic is not None:
+                yield f"{topic}{need.suffix}"
+    topic = getattr(case.bound.parameters, "topic", None)
+    if topic:
         yield topic
 
 

@@ -25,17 +25,18 @@ def judge_early(
     the machine or a wrong name, is left out.
     """
     decided = tuple(
-        one.spec.id
-        for one in loaded.checks
-        if one.spec.id in checks and {run.id for run in loaded.scenarios_of(one)} <= set(recordings)
+        bound.spec.id
+        for bound in loaded.checks
+        if bound.spec.id in checks
+        and all(scenario.id in recordings for scenario in loaded.scenarios_of(bound))
     )
     if not decided:
         return ()
     part = select(loaded, decided, tuple(recordings))
     return tuple(
-        one
-        for one in judge_all(part, submission, recordings).results
-        if one.id in decided
-        and one.status in (Status.PASSED, Status.FAILED)
-        and not any(item.finding.disturbed or item.finding.names for item in one.findings)
+        result
+        for result in judge_all(part, submission, recordings).results
+        if result.id in decided
+        and result.status in (Status.PASSED, Status.FAILED)
+        and not any(item.finding.disturbed or item.finding.names for item in result.findings)
     )

@@ -17,7 +17,8 @@ from grader.findings.finding import Finding
 from grader.recording.model import Declaration, Recording
 from grader.recording.submission import CPP, SourceError
 
-_MOST = 3
+# What a report shows; a student's program may name things at any length.
+_MOST_PLACES = 3
 _LONGEST_NAME = 200
 # What a declaration is called by, and what it says.
 _NAMES = {"node": "node", "timer": "callback"}
@@ -37,34 +38,38 @@ def with_origins(finding: Finding, parameters: Parameters, recording: Recording)
     """
     if finding.evidence.places:
         return finding
-    seen = finding.observed
-    set_here = _fields_set(seen, recording) if "published" in parameters.about else ()
-    places = dict.fromkeys((*set_here, *_places(seen, parameters, recording)))
-    evidence = replace(finding.evidence, origins=tuple(islice(places, _MOST)))
+    observed = finding.observed
+    places = list(_creations(observed, parameters, recording))
+    if "published" in parameters.about:
+        places = [*_assignments(observed, recording), *places]
+    evidence = replace(finding.evidence, origins=tuple(islice(dict.fromkeys(places), _MOST_PLACES)))
     return replace(finding, evidence=evidence)
 
 
-def _places(seen: str, parameters: Parameters, recording: Recording) -> Iterator[SourceError]:
+def _creations(
+    observed: str, parameters: Parameters, recording: Recording
+) -> Iterator[SourceError]:
+    """Where the program creates what was observed, or without that what was asked for."""
     asked = _asked(parameters, recording)
     kinds = _kinds(parameters, asked, recording)
     declared = [one for kind in kinds if kind != "timer" for one in recording.declared(kind)]
-    observed = [one for one in declared if f"`{_name(one)}`" in seen]
-    # What was observed, and only without that what was asked for.
-    found = observed or [one for one in declared if _name(one) in asked]
+    things = [one for one in declared if f"`{_name(one)}`" in observed]
+    things = things or [one for one in declared if _name(one) in asked]
     timers = recording.declared("timer") if "timer" in kinds else ()
-    for one in (*_timers_of(found, timers), *found):
-        place = _place(one, recording)
+    for declaration in (*_timers_of(things, timers), *things):
+        place = _place(declaration, recording)
         if place is not None:
             yield place
 
 
 def _asked(parameters: Parameters, recording: Recording) -> set[str]:
     """The names among the parameters of a check: its topic, its node."""
-    named = {value for _, value in parameters if isinstance(value, str)}
+    names = {value for _, value in parameters if isinstance(value, str)}
     is_of_robot = "published" in parameters.about and not hasattr(parameters, "topic")
-    # The robot does what it is commanded.
-    command = {recording.scene.command_topic} if recording.scene and is_of_robot else set()
-    return named | command
+    if recording.scene is not None and is_of_robot:
+        # The robot does what it is commanded.
+        names.add(recording.scene.command_topic)
+    return names
 
 
 def _kinds(parameters: Parameters, asked: set[str], recording: Recording) -> tuple[str, ...]:
@@ -77,43 +82,44 @@ def _kinds(parameters: Parameters, asked: set[str], recording: Recording) -> tup
     return kinds
 
 
-def _timers_of(found: Sequence[Declaration], timers: Sequence[Declaration]) -> list[Declaration]:
-    """The timers of the nodes that something else is of; of no other thing, all of them."""
-    nodes = {one.data.get("node") for one in found}
+def _timers_of(things: Sequence[Declaration], timers: Sequence[Declaration]) -> list[Declaration]:
+    """The timers of the nodes that have some things; without any such thing, all of them."""
+    nodes = {one.data.get("node") for one in things}
     # A compiled process does not tell the node of a timer.
     return [one for one in timers if not nodes or one.data.get("node") in {*nodes, None}]
 
 
-def _place(one: Declaration, recording: Recording) -> SourceError | None:
+def _place(declaration: Declaration, recording: Recording) -> SourceError | None:
     """Where something that a process declares is created: as it says itself, or by its source."""
-    words = _WORDS.get(one.kind, f"the {one.kind} {{}} is created here")
-    line = one.data.get("line")
-    path = submission_path(str(one.data.get("file")), recording.submission)
+    kind, data = declaration.kind, declaration.data
+    words = _WORDS.get(kind, f"the {kind} {{}} is created here")
+    path, line = submission_path(str(data.get("file")), recording.submission), data.get("line")
     if path and isinstance(line, int):
-        return SourceError(path, line, words.format(_name(one)[:_LONGEST_NAME]))
-    call = _call_in_cpp(one, recording) if "file" not in one.data else None
+        return SourceError(path, line, words.format(_name(declaration)[:_LONGEST_NAME]))
+    call = _call_in_cpp(declaration, recording) if "file" not in data else None
     if call is None:
         return None
-    name = str(one.data.get("topic", ""))[:_LONGEST_NAME]
+    # A timer has no name: its words would have two blanks.
+    name = str(data.get("topic", ""))[:_LONGEST_NAME]
     return SourceError(*call, words.format(name).replace("  ", " "))
 
 
-def _call_in_cpp(one: Declaration, recording: Recording) -> tuple[str, int] | None:
+def _call_in_cpp(declaration: Declaration, recording: Recording) -> tuple[str, int] | None:
     """File and line of the call that creates something in C++, if only one can be meant.
 
     That is the call with the name, or the only one that has its name from elsewhere.
     """
-    calls = [
-        (file.path, call)
-        for package in recording.submission.packages
-        for file in package.sources
-        for call in file.calls
-        if file.language == CPP and call.short in _CREATED_BY.get(one.kind, ())
-    ]
-    topic = str(one.data.get("topic", ""))
-    named = [(file, call) for file, call in calls if _is_named(topic, call.literal)]
-    meant = named or [(file, call) for file, call in calls if not call.literal]
-    return (meant[0][0], meant[0][1].line) if len(meant) == 1 else None
+    functions, topic = _CREATED_BY.get(declaration.kind, ()), str(declaration.data.get("topic", ""))
+    with_name, without_name = [], []
+    for package in recording.submission.packages:
+        for file in package.sources:
+            for call in file.calls if file.language == CPP else ():
+                if call.short in functions and _is_named(topic, call.literal):
+                    with_name.append((file.path, call.line))
+                elif call.short in functions and not call.literal:
+                    without_name.append((file.path, call.line))
+    candidates = with_name or without_name
+    return candidates[0] if len(candidates) == 1 else None
 
 
 def _is_named(topic: str, written: str) -> bool:
@@ -122,18 +128,18 @@ def _is_named(topic: str, written: str) -> bool:
     return bool(last) and f"/{topic}".endswith(f"/{last}")
 
 
-def _name(one: Declaration) -> str:
-    return str(one.data.get(_NAMES.get(one.kind, "topic")))
+def _name(declaration: Declaration) -> str:
+    return str(declaration.data.get(_NAMES.get(declaration.kind, "topic")))
 
 
-def _fields_set(seen: str, recording: Recording) -> Iterator[SourceError]:
+def _assignments(observed: str, recording: Recording) -> Iterator[SourceError]:
     """Where the program assigns to a field that the finding says has another value."""
     for package in recording.submission.packages:
         for file in package.sources:
             for target, line in file.sets:
                 # `msg.linear.x` sets `linear.x`, and `self.msg.linear.x` too.
                 parts = target.split(".")
-                ends = (".".join(parts[n:]) for n in range(1, len(parts)))
-                field = next((one for one in ends if f" {one} = " in f" {seen}"), None)
-                if field:
-                    yield SourceError(file.path, line, f"{field} is set here")
+                fields = [".".join(parts[begin:]) for begin in range(1, len(parts))]
+                said = [field for field in fields if f" {field} = " in f" {observed}"]
+                if said:
+                    yield SourceError(file.path, line, f"{said[0]} is set here")

@@ -18,21 +18,21 @@ def with_runtime_imports(
 
     Imports by a library are left out: the student need not declare them.
     """
-    found = {
-        Import(str(item.data["module"]), path, item.data["line"])
-        for recording in recordings
-        for item in recording.declared("imported")
-        if str(item.data.get("module")) in PACKAGES
-        and isinstance(item.data.get("line"), int)
-        and (path := submission_path(str(item.data.get("file")), submission))
-    }
-    packages = tuple(_with(package, found) for package in submission.packages)
+    imports: set[Import] = set()
+    for recording in recordings:
+        for declaration in recording.declared("imported"):
+            module, line = str(declaration.data.get("module")), declaration.data.get("line")
+            path = submission_path(str(declaration.data.get("file")), submission)
+            if module in PACKAGES and isinstance(line, int) and path:
+                imports.add(Import(module, path, line))
+    packages = tuple(_with(package, imports) for package in submission.packages)
     return replace(submission, packages=packages)
 
 
-def _with(package: PackageRecord, found: Iterable[Import]) -> PackageRecord:
+def _with(package: PackageRecord, imports: Iterable[Import]) -> PackageRecord:
+    """A package with those of some imports that its files make and its code does not name."""
     files = {path for _, path in package.files}
     named = {item.module for item in (*package.imports, *package.ros_imports)}
-    more = [item for item in found if item.file in files and item.module not in named]
-    more.sort(key=lambda item: (item.file, item.line, item.module))
-    return replace(package, ros_imports=(*package.ros_imports, *more)) if more else package
+    shown = [item for item in imports if item.file in files and item.module not in named]
+    shown.sort(key=lambda item: (item.file, item.line, item.module))
+    return replace(package, ros_imports=(*package.ros_imports, *shown))

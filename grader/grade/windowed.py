@@ -28,8 +28,8 @@ def judged_in(
     if not intervals:
         expected = f"a time {window}: this is judged then"
         return replace(_why_never(recording, window), expected=expected)
-    found = [judge(cut(recording, *one), parameters) for one in intervals]
-    worst = min(found, key=lambda one: (SEVERITY.index(one.status), one.credit))
+    findings = [judge(cut(recording, *interval), parameters) for interval in intervals]
+    worst = min(findings, key=lambda finding: (SEVERITY.index(finding.status), finding.credit))
     return replace(worst, expected=f"{window}: {worst.expected}")
 
 

@@ -30,39 +30,41 @@ def write_bag(
     from rosbags.rosbag2 import StoragePlugin, Writer
 
     plugin = StoragePlugin[storage.upper()]
-    kept = sorted(messages, key=lambda one: one.recorded_ns)
+    in_order = sorted(messages, key=lambda message: message.recorded_ns)
     with Writer(folder, version=9, storage_plugin=plugin) as writer:
         connections: dict[BagChannel, Any] = {}
-        for one in kept:
-            if one.channel not in connections:
-                connections[one.channel] = writer.add_connection(
-                    one.channel.name,
-                    one.channel.type,
-                    msgdef=definitions.get(one.channel.type, ""),
-                    rihs01=one.channel.hash,
-                    offered_qos_profiles=[_profile(qos) for qos in one.channel.publishers],
+        for message in in_order:
+            channel = message.channel
+            if channel not in connections:
+                connections[channel] = writer.add_connection(
+                    channel.name,
+                    channel.type,
+                    msgdef=definitions.get(channel.type, ""),
+                    rihs01=channel.hash,
+                    offered_qos_profiles=[_profile(qos) for qos in channel.publishers],
                 )
-            writer.write(connections[one.channel], one.recorded_ns, one.cdr)
+            writer.write(connections[channel], message.recorded_ns, message.cdr)
     metadata = folder / "metadata.yaml"
     text = metadata.read_text("utf-8").replace("ros_distro: rosbags", "ros_distro: jazzy")
     metadata.write_text(text, "utf-8")
     if storage == "mcap":
         # rosbags writes one time only.
-        _write_mcap(folder / f"{folder.name}.mcap", kept, definitions)
+        _write_mcap(folder / f"{folder.name}.mcap", in_order, definitions)
 
 
 def _write_mcap(file: Path, messages: Iterable[BagMessage], definitions: Mapping[str, str]) -> None:
     with file.open("wb") as stream:
         writer = McapFile(stream, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="rosgrade")
-        channels: dict[BagChannel, int] = {}
-        for one in messages:
-            if one.channel not in channels:
-                text = definitions.get(one.channel.type, "").encode()
-                schema = writer.register_schema(one.channel.type, "ros2msg", text)
-                channels[one.channel] = writer.register_channel(one.channel.name, "cdr", schema)
-            times = one.recorded_ns, one.cdr, one.published_ns
-            writer.add_message(channels[one.channel], *times)
+        ids: dict[BagChannel, int] = {}
+        for message in messages:
+            channel = message.channel
+            if channel not in ids:
+                text = definitions.get(channel.type, "").encode()
+                schema = writer.register_schema(channel.type, "ros2msg", text)
+                ids[channel] = writer.register_channel(channel.name, "cdr", schema)
+            recorded_ns, published_ns = message.recorded_ns, message.published_ns
+            writer.add_message(ids[channel], recorded_ns, message.cdr, published_ns)
         writer.finish()  # type: ignore[no-untyped-call]
 
 
@@ -71,7 +73,7 @@ def read_bag(folder: Path) -> tuple[list[BagMessage], dict[str, str]]:
     from mcap.reader import make_reader
     from rosbags.rosbag2 import Reader
 
-    found: list[BagMessage] = []
+    messages: list[BagMessage] = []
     with Reader(folder) as reader:
         definitions = {one.msgtype: one.msgdef.data for one in reader.connections}
         channels = {
@@ -83,18 +85,18 @@ def read_bag(folder: Path) -> tuple[list[BagMessage], dict[str, str]]:
             )
             for one in reader.connections
         }
-        if files := sorted(folder.glob("*.mcap")):
-            for file in files:
-                with file.open("rb") as stream:
-                    for schema, channel, one in make_reader(stream).iter_messages():
-                        key = channel.topic, schema.name if schema else ""
-                        times = one.log_time, one.publish_time
-                        found.append(BagMessage(channels[key], *times, one.data))
-        else:
-            for connection, at_ns, data in reader.messages():
-                key = connection.topic, connection.msgtype
-                found.append(BagMessage(channels[key], at_ns, at_ns, bytes(data)))
-    return found, definitions
+        files = sorted(folder.glob("*.mcap"))
+        # rosbags reads one time only, and SQLite has no other.
+        for connection, time_ns, data in () if files else reader.messages():
+            key = connection.topic, connection.msgtype
+            messages.append(BagMessage(channels[key], time_ns, time_ns, bytes(data)))
+    for file in files:
+        with file.open("rb") as stream:
+            for schema, channel, record in make_reader(stream).iter_messages():
+                of_channel = channels[channel.topic, schema.name if schema else ""]
+                times_ns = record.log_time, record.publish_time
+                messages.append(BagMessage(of_channel, *times_ns, record.data))
+    return messages, definitions
 
 
 def _profile(qos: Qos) -> Any:

@@ -71,72 +71,100 @@ class _NotARecording(Exception):
 
 
 def _read(stream: Any) -> Recording:
-    frame: dict[str, Any] | None = None
-    submission: SubmissionRecord | None = None
-    schemas: dict[int, Schema] = {}
-    channels: dict[int, Channel] = {}
-    facts: dict[str, list[tuple[int, Any]]] = {name: [] for name in FACTS}
-    messages: defaultdict[str, list[Message]] = defaultdict(list)
-    sent: defaultdict[str, list[Message]] = defaultdict(list)
-    joined: defaultdict[str, list[Message]] = defaultdict(list)
-    unreadable: Counter[str] = Counter()
-    has_ended = False
+    contents = _Contents()
     # All of it, once, with its checksums: a flipped bit must not become another grade.
     for record in StreamReader(stream, validate_crcs=True).records:
+        contents.take(record)
+    return contents.recording()
+
+
+class _Contents:
+    """What the records of a file hold, taken one after the other."""
+
+    def __init__(self) -> None:
+        self._frame: dict[str, Any] | None = None
+        self._submission: SubmissionRecord | None = None
+        self._schemas: dict[int, Schema] = {}
+        self._channels: dict[int, Channel] = {}
+        self._facts: dict[str, list[tuple[int, Any]]] = {name: [] for name in FACTS}
+        self._messages: defaultdict[str, list[Message]] = defaultdict(list)
+        self._sent: defaultdict[str, list[Message]] = defaultdict(list)
+        self._joined: defaultdict[str, list[Message]] = defaultdict(list)
+        self._unreadable: Counter[str] = Counter()
+        self._has_ended = False
+
+    def take(self, record: Any) -> None:
+        """Keep what a record holds."""
         if isinstance(record, DataEnd):
-            has_ended = True
+            self._has_ended = True
         elif isinstance(record, Schema):
-            schemas[record.id] = record
+            self._schemas[record.id] = record
         elif isinstance(record, Channel):
-            channels[record.id] = record
+            self._channels[record.id] = record
         elif isinstance(record, Metadata) and record.name == "rosgrade":
-            frame = _frame(record)
-        elif isinstance(record, Attachment) and record.name == "submission.json":
-            submission = record_of(record.data)
-        elif isinstance(record, Attachment) and record.name.removesuffix(FACTS_SUFFIX) in FACTS:
-            name = record.name.removesuffix(FACTS_SUFFIX)
-            data = gzip.decompress(record.data)
-            facts[name] += enumerate(_adapter(_LISTS[name]).validate_json(data))
+            self._frame = _frame(record)
+        elif isinstance(record, Attachment):
+            self._take_attachment(record)
         elif isinstance(record, Record):
-            channel = channels[record.channel_id]
+            self._take_message(record, self._channels[record.channel_id])
+
+    def _take_attachment(self, record: Attachment) -> None:
+        name = record.name.removesuffix(FACTS_SUFFIX)
+        if record.name == "submission.json":
+            self._submission = record_of(record.data)
+        elif name in FACTS:
+            data = gzip.decompress(record.data)
+            self._facts[name] += enumerate(_adapter(_LISTS[name]).validate_json(data))
+
+    def _take_message(self, record: Record, channel: Channel) -> None:
+        if channel.message_encoding == "json":
+            # Format 2 has the facts so.
             name = channel.topic.removeprefix("/rosgrade/")
-            if channel.message_encoding == "json" and name in facts:
+            if name in self._facts:
                 fact = _adapter(FACTS[name]).validate_json(record.data)
-                facts[name].append((record.sequence, fact))
-            if channel.message_encoding == "json" or channel.topic == LAUNCHED:
-                continue
-            if has_ended:
-                # What follows has no checksum: a flipped bit makes a message of a summary.
-                raise ValueError("a message after the end of the data")
-            try:
-                found = _message(schemas[channel.schema_id], channel, record)
-            except _Unreadable:
-                unreadable[channel.metadata.get(TOPIC, channel.topic)] += 1
-                continue
-            if JOIN in channel.metadata:
-                joined[channel.metadata[JOIN]].append(found)
-            else:
-                (sent if SENT in channel.metadata else messages)[found.topic].append(found)
-    if frame is None:
-        raise _NotARecording("an MCAP file, but not a recording of rosgrade")
-    if submission is None:
-        raise _NotARecording("the facts of the submission are missing")
-    unmatched: dict[str, list[Message]] = {topic: [] for topic in frame.pop("sent", ())}
-    recording: Recording = _adapter(Recording).validate_python(
-        {
-            **frame,
-            **{
-                name: [fact for _, fact in sorted(items, key=itemgetter(0))]
-                for name, items in facts.items()
-            },
-            "submission": submission,
-            "messages": _in_order(messages),
-            "sent": _in_order(unmatched | sent),
-            "joined": dict(joined),
-            "unreadable": dict(unreadable),
+                self._facts[name].append((record.sequence, fact))
+            return
+        if channel.topic == LAUNCHED:
+            return
+        if self._has_ended:
+            # What follows has no checksum: a flipped bit makes a message of a summary.
+            raise ValueError("a message after the end of the data")
+        try:
+            message = _message(self._schemas[channel.schema_id], channel, record)
+        except _Unreadable:
+            self._unreadable[channel.metadata.get(TOPIC, channel.topic)] += 1
+            return
+        if JOIN in channel.metadata:
+            self._joined[channel.metadata[JOIN]].append(message)
+        elif SENT in channel.metadata:
+            self._sent[message.topic].append(message)
+        else:
+            self._messages[message.topic].append(message)
+
+    def recording(self) -> Recording:
+        """The recording that the records make."""
+        if self._frame is None:
+            raise _NotARecording("an MCAP file, but not a recording of rosgrade")
+        if self._submission is None:
+            raise _NotARecording("the facts of the submission are missing")
+        frame = dict(self._frame)
+        unmatched: dict[str, list[Message]] = {topic: [] for topic in frame.pop("sent", ())}
+        facts = {
+            name: [fact for _, fact in sorted(numbered, key=itemgetter(0))]
+            for name, numbered in self._facts.items()
         }
-    )
-    return recording
+        recording: Recording = _adapter(Recording).validate_python(
+            {
+                **frame,
+                **facts,
+                "submission": self._submission,
+                "messages": _in_order(self._messages),
+                "sent": _in_order(unmatched | self._sent),
+                "joined": dict(self._joined),
+                "unreadable": dict(self._unreadable),
+            }
+        )
+        return recording
 
 
 class _Unreadable(Exception):
@@ -180,24 +208,23 @@ def _in_order(messages: Mapping[str, list[Message]]) -> dict[str, tuple[Message,
 
 def read_topic(file: Path, topic: str) -> tuple[tuple[Message, ...], tuple[str, ...]]:
     """The messages on one topic of any MCAP file of ROS 2, and its topics."""
-    found = []
+    messages = []
     topics = set()
     with file.open("rb") as stream:
         try:
             for schema, channel, record in make_reader(stream).iter_messages():
                 topics.add(channel.topic)
                 if channel.topic == topic and schema is not None:
-                    found.append(_message(schema, channel, record))
+                    messages.append(_message(schema, channel, record))
         except Exception as error:
             raise ValueError(f"no MCAP file that can be read: {_reason(error)}") from error
-    return tuple(found), tuple(sorted(topics))
+    return tuple(messages), tuple(sorted(topics))
 
 
 def read_inputs(file: Path, recording: Recording) -> tuple[RawMessage, ...]:
     """The messages that the probe or the simulator published, in that order."""
-    scenes = recording.scenes.values()
-    simulated = {topic for one in scenes for topic in one.published}
-    found: list[RawMessage] = []
+    simulated = {topic for scene in recording.scenes.values() for topic in scene.published}
+    inputs: list[RawMessage] = []
     try:
         with file.open("rb") as stream:
             for schema, channel, message in make_reader(stream).iter_messages():
@@ -206,18 +233,19 @@ def read_inputs(file: Path, recording: Recording) -> tuple[RawMessage, ...]:
                 if is_ours and schema is not None and channel.message_encoding == "cdr":
                     times = message.publish_time, message.log_time, message.sequence
                     raw = (channel.topic, schema.name, message.data, *times)
-                    found.append(RawMessage(*raw, is_sent=is_sent))
+                    inputs.append(RawMessage(*raw, is_sent=is_sent))
     except OSError as error:
         raise UsageError(f"{file}: {error.strerror or error}") from error
-    return tuple(sorted(found, key=lambda message: message.stamp_ns))
+    return tuple(sorted(inputs, key=lambda message: message.stamp_ns))
 
 
 def _frame(record: Metadata) -> dict[str, Any]:
     frame = {key: json.loads(value) for key, value in record.metadata.items()}
     if frame.pop("format", None) not in ("2", FORMAT):
         raise _NotARecording(f"made by another version of rosgrade (not format {FORMAT})")
-    if scene := frame.pop("scene", None):
-        # From when there was one robot in a simulation.
+    # From when there was one robot in a simulation.
+    scene = frame.pop("scene", None)
+    if scene:
         frame["scenes"] = {"": scene}
     if "names" not in frame:
         frame["names"] = names_of_run(frame["environment"])

@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 from grader.recording.simulated import Incident, Truth
 from grader.recording.tracked import Sighting, truth_of
-from sim.motion import REST, Pose, Twist, compose, relative
+from grader.spec.expression import yaw
+from sim.motion import NS, REST, Pose, Twist, compose, relative
 
 Timed = tuple[int, Mapping[str, Any]]
 """A time in ns and the fields of a message."""
+# What goes farther than the fastest robot by more than these is a jump of the odometry.
+_NOISE_M = 0.1
+_FASTER = 2.0
 
 
 def motion(
@@ -25,16 +29,23 @@ def motion(
         commands: Messages of geometry_msgs/msg/Twist or TwistStamped, oldest first.
         start: The pose that the robot begins at; by default what its odometry says.
     """
-    told = [one for one in map(_read, odometry) if _is_finite(one[1]) and one[2].is_finite]
-    told = [one for index, one in enumerate(told) if index == 0 or one[0] > told[index - 1][0]]
-    if start is not None and told:
-        first = told[0][1]
-        told = [(at, compose(start, relative(first, pose)), twist) for at, pose, twist in told]
-    seen = [Sighting(time_ns, time_ns, pose) for time_ns, pose, _ in told]
-    twists = [twist for _, _, twist in told]
-    # Some drivers fill in the pose alone.
-    said = twists if any(twist != REST for twist in twists) else ()
-    return truth_of(seen, [one for one in _orders(commands) if one[1].is_finite], twists=said)
+    states = [state for state in map(_state, odometry) if state.is_finite]
+    states = [
+        state
+        for index, state in enumerate(states)
+        if index == 0 or state.time_ns > states[index - 1].time_ns
+    ]
+    if start is not None and states:
+        first = states[0].pose
+        moved = [compose(start, relative(first, state.pose)) for state in states]
+        states = [state._replace(pose=pose) for state, pose in zip(states, moved, strict=True)]
+    sightings = [Sighting(state.time_ns, state.time_ns, state.pose) for state in states]
+    twists = [state.twist for state in states]
+    if all(twist == REST for twist in twists):
+        # Some drivers fill in the pose alone: the velocities follow from the poses then.
+        twists = []
+    orders = [(time_ns, twist) for time_ns, twist in _orders(commands) if twist.is_finite]
+    return truth_of(sightings, orders, twists=twists)
 
 
 def rejected(commands: Sequence[Timed]) -> tuple[Incident, ...]:
@@ -57,26 +68,35 @@ def _orders(commands: Sequence[Timed]) -> Iterator[tuple[int, Twist]]:
 
 def jump(odometry: Sequence[Timed], fastest_m_s: float) -> tuple[int, float] | None:
     """When the odometry first goes farther than any robot can, and how far in m; or None."""
-    for (before_ns, one), (after_ns, other) in pairwise(odometry):
-        pose, after = _read((before_ns, one))[1], _read((after_ns, other))[1]
-        way_m = math.hypot(after.x_m - pose.x_m, after.y_m - pose.y_m)
-        if way_m > 0.1 + 2.0 * fastest_m_s * (after_ns - before_ns) / 1e9:
-            return after_ns, way_m
+    for before, after in pairwise(map(_state, odometry)):
+        way_m = math.hypot(after.pose.x_m - before.pose.x_m, after.pose.y_m - before.pose.y_m)
+        longest_m = fastest_m_s * (after.time_ns - before.time_ns) / NS
+        if way_m > _NOISE_M + _FASTER * longest_m:
+            return after.time_ns, way_m
     return None
 
 
-def _read(message: Timed) -> tuple[int, Pose, Twist]:
+class _State(NamedTuple):
+    """What one message of odometry says."""
+
+    time_ns: int
+    pose: Pose
+    twist: Twist
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether it has numbers that a robot can have."""
+        pose = self.pose
+        return self.twist.is_finite and all(map(math.isfinite, (pose.x_m, pose.y_m, pose.yaw_rad)))
+
+
+def _state(message: Timed) -> _State:
     time_ns, value = message
-    place, turn = value["pose"]["pose"]["position"], value["pose"]["pose"]["orientation"]
-    x, y, z, w = (float(turn[key]) for key in "xyzw")
-    yaw_rad = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    pose = Pose(float(place["x"]), float(place["y"]), yaw_rad)
-    return time_ns, pose, _twist(value["twist"]["twist"])
+    position, orientation = value["pose"]["pose"]["position"], value["pose"]["pose"]["orientation"]
+    heading_rad = yaw(*(float(orientation[key]) for key in "xyzw"))
+    pose = Pose(float(position["x"]), float(position["y"]), heading_rad)
+    return _State(time_ns, pose, _twist(value["twist"]["twist"]))
 
 
 def _twist(value: Mapping[str, Any]) -> Twist:
     return Twist(float(value["linear"]["x"]), float(value["angular"]["z"]))
-
-
-def _is_finite(pose: Pose) -> bool:
-    return all(map(math.isfinite, (pose.x_m, pose.y_m, pose.yaw_rad)))

@@ -77,24 +77,28 @@ def truth_of(
         for time_ns in range(before.time_ns, after.time_ns, STEP_NS):
             share = (time_ns - before.time_ns) / (after.time_ns - before.time_ns)
             start, end = before.pose, after.pose
-            command, touches = _at(commands, time_ns, REST), _at(contacts, time_ns, False)
+            command = _value_at(commands, time_ns, REST)
+            touches = _value_at(contacts, time_ns, False)
             found.append(
                 Truth(
                     time_ns,
                     start.x_m + share * (end.x_m - start.x_m),
                     start.y_m + share * (end.y_m - start.y_m),
                     wrap_angle(start.yaw_rad + share * wrap_angle(end.yaw_rad - start.yaw_rad)),
-                    *(twist.linear_m_s, twist.angular_rad_s),
-                    *(command.linear_m_s, command.angular_rad_s),
-                    CONTACT if touches else None,
+                    linear_m_s=twist.linear_m_s,
+                    angular_rad_s=twist.angular_rad_s,
+                    command_m_s=command.linear_m_s,
+                    command_rad_s=command.angular_rad_s,
+                    contact=CONTACT if touches else None,
                 )
             )
     return tuple(found)
 
 
-def _at(changes: Sequence[tuple[int, _Value]], time_ns: int, before: _Value) -> _Value:
+def _value_at(changes: Sequence[tuple[int, _Value]], time_ns: int, first: _Value) -> _Value:
+    """The value of the last change by a time; the first value before any change."""
     index = bisect_right(changes, time_ns, key=itemgetter(0))
-    return changes[index - 1][1] if index else before
+    return changes[index - 1][1] if index else first
 
 
 class RealTimeFactor:

@@ -59,9 +59,10 @@ class _Dumper(yaml.SafeDumper):
 
 
 def _written(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
-    # Unquoted, the other line ends of Unicode would be read as line ends.
-    odd = not text.replace("\n", "").isprintable()
-    style = '"' if odd else "|" if "\n" in text else None
+    style = "|" if "\n" in text else None
+    if not text.replace("\n", "").isprintable():
+        # Unquoted, the other line ends of Unicode would be read as line ends.
+        style = '"'
     return dumper.represent_scalar(f"{_TAG}str", text, style)
 
 
@@ -122,20 +123,19 @@ def write_yaml(data: Any) -> str:
 
 def path(place: Place) -> str:
     """Write a place as people do: ``checks[2].with.period``."""
-    text = ""
-    for step in place:
-        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else str(step)
-    return text
+    text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in place)
+    return text.removeprefix(".")
 
 
 def places(value: Any, place: Place = ()) -> Iterator[Place]:
     """The place of a value, and the places of all that is in it."""
     yield place
-    steps = (
-        value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
-    )
-    for step in steps:
-        yield from places(value[step], (*place, step))
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from places(item, (*place, key))
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            yield from places(item, (*place, index))
 
 
 class _Reader:
@@ -228,10 +228,12 @@ def _syntax(error: yaml.YAMLError, text: str) -> Problem:
     if isinstance(error, yaml.MarkedYAMLError):
         context = error.context if error.context != "while scanning for the next token" else None
         message = ", ".join(filter(None, (context, error.problem)))
-        # A bracket or quote that was never closed is corrected where it was opened.
-        unclosed = "end of stream" in message or "<stream end>" in message
-        marks = (error.problem_mark, error.context_mark)
-        mark = next(filter(None, reversed(marks) if unclosed else marks), None)
+        mark = error.problem_mark or error.context_mark
+        if "end of stream" in message or "<stream end>" in message:
+            # A bracket or quote that was never closed is corrected where it was opened.
+            mark = error.context_mark or error.problem_mark
         line = mark.line + 1 if mark else None
-    advice = next((advice for sign, advice in _ADVICE.items() if sign in message), "")
-    return Problem(f"not valid YAML: {message}" + (f" ({advice})" if advice else ""), line)
+    for sign, advice in _ADVICE.items():
+        if sign in message:
+            return Problem(f"not valid YAML: {message} ({advice})", line)
+    return Problem(f"not valid YAML: {message}", line)

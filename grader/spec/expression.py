@@ -9,7 +9,7 @@ import ast
 import math
 import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -114,8 +114,8 @@ class Expression:
         try:
             tree = ast.parse(text.strip(), mode="eval").body
         except (SyntaxError, ValueError, RecursionError):
-            unclosed = text.count("(") > text.count(")")
-            why += ": inside {...} an expression with a comma needs quotes" if unclosed else ""
+            if text.count("(") > text.count(")"):
+                why += ": inside {...} an expression with a comma needs quotes"
             raise ValueError(why) from None
         return _read(tree)
 
@@ -135,47 +135,62 @@ def _path(node: ast.AST) -> str:
         case ast.Name(id=name):
             return name
         case ast.Attribute(value=inner, attr=name):
-            around = _path(inner)
-            return around and f"{around}.{name}"
+            outer = _path(inner)
+            return f"{outer}.{name}" if outer else ""
         case ast.Subscript(value=inner, slice=ast.Constant(value=int(index))):
-            around = _path(inner)
-            return around and f"{around}[{index}]"
+            outer = _path(inner)
+            return f"{outer}[{index}]" if outer else ""
     return ""
 
 
 def _read(node: ast.expr) -> Expression:
-    path, name = _path(node), ""
-    sign: ast.AST = node
-    if path and path != "pi":
+    path = _path(node)
+    if path == "pi":
+        return Expression((), 0.0, lambda _: math.pi)
+    if path:
         return _field(path)
-    parts: list[ast.expr] = []
     match node:
-        case ast.Name():
-            return Expression((), 0.0, lambda _: math.pi)
         case ast.Constant(value=number) if type(number) in (int, float):
             return Expression((), 0.0, lambda _: number)
-        case ast.Call(func=ast.Name(id=name), args=parts, keywords=[]):
+        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
             if name not in _FUNCTIONS:
                 advice = nearest_or_all(name, _FUNCTIONS, "The functions are")
                 raise ValueError(f"there is no function {name!r}.{advice}")
-        case ast.BinOp(left=left, op=sign, right=right):
-            parts = [left, right]
-        case ast.UnaryOp(op=sign, operand=operand):
-            parts = [operand]
-    function = _FUNCTIONS.get(name) or _OPERATORS.get(type(sign))
-    if function is None:
-        raise ValueError(f"{ast.unparse(node)!r} is not allowed in it")
-    read = [_read(part) for part in parts]
+            return _called(name, [_read(argument) for argument in arguments])
+        case ast.BinOp(left=left, op=sign, right=right) if type(sign) in _OPERATORS:
+            operands = [_read(left), _read(right)]
+            return _computed(_OPERATORS[type(sign)], operands, _circle(sign, operands))
+        case ast.UnaryOp(op=sign, operand=inner) if type(sign) in _OPERATORS:
+            operand = _read(inner)
+            return _computed(_OPERATORS[type(sign)], [operand], _circle(sign, [operand]))
+    raise ValueError(f"{ast.unparse(node)!r} is not allowed in it")
 
+
+def _circle(sign: ast.AST, operands: Sequence[Expression]) -> float:
+    """The full turn of a sum or difference of angles; a product of an angle is none."""
+    if type(sign) not in _LIKE_AN_ANGLE:
+        return 0.0
+    return max(operand.circle for operand in operands)
+
+
+def _called(name: str, arguments: Sequence[Expression]) -> Expression:
+    function, circle = _FUNCTIONS[name], 0.0
+    if name in _ALL_AROUND:
+        circle = math.tau
+    elif name in ("degrees", "radians"):
+        circle = function(max((argument.circle for argument in arguments), default=0.0))
+    return _computed(function, arguments, circle)
+
+
+def _computed(
+    function: Callable[..., Any], parts: Sequence[Expression], circle: float
+) -> Expression:
     def value(find: Find) -> Any:
-        values = [part.value(find) for part in read]
+        values = [part.value(find) for part in parts]
         try:
             return function(*values)
         except (ArithmeticError, ValueError):
             return math.nan
 
-    circle = math.tau if name in _ALL_AROUND else 0.0
-    if name in ("degrees", "radians") or type(sign) in _LIKE_AN_ANGLE:
-        circle = max((part.circle for part in read), default=0.0)
-        circle = function(circle) if name else circle
-    return Expression(tuple(dict.fromkeys(f for part in read for f in part.fields)), circle, value)
+    fields = dict.fromkeys(field for part in parts for field in part.fields)
+    return Expression(tuple(fields), circle, value)
