@@ -77,11 +77,15 @@ class Explanation:
     after: tuple[Callable[[Any], Any], ...] = ()
 
     def follows(self, other: Explanation, *, is_later: bool) -> bool:
-        """Whether it is asked after another one of its symptom, which may be defined later."""
+        """Whether it is asked after another one of its symptom.
+
+        Args:
+            is_later: Whether it is defined later than the other.
+        """
         if self.is_general != other.is_general:
             return self.is_general
-        in_order = self.module == other.module and is_later
-        return in_order or other.apply in self.after or self.apply in other.before
+        is_below = is_later and self.module == other.module
+        return is_below or other.apply in self.after or self.apply in other.before
 
 
 def add(entry: Explanation) -> None:
@@ -113,8 +117,8 @@ def explanation(
         for symptom in symptoms:
             name, module = apply.__name__, apply.__module__
             entry = Explanation(symptom, name, apply, module, sentence, general)
-            named = concept or symptom.concept
-            add(replace(entry, only=only, concept=named, before=before, after=after))
+            page = concept or symptom.concept
+            add(replace(entry, only=only, concept=page, before=before, after=after))
         return apply
 
     return register
@@ -125,17 +129,18 @@ def explanations() -> dict[type[Symptom[Any]], tuple[Explanation, ...]]:
     """All explanations by their symptom, in the order in which they are asked."""
     for module in walk_packages(diagnosis.__path__, f"{diagnosis.__name__}."):
         import_module(module.name)
-    found = {}
+    catalogue = {}
     for symptom in _derived(Symptom):
         entries = [entry for entry in _DEFINED if issubclass(symptom, entry.symptom)]
-        found[symptom] = tuple(in_order(entries))
-    return {symptom: entries for symptom, entries in found.items() if entries}
+        if entries:
+            catalogue[symptom] = tuple(in_order(entries))
+    return catalogue
 
 
 def _derived(symptom: type[Symptom[Any]]) -> Iterator[type[Symptom[Any]]]:
-    for one in symptom.__subclasses__():
-        yield one
-        yield from _derived(one)
+    for derived in symptom.__subclasses__():
+        yield derived
+        yield from _derived(derived)
 
 
 def in_order(entries: Sequence[Explanation]) -> Iterator[Explanation]:
@@ -145,21 +150,21 @@ def in_order(entries: Sequence[Explanation]) -> Iterator[Explanation]:
         LookupError: Nothing decides which of two is asked first.
     """
     sorter = TopologicalSorter[int]()
-    for number, one in enumerate(entries):
-        earlier = (
-            index
-            for index, other in enumerate(entries)
-            if index != number and one.follows(other, is_later=number > index)
-        )
-        sorter.add(number, *earlier)
+    for index, entry in enumerate(entries):
+        earlier = [
+            other_index
+            for other_index, other in enumerate(entries)
+            if other_index != index and entry.follows(other, is_later=index > other_index)
+        ]
+        sorter.add(index, *earlier)
     sorter.prepare()
     while sorter.is_active():
-        number, *others = sorter.get_ready()
-        if others:
-            names = [f"{entries[one].module}.{entries[one].name}" for one in (number, *others)]
+        ready = sorter.get_ready()
+        if len(ready) > 1:
+            names = [f"{entries[index].module}.{entries[index].name}" for index in ready]
             raise LookupError(f"say by before= or after= which is asked first: {', '.join(names)}")
-        yield entries[number]
-        sorter.done(number)
+        yield entries[ready[0]]
+        sorter.done(ready[0])
 
 
 def explain(symptom: Symptom[A]) -> A | None:
@@ -174,7 +179,7 @@ def explain(symptom: Symptom[A]) -> A | None:
 
 
 def cause_of(symptom: Symptom[A]) -> A:
-    """The same of a symptom that has an explanation that always applies."""
+    """The deepest explanation of a symptom of which one always applies."""
     answer = explain(symptom)
     assert answer is not None, symptom
     return answer
@@ -207,9 +212,13 @@ def mistakes() -> dict[str, dict[str, Row]]:
 @cache
 def hints() -> dict[str, str | Words]:
     """What to try, by the name of the mistake."""
-    explained = read_source(Path(__file__).with_name("hints.yaml")).read(Hints).root.values()
-    found = {name: hint for names in explained for name, hint in names.items()}
-    return found | {name: one.hint for rows in mistakes().values() for name, one in rows.items()}
+    hints_by_module = read_source(Path(__file__).with_name("hints.yaml")).read(Hints).root
+    by_name: dict[str, str | Words] = {}
+    for of_module in hints_by_module.values():
+        by_name |= of_module
+    for rows in mistakes().values():
+        by_name |= {name: row.hint for name, row in rows.items()}
+    return by_name
 
 
 def mistaken(

@@ -174,6 +174,10 @@ def why_not_built(submission: SubmissionRecord, name: str) -> Finding | None:
     return cause_of(NotBuilt(submission, name, build))
 
 
+_TIMED_OUT = {None: "endless_build", True: "build_waits", False: "build_computes"}
+"""Whether the build waited for something, as far as that was measured -> the mistake."""
+
+
 @explanation(NotBuilt)
 def build_takes_too_long(symptom: NotBuilt) -> Finding | None:
     """The build does not end: a sleep or an endless loop in setup.py or CMakeLists.txt."""
@@ -181,9 +185,8 @@ def build_takes_too_long(symptom: NotBuilt) -> Finding | None:
     begun = [one for one in build.failed_packages if _failed_itself(build, one)]
     if not build.timed_out or name not in (begun or build.failed_packages or [name]):
         return None
-    mistakes = {None: "endless_build", True: "build_waits", False: "build_computes"}
     return mistaken(
-        mistakes[build.waited],
+        _TIMED_OUT[build.waited],
         "`colcon build` did not finish within its time limit and was ended",
         _evidence(build, name),
     )
@@ -244,12 +247,13 @@ def why_lacking(submission: SubmissionRecord, name: str) -> Finding | None:
 
 
 def _not_here(lacking: list[str]) -> Finding:
-    named = " ".join(filter(None, map(apt_package, lacking)))
-    ways = (named and f"`sudo apt install --reinstall {named}`", ways_to_get(lacking))
+    packages = " ".join(filter(None, map(apt_package, lacking)))
+    ways = [f"`sudo apt install --reinstall {packages}`"] if packages else []
+    ways += filter(None, [ways_to_get(lacking)])
     return Finding.ours(
         f"it needs {codes(lacking)} to build: ROS 2 Jazzy has it, but it is missing or damaged on "
         "the machine that grades",
-        remedy("not_here", ways="".join(f", or {way}" for way in ways if way)),
+        remedy("not_here", ways="".join(f", or {way}" for way in ways)),
     )
 
 
@@ -264,22 +268,29 @@ def _failed_itself(build: BuildRecord, name: str) -> bool:
 
 def _needs(submission: SubmissionRecord, name: str) -> list[str]:
     """Other packages of the submission that a package names or imports, and those that they do."""
-    found = [name]
-    for one in found:
-        package = submission.package(one)
-        named = {item.name for item in package.dependencies} if package else set()
-        named |= {item.module for item in package.imports} if package else set()
-        found += sorted(named & {item.name for item in submission.packages} - set(found))
-    return found[1:]
+    own = {package.name for package in submission.packages}
+    needed = [name]
+    # The list grows while it is read: what is needed may need more.
+    for needed_name in needed:
+        package = submission.package(needed_name)
+        if package is not None:
+            named = {item.name for item in package.dependencies}
+            named |= {item.module for item in package.imports}
+            needed += sorted(named & own - set(needed))
+    return needed[1:]
 
 
 def _failed(submission: SubmissionRecord, build: BuildRecord, name: str) -> Finding:
     ended = _OURS.search(build.log)
-    error = build.culprit or SourceError("", None, ended[1] if ended else "")
+    culprit = build.culprit or SourceError("", None, ended[1] if ended else "")
     package = existing_package(submission, name)
     # setuptools names no line of what setup() refuses, and CMake one beyond an empty file.
-    of_file = (one for one in package.syntax_errors if one.file == error.file)
-    error = next((one for one in of_file if not error.line or one.message == EMPTY), error)
+    better = [
+        error
+        for error in package.syntax_errors
+        if error.file == culprit.file and (not culprit.line or error.message == EMPTY)
+    ]
+    error = better[0] if better else culprit
     return Finding(
         f"`colcon build` failed: {error if error.file else error.message}".removesuffix(": "),
         cause_of(BuildError(error, package)),
@@ -293,18 +304,18 @@ def _lacking(submission: SubmissionRecord, build: BuildRecord, name: str) -> lis
     Only CMake looks for packages; what a setup.py prints may be put in the same words.
     """
     missing: set[str] = set()
-    ahead, seen = [name], {name}
-    while ahead:
-        one = ahead.pop()
-        written = "\n".join(_written(build, one))
-        found = modules_not_found(written)
-        package = submission.package(one)
+    to_read, known = [name], {name}
+    while to_read:
+        reading = to_read.pop()
+        log = "\n".join(_written(build, reading))
+        missing_here = modules_not_found(log)
+        package = submission.package(reading)
         if package is None or package.build_type != "ament_python":
-            found |= not_found(written) | damage_in(written) | set(COMPILERS.values())
-        missing |= found
+            missing_here |= not_found(log) | damage_in(log) | set(COMPILERS.values())
+        missing |= missing_here
         # Another package of the submission is not there, which lacks something itself.
-        ahead += found & set(build.failed_packages) - seen
-        seen |= found
+        to_read += missing_here & set(build.failed_packages) - known
+        known |= missing_here
     return sorted(missing & set(build.lacking))
 
 
@@ -318,31 +329,28 @@ def _clean(build: BuildRecord) -> str:
 
 def _relevant(build: BuildRecord, name: str) -> tuple[str, ...]:
     """The log of the package's build, up to its first error or to its end."""
-    noise = (_CHATTER, _STEPS)
-    kept = [
-        line
-        for line in _written(build, name)
-        if line.strip() and not any(pattern.match(line) for pattern in noise)
-    ]
-    if build.culprit is not None:
-        message = build.culprit.message[:_COMPARED]
-        blamed = next((i for i, line in enumerate(kept) if message and message in line), None)
-        # What follows is the complaint of the tools that called the student's file.
-        if blamed is not None:
-            kept = kept[: blamed + 1]
-    return tuple(kept[-_LOG_LINES:])
+    message = build.culprit.message[:_COMPARED] if build.culprit is not None else ""
+    relevant: list[str] = []
+    for line in _written(build, name):
+        if line.strip() and not _CHATTER.match(line) and not _STEPS.match(line):
+            relevant.append(line)
+            if message and message in line:
+                # What follows is the complaint of the tools that called the student's file.
+                break
+    return tuple(relevant[-_LOG_LINES:])
 
 
 def _written(build: BuildRecord, name: str) -> list[str]:
     """What the build of the package wrote; all of the log where it was never begun."""
     lines = _clean(build).splitlines()
-    begin = _last(lines, f"Starting >>> {name}")
+    begin = _last_index(lines, f"Starting >>> {name}")
     if begin is None:
         return lines
     lines = lines[begin:]
-    return lines[: _last(lines, f"Failed   <<< {name}", f"Aborted  <<< {name}")]
+    return lines[: _last_index(lines, f"Failed   <<< {name}", f"Aborted  <<< {name}")]
 
 
-def _last(lines: list[str], *beginnings: str) -> int | None:
-    found = [i for i, line in enumerate(lines) if line.startswith(beginnings)]
-    return found[-1] if found else None
+def _last_index(lines: list[str], *beginnings: str) -> int | None:
+    """The index of the last line with one of some beginnings, or None."""
+    indexes = [index for index, line in enumerate(lines) if line.startswith(beginnings)]
+    return indexes[-1] if indexes else None

@@ -89,10 +89,12 @@ class Search:
 
     def chosen(self) -> str | None:
         """The only one; of several of one role, each has the next in the order of their names."""
-        found = self._free()
-        same = [one for one in self._same if one == self.name or one not in self.values]
-        place = same.index(self.name)
-        return found[place] if place < len(found) <= len(same) else None
+        names = self._free()
+        open_variables = [one for one in self._same if one == self.name or one not in self.values]
+        place = open_variables.index(self.name)
+        if len(names) > len(open_variables) or place >= len(names):
+            return None
+        return names[place]
 
     @property
     def is_open(self) -> bool:
@@ -176,8 +178,8 @@ class Search:
             for node in nodes:
                 if role.node in (None, node, node.rpartition("/")[2]):
                     for name in parameter_calls.names(recording, node):
-                        found = parameter_calls.descriptor(recording, node, name)
-                        if of is None or (found is not None and found.type == of):
+                        declaration = parameter_calls.descriptor(recording, node, name)
+                        if of is None or (declaration is not None and declaration.type == of):
                             yield name
         else:
             for item in NoEndpoint(recording, _WORDS[variable.in_], "").there:
@@ -223,14 +225,14 @@ class Search:
         Before any run, and where nothing is seen of it, one stands for all.
         """
         own = [one for package in self.submission.packages for one in self._interfaces(package)]
-        there = [
-            item
+        types_in_use = {
+            item.type
             for recording in self.recordings.values()
-            for noun in _WORDS.values()
-            for item in NoEndpoint(recording, noun, "").there
-        ]
-        seen = {item.type for item in there if item.name == name}
-        return [one for one in own if one in seen] or own[:1]
+            for word in _WORDS.values()
+            for item in NoEndpoint(recording, word, "").there
+            if item.name == name
+        }
+        return [interface for interface in own if interface in types_in_use] or own[:1]
 
     @property
     def asked(self) -> str:
@@ -259,16 +261,16 @@ class Search:
 
     def why_wrong(self, answer: str) -> Finding | None:
         """Why what the submission says is not what is looked for, as far as that is known."""
-        found = {*self.found()}
+        right = {*self.found()}
         if not self.variable.is_of_runs:
             # The source shows roughly what a program does, and surely whether it is there.
-            found |= {*self.others}
-        if answer in found or not (found or self.others):
+            right |= {*self.others}
+        if answer in right or not (right or self.others):
             return None
-        if not found:
+        if not right:
             return self.why_none()
         return Finding(
-            f"{code(ANSWERS_FILE)} says {code(answer)}, and there is {codes(sorted(found))}",
+            f"{code(ANSWERS_FILE)} says {code(answer)}, and there is {codes(sorted(right))}",
             f"Correct the line of {code(self.name)} in it.",
             verdict=Verdict.ASKS,
             expected=f"one {self.asked}",
