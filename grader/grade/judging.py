@@ -75,7 +75,7 @@ def judge_all(
 def _parameters_first(checks: Mapping[str, BoundCheck]) -> dict[str, list[str]]:
     """By check, the checks of given parameters that are judged before it.
 
-    Before these checks, and without any before it, comes what they require themselves.
+    None for those checks themselves, and for what they require: these come first.
     """
     requires = {name: bound.spec.requires for name, bound in checks.items()}
     of_parameters = [n for n, bound in checks.items() if bound.check.name == PARAMETERS_GIVEN]
@@ -110,12 +110,7 @@ class _Known:
         parameters_first: Iterable[str],
         results: Mapping[str, CheckResult],
     ) -> CheckResult:
-        """Judge one check, or skip it for what was judged before.
-
-        Args:
-            parameters_first: The checks of given parameters before it.
-            results: Of all checks before it.
-        """
+        """Judge one check, or skip it by the results of the checks before it."""
         blockers = _blockers(bound.spec.requires, results)
         with speaking(self.submission.spoken(self.about(bound))):
             hints = tuple(map(str, bound.spec.hints))

@@ -108,17 +108,19 @@ def signal_of(exit_code: int) -> signal.Signals | None:
 
 def why_ended(recording: Recording, seen: str = "") -> Finding | None:
     """The cause if a process ended early, after what was seen of it; None if none did."""
-    ended = exited(recording)
-    if not ended:
-        return None
-    cause = why_it_exited(recording, ended[0])
-    return cause.after(seen) if seen else cause
+    return _why_first(recording, exited(recording), seen)
 
 
 def why_crashed(recording: Recording) -> Finding | None:
     """The cause if a process ended early with a failure; None if none did."""
-    ended = crashed(recording)
-    return why_it_exited(recording, ended[0]) if ended else None
+    return _why_first(recording, crashed(recording), "")
+
+
+def _why_first(recording: Recording, ended: Sequence[Process], seen: str) -> Finding | None:
+    if not ended:
+        return None
+    cause = why_it_exited(recording, ended[0])
+    return cause.after(seen) if seen else cause
 
 
 @dataclass(frozen=True)
@@ -209,11 +211,7 @@ class NotDone(Symptom[Finding]):
 @explanation(NotDone, concept="nodes")
 def process_ended(symptom: NotDone) -> Finding | None:
     """The process ended."""
-    ended = symptom.ended
-    if not ended:
-        return None
-    cause = why_it_exited(symptom.recording, ended[0])
-    return cause.after(symptom.seen) if symptom.seen else cause
+    return _why_first(symptom.recording, symptom.ended, symptom.seen)
 
 
 @explanation(ProcessExit)
