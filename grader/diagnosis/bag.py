@@ -14,7 +14,7 @@ def why_not_in_bag(recording: Recording, topic: str) -> Finding | None:
     """Why a bag has no message on a topic to judge; None if it has."""
     if recording.on(topic) or recording.bag is None or recording.unreadable.get(topic):
         return None
-    bag, name = code(recording.bag), code(topic)
+    bag, name = code(recording.bag), code(recording.in_bag(topic))
     types = {one.type for one in recording.student_endpoints(Kind.PUBLISHER, topic)}
     if recording.misdefined(topic):
         seen = f"{bag} has {name} with another definition of {codes(types)} than Jazzy's"
@@ -24,9 +24,8 @@ def why_not_in_bag(recording: Recording, topic: str) -> Finding | None:
     if types and other_types:
         seen = f"{bag} has {codes(types)} on {name}, not {codes(other_types)}"
         return mistaken("other_type_in_bag", seen, topic=name)
-    if types:
-        return mistaken("not_in_bag", f"{bag} has no message on {name}", topic=name)
-    return mistaken("not_in_bag", f"{bag} has no {name}; {_what_it_has(recording)}", topic=name)
+    seen = f"{bag} has no message on {name}; {_what_it_has(recording)}"
+    return mistaken("not_in_bag", seen, topic=name)
 
 
 def _what_it_has(recording: Recording) -> str:

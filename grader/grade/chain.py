@@ -155,6 +155,9 @@ def in_bag(finding: Finding, case: Case) -> Finding:
     if recording is None or recording.bag is None:
         return finding
     remarks = [f"in the bag {code(recording.bag)}"]
+    for topic in dict.fromkeys(_judged_topics(case)):
+        if (own := recording.in_bag(topic)) != topic:
+            remarks.append(f"{code(own)} is called {code(topic)} here")
     if case.bound.check.family == "timing" and BAG_RECEIVED in recording.environment:
         remarks.append(
             "by the times when it was recorded, which vary more than those of publishing"

@@ -26,6 +26,7 @@ NS = 1_000_000_000
 PROBE_NODE = "rosgrade_probe"
 """Name of the node through which a run is watched."""
 BAG, BAG_NOTES, BAG_RECEIVED = "bag", "bag_notes", "bag_received"
+BAG_RENAMED = "bag_renamed"
 """Keys of ``Recording.environment``, where a bag was read in place of a run."""
 
 
@@ -392,6 +393,11 @@ class Recording:
     def bag_notes(self) -> tuple[str, ...]:
         """What is conspicuous about that bag, parts of a sentence."""
         return tuple(self.environment.get(BAG_NOTES, "").splitlines())
+
+    def in_bag(self, topic: str) -> str:
+        """What a topic is called in that bag."""
+        rules = (rule.split(":=") for rule in self.environment.get(BAG_RENAMED, "").split())
+        return next((own for own, asked in rules if asked == topic), topic)
 
     def on(self, topic: str) -> tuple[Message, ...]:
         """Messages on a topic, oldest first."""

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from grader.errors import GraderFault
 from grader.findings.words import code, codes, counted, metres
+from grader.measure.motion.track import is_at_rest
 from grader.recording.bag import BagChannel, BagMessage, KeptBag
 from grader.recording.cdr import decoder
 from grader.recording.interface import concatenated_definition, definition_finder
@@ -26,6 +27,7 @@ from grader.recording.model import (
     BAG,
     BAG_NOTES,
     BAG_RECEIVED,
+    BAG_RENAMED,
     NS,
     Ending,
     Endpoint,
@@ -126,10 +128,13 @@ class _Reading:
             commands = self._values(scenario.topics.command.topic)
         truth = motion(odometry, commands, scenario.robot.pose)
         self._notes += self._faults_of_recording(odometry)
+        if truth and not is_at_rest(truth[0]):
+            self._notes.append("the robot drives already when it begins")
         environment = {
             "assignment": order.assignment,
             "ros_distro": order.bag.distro or "unknown",
             BAG: order.bag.path,
+            BAG_RENAMED: " ".join(f"{own}:={name}" for own, name in self._rename.items()),
         }
         if self._notes:
             environment[BAG_NOTES] = "\n".join(self._notes)
@@ -207,7 +212,9 @@ class _Reading:
         for topic, type in self._types.items():
             read = BagChannel(topic, type, self._hashes_here[type])
             yield self._endpoint(Kind.SUBSCRIPTION, Owner.PROBE, read, Qos())
-        for channel in map(self._renamed, self._order.kept.channels):
+        filled = {(one.name, one.type) for one in self._order.bag.topics if one.messages}
+        channels = (one for one in self._order.kept.channels if (one.name, one.type) in filled)
+        for channel in map(self._renamed, channels):
             if channel.name in self._types:
                 # That nothing is said of its publishers does not mean that it had none.
                 for qos in channel.publishers or (Qos(),):

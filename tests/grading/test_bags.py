@@ -142,7 +142,10 @@ def test_a_bag_is_judged_again_from_its_recording(judge: Judge, tmp_path: Path) 
 def test_a_topic_that_is_not_in_the_bag_is_said_with_those_that_are(judge: Judge) -> None:
     graded = judge({"bag": {"folder": "square", "rename": {ODOMETRY: "/robot2/odom"}}})
     assert result(graded, "odometry").status is Status.FAILED
-    assert "has no `/odom`; it has `/robot1/cmd_vel` and `/robot2/odom`" in seen(graded)
+    assert "no message on `/robot1/odom`; it has `/robot1/cmd_vel` and `/robot2/odom`" in seen(
+        graded
+    )
+    assert "Record `/robot1/odom`" in seen(graded)
     assert result(graded, "rate").status is Status.PASSED
 
 
@@ -158,7 +161,7 @@ def test_a_topic_that_is_not_in_the_bag_is_said_with_those_that_are(judge: Judge
         ({"files": {"square": None}}, "there is no bag, a folder with"),
         (
             {"bag": {"folder": "square", "without": [ODOMETRY, COMMANDS]}},
-            "has no `/odom`; it is empty",
+            "has no message on `/robot1/odom`; it is empty",
         ),
     ],
 )
@@ -225,6 +228,31 @@ def test_messages_that_are_in_a_bag_twice_count_once(judge: Judge, tmp_path: Pat
     recording = graded.recordings["square"]
     assert len(recording.on("/cmd_vel")) == 350
     assert any("are in it more than once, and count once" in note for note in recording.bag_notes)
+
+
+@pytest.mark.parametrize("storage", ["MCAP", "SQLITE3"])
+def test_a_bag_of_topics_without_a_message_is_the_students_and_costs_the_points(
+    judge: Judge, tmp_path: Path, storage: str
+) -> None:
+    from rosbags.rosbag2 import StoragePlugin, Writer
+
+    messages, definitions = read_bag(EXAMPLE / "reference" / "square")
+    with Writer(
+        tmp_path / "made" / "square", version=9, storage_plugin=StoragePlugin[storage]
+    ) as bag:
+        for one in {one.channel for one in messages}:
+            bag.add_connection(one.name, one.type, msgdef=definitions[one.type], rihs01=one.hash)
+    graded = judge(files=read_files(tmp_path / "made"))
+    assert (graded.grade.graded, graded.grade.score) == (True, 0.0)
+    assert "no message on `/robot1/cmd_vel`; it is empty" in seen(graded, "commands")
+
+
+def test_a_recording_that_begins_or_ends_while_the_robot_drives_is_told_so(judge: Judge) -> None:
+    late = judge({"bag": {"folder": "square", "since": "8 s"}})
+    assert "the robot drives already when it begins" in seen(late, "corners")
+    early = judge({"bag": {"folder": "square", "until": "26 s"}})
+    assert "End the recording when the robot stands" in seen(early, "back")
+    assert "drove on" not in seen(early, "back")
 
 
 def test_two_publishers_a_cut_and_other_clocks_are_said(judge: Judge, tmp_path: Path) -> None:

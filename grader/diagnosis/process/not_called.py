@@ -81,7 +81,7 @@ class NotCalled(NotDone, concept="executors"):
     def starved(self, begin_ns: int, end_ns: int) -> Finding | None:
         """The machine's doing, if it took so much of a time that nothing is proven by it."""
         stolen_s = self.recording.stolen_s(begin_ns, end_ns)
-        if stolen_s < _STARVED * (end_ns - begin_ns) / NS:
+        if stolen_s <= _STARVED * (end_ns - begin_ns) / NS:
             return None
         guilty = self.guilty()
         if guilty is not None:
