@@ -96,6 +96,13 @@ def test_a_place_is_missed_for_a_cause_of_its_own(way, said, when):
     assert finding.hint
 
 
+def test_a_robot_that_turns_before_it_is_there_did_not_turn_too_far():
+    """It drives a square with sides that are too short, and rests where it began."""
+    run = legs(0.1, 0.4, RIGHT_ANGLE, 0.4, RIGHT_ANGLE, 0.4, RIGHT_ANGLE, 0.4)
+    finding = judge("motion.visits", run, places=[[0.8, 0], [0.8, 0.8]])
+    assert "0 of 2 places; it came within 0.4" in finding.observed
+
+
 def test_a_route_that_ends_where_it_began_was_not_there_too_early():
     """It is at its last place at the start, and at the place before while it leaves that."""
     run = legs(0.1, 0.5, RIGHT_ANGLE, 0.2)

@@ -49,6 +49,11 @@ class PlaceMissed(Symptom[Finding]):
         return math.hypot(self.x_m - step.x_m, self.y_m - step.y_m)
 
     @cached_property
+    def nearest(self) -> Truth:
+        """Where the robot was nearest to the place."""
+        return min(self.way, key=self.distance_m)
+
+    @cached_property
     def gone_m(self) -> list[float]:
         """How far each step is from the beginning of the way."""
         first = self.way[0]
@@ -90,7 +95,7 @@ def skipped(symptom: PlaceMissed) -> Finding | None:
         f"it went to {symptom.skipped_to} without {symptom.name} before",
         remedy("skipped"),
         f"nearest to {symptom.name}",
-        min(symptom.way, key=symptom.distance_m),
+        symptom.nearest,
     )
 
 
@@ -106,6 +111,10 @@ def turned_wrongly(symptom: PlaceMissed) -> Finding | None:
     room_rad = max(_TURN_RAD, math.atan2(symptom.reach_m, distance_m))
     if far_m < _WAY_M or abs(wrap_angle(turned_rad - needed_rad)) <= room_rad:
         return None
+    off = symptom.first_beyond(_WAY_M)
+    # It went in the right direction, and turned before it was there.
+    if abs(wrap_angle(symptom.bearing_rad(off.x_m, off.y_m) - needed_rad)) <= _TURN_RAD:
+        return None
     are_turns = min(abs(turned_rad), abs(needed_rad)) > _TURN_RAD
     if are_turns and turned_rad * needed_rad < 0.0:
         how, mistake = "to the wrong side", "other_side"
@@ -117,7 +126,7 @@ def turned_wrongly(symptom: PlaceMissed) -> Finding | None:
         f"on its way to {symptom.name} it turned {how}: {_to(turned_rad)} instead of {instead}",
         remedy(mistake),
         "drives off in another direction",
-        symptom.first_beyond(_WAY_M),
+        off,
     )
 
 
@@ -126,7 +135,8 @@ def stopped_short(symptom: PlaceMissed) -> Finding | None:
     """It came to rest on its way to the place."""
     rest = final_rest(symptom.way)
     left_m = symptom.distance_m(symptom.way[-1])
-    if rest is None or max(symptom.gone_m) > symptom.distance_m(symptom.way[0]):
+    went_past = max(symptom.gone_m) > symptom.distance_m(symptom.way[0])
+    if rest is None or went_past or left_m > symptom.distance_m(symptom.nearest) + symptom.reach_m:
         return None
     return symptom.cause(
         f"it stopped {metres(left_m)} from {symptom.name}",
@@ -139,10 +149,9 @@ def stopped_short(symptom: PlaceMissed) -> Finding | None:
 @explanation(PlaceMissed, general=True)
 def not_near(symptom: PlaceMissed) -> Finding:
     """It came near the place, but not near enough."""
-    step = min(symptom.way, key=symptom.distance_m)
     return symptom.cause(
-        f"it came within {metres(symptom.distance_m(step))} of {symptom.name}",
+        f"it came within {metres(symptom.distance_m(symptom.nearest))} of {symptom.name}",
         remedy("not_near"),
         f"nearest to {symptom.name}",
-        step,
+        symptom.nearest,
     )
