@@ -273,6 +273,14 @@ def incompatible_qos(symptom: OnTopic) -> Finding | None:
     return why_refused(symptom) if symptom.pairs == symptom.refused else None
 
 
+def why_unheard(recording: Recording) -> Finding | None:
+    """Why a subscription of the student's gets nothing, by its QoS; None if each may get some."""
+    topics = {one.topic for one in recording.student_endpoints(Kind.SUBSCRIPTION)}
+    causes = (incompatible_qos(NotDelivered(recording, topic)) for topic in sorted(topics))
+    cause = next(filter(None, causes), None)
+    return cause and cause.after("a subscription of the node gets nothing")
+
+
 def why_refused(symptom: OnTopic) -> Finding | None:
     """The cause if the QoS of an endpoint of the student's refuses another one, or is refused."""
     if not symptom.refused:

@@ -10,6 +10,7 @@ from grader.diagnosis.no_messages import (
     nothing_to_answer,
     seconds_hint,
     why_not_delivered,
+    why_unheard,
 )
 from grader.diagnosis.process.not_called import callback_raised, no_cpu_time
 from grader.diagnosis.process.raised import defined_at
@@ -60,6 +61,13 @@ def publish_never_called(symptom: NoMessages) -> Finding | None:
         f"{symptom.seen}: no line of the program calls publish()",
         Evidence(moments=symptom.moments, places=tuple(filter(None, places))),
     )
+
+
+@explanation(NoMessages, after=(no_answer,), concept="qos")
+def deaf_by_qos(symptom: NoMessages) -> Finding | None:
+    """A subscription of the node gets nothing, because its QoS does not match the publisher."""
+    cause = why_unheard(symptom.recording)
+    return cause and cause.after(symptom.seen)
 
 
 @explanation(NoMessages, after=(no_answer,), concept="names")

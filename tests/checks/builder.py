@@ -175,6 +175,17 @@ def reader(topic: str = "/cmd_vel", type: str = TWIST, qos: Qos = RELIABLE) -> E
     )
 
 
+def senses(topic: str, type: str, qos: Qos = RELIABLE) -> tuple[Endpoint, Endpoint]:
+    """A publisher of the robot, and the student's subscription to it."""
+    robot = endpoint(topic, type=type, node="/probe", owner=Owner.PROBE)
+    return robot, endpoint(topic, type=type, kind=Kind.SUBSCRIPTION, qos=qos)
+
+
+def deaf(topic: str, type: str) -> tuple[Endpoint, Endpoint]:
+    """The same, where the subscription requests more than the robot offers."""
+    return senses(topic, type, replace(RELIABLE, durability="transient_local"))
+
+
 def process(name: str = BOT, **changes: Any) -> Process:
     """A process that ran until SIGINT; ``exited_s`` is its end."""
     exited_s = changes.pop("exited_s", END_S)

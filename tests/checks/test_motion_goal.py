@@ -24,6 +24,7 @@ from tests.checks.builder import (
     on_odometry,
     on_timer,
     output,
+    senses,
     simulated,
     taken,
     text,
@@ -31,6 +32,7 @@ from tests.checks.builder import (
 )
 
 GOAL = (0.8, 0.5, 2.0)
+ODOMETRY = "nav_msgs/msg/Odometry"
 BEHIND = (-0.6, 0.15, -math.pi / 2)
 REACHES = {"position": "0.1 m", "heading": "0.1 rad"}
 
@@ -637,6 +639,44 @@ class TestMistakes:
         late = simulated(run.truth, run.scene, messages=run.messages, disturbance=stall)
         finding = judge("motion.overshoot", late, goal=yaml((0.6, 0.0, 0.0)), most="4 cm")
         assert finding.status is Status.FAILED
+
+
+def test_a_goal_at_the_start_was_not_reached_before_it_was_left():
+    run = drive(on_odometry(lambda pose: (0.2 if pose.x_m < 0.5 else 0.0, 0.0)))
+    said = failing("motion.reaches", run, goal=[0, 0, 0], position="0.1 m")
+    assert "m from the goal" in said
+    assert "drove on" not in said
+    moving = drive(on_odometry(lambda pose: (0.2, 0.0)), seconds=3.0)
+    said = failing("motion.reaches", moving, goal=[0, 0, 0], position="0.1 m")
+    assert "farther than at the start" not in said
+
+
+def test_a_robot_that_stands_because_it_refused_a_command_was_not_stopped():
+    speeds = {"goal": [0.5, 0, 0], "position": "0.1 m"}
+    stops, refuses = (
+        drive(on_odometry(lambda pose, end=end: (0.2 if pose.x_m < 0.48 else end, 0.0)))
+        for end in (0.0, math.nan)
+    )
+    assert judge("motion.reaches", stops, **speeds).status is Status.PASSED
+    assert "were not finite" in failing("motion.reaches", refuses, **speeds)
+
+
+def test_what_it_does_after_it_was_at_the_goal_is_no_turn_on_its_way():
+    run = drive(
+        on_odometry(lambda pose: (0.2, 0.0) if pose.x_m < 1.0 else (0.0, 1.0)), seconds=25.0
+    )
+    said = failing("motion.reaches", run, goal=[0.5, 0, 0], position="0.1 m")
+    assert "and drove on" in said
+    assert "full turns" not in said
+
+
+def test_a_robot_that_only_sees_gets_no_advice_about_odometry():
+    run = drive(on_timer(0.1, lambda _: (0.0, 1.0)), seconds=25.0)
+    camera = senses("/camera/image_raw", "sensor_msgs/msg/Image")
+    seeing, told = replace(run, endpoints=camera), (*camera, *senses("/odom", ODOMETRY))
+    reaches = {"goal": [0.5, 0, 0], "position": "0.1 m"}
+    assert "yaw" not in failing("motion.reaches", seeing, **reaches)
+    assert "yaw" in failing("motion.reaches", replace(run, endpoints=told), **reaches)
 
 
 def test_drive_plain_silence_says_why():

@@ -1,13 +1,14 @@
 """motion.follows_line, on runs of the real simulator core."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from grader.findings.finding import Status
 from grader.measure.motion.floor_line import followed_m, length_m
 from grader.recording.simulated import Truth
-from tests.checks.builder import drive, failing, judge, on_timer
+from tests.checks.builder import deaf, drive, failing, judge, on_timer
 
 BEND = "lines: [{points: [[0, 0], [0.6, 0], [0.6, 0.6]]}]"
 
@@ -51,6 +52,20 @@ def test_a_robot_that_stops_in_the_middle_did_not_follow_it_to_the_end():
 def test_a_robot_that_drives_backwards_does_not_come_along_the_line():
     run = drive(on_timer(0.05, lambda _: (-0.2, 0.0)), seconds=3.0, world=BEND)
     failing("motion.follows_line", run)
+
+
+def test_a_command_that_ros_misreads_is_why_the_robot_does_not_turn():
+    run = drive(on_timer(0.05, lambda _: (0.2, 1.584e-314)), seconds=5.0, world=BEND)
+    found = failing("motion.follows_line", run)
+    assert "`angular.z` is a float field" in found
+    assert "numpy.float32" in found
+
+
+def test_a_subscription_that_gets_nothing_is_why_the_robot_does_not_turn():
+    run = drive(on_timer(0.05, lambda _: (0.2, 0.0)), seconds=5.0, world=BEND)
+    camera = deaf("/camera/image_raw", "sensor_msgs/msg/Image")
+    found = failing("motion.follows_line", replace(run, endpoints=camera))
+    assert "QoS does not match the publisher on `/camera/image_raw`" in found
 
 
 def test_a_line_that_the_world_does_not_have_is_no_fault_of_the_student():

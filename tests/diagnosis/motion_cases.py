@@ -17,6 +17,7 @@ from tests.checks.builder import (
     on_scan,
     output,
     reader,
+    senses,
     simulated,
     taken,
 )
@@ -179,6 +180,13 @@ CASES: list[Group] = [
         "motion.reaches",
         {"goal": yaml((0.8, 0.0, 0.0)), **REACHES},
         {
+            "GoalMissed.not_told_where": lambda: replace(
+                drive(on_odometry(lambda pose: (0.2, 0.0)), seconds=10),
+                endpoints=senses("/camera/image_raw", "sensor_msgs/msg/Image"),
+            ),
+            "GoalMissed.still_driving": lambda: drive(
+                on_odometry(lambda pose: (0.2, 0.0)), seconds=3, environment={"bag": "square"}
+            ),
             "GoalMissed.drove_on": lambda: drive(on_odometry(lambda pose: (0.2, 0.0)), seconds=10),
         },
     ),

@@ -28,6 +28,7 @@ from tests.checks.builder import (
     NODE,
     RELIABLE,
     call,
+    deaf,
     declarations,
     declared,
     died,
@@ -274,6 +275,10 @@ CASES: list[Group] = [
             "NoMessages.process_ended": silent(processes=(died(1),)),
             "NoMessages.publisher_destroyed": silent(endpoints=(gone(endpoint()), reader())),
             "NoMessages.nothing_to_answer NotDelivered.no_endpoint": answering(),
+            "NoMessages.deaf_by_qos": silent(
+                declarations=declarations(timer_s=None),
+                endpoints=(endpoint(), reader(), *deaf("/scan", "sensor_msgs/msg/LaserScan")),
+            ),
             "NoMessages.slow_timer": silent(declarations=declarations(timer_s=300.0)),
             "NoMessages.no_cpu_time": silent(calls=(), disturbance=BUSY),
             "NoMessages.callback_raised": silent(log=SURVIVED),

@@ -10,12 +10,12 @@ from grader.checks.check import Subject, check, stop_if
 from grader.checks.motion.robot_check import GoalParameters, RobotParameters, at_the_end
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.missed_goal import why_not_aligned, why_not_there
-from grader.diagnosis.motion.no_motion import approach, why_not_moved
+from grader.diagnosis.motion.no_motion import approach, why_not_moved, why_rejected
 from grader.diagnosis.motion.off_course import why_interrupted, why_off_course, why_unsteered
 from grader.findings.finding import Evidence, Finding, Plot, evidence_at
 from grader.findings.words import degrees, metres, percent, point, speed, turn
 from grader.measure.motion.approach import Approach
-from grader.measure.motion.command import stolen_s
+from grader.measure.motion.command import commands, stolen_s
 from grader.measure.motion.track import final_rest, is_at_rest, speed_plot, way_m
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
@@ -70,6 +70,10 @@ def reaches(recording: Recording, parameters: Reaches) -> Finding:
     if parameters.at_rest and not is_at_rest(last):
         stop_if(why_off_course(recording))
         return _restless(recording, last, "is at the goal, but")
+    sent = commands(recording)
+    # It stands because the robot refused the last command.
+    if parameters.at_rest and sent and not sent[-1].twist.is_finite:
+        stop_if(why_rejected(recording))
     seen = f"{metres(run.distance_m(last))} from the goal"
     if heading is not None:
         seen += f", {degrees(abs(run.heading_error_rad(last)))} off its heading"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import dropwhile, takewhile
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation, remedy
 from grader.diagnosis.motion.misread_yaw import misread_yaw
@@ -15,7 +17,7 @@ from grader.findings.words import degrees, metres, point, speed, turn
 from grader.measure.motion.approach import Approach, long_turns
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.track import is_at_rest, turned_rad
-from grader.recording.model import NS, Ending
+from grader.recording.model import NS, Ending, Kind, Owner
 from grader.recording.simulated import Truth
 from grader.spec.unit import format_duration
 
@@ -25,6 +27,14 @@ _ASTRAY_RAD = math.radians(30.0)
 _MANY_TURNS = 1.5
 # Share of the run that the machine may take from it.
 _STARVED = 0.25
+# What tells a program what is around the robot, and not where it is.
+_SIGHTS = {
+    *(
+        f"sensor_msgs/msg/{name}"
+        for name in ("Image", "CompressedImage", "CameraInfo", "LaserScan")
+    ),
+    "visualization_msgs/msg/MarkerArray",
+}
 
 
 @dataclass(frozen=True)
@@ -39,10 +49,19 @@ class GoalMissed(Symptom[Finding]):
         """The end of the way."""
         return self.run.truth[-1]
 
+    def is_far(self, step: Truth) -> bool:
+        """Whether the robot is not at the goal's position."""
+        return self.run.distance_m(step) > self.position_m
+
+    @cached_property
+    def way(self) -> tuple[Truth, ...]:
+        """Every step since it was away from the goal: it may have started there."""
+        return tuple(dropwhile(lambda step: not self.is_far(step), self.run.truth))
+
     @property
     def nearest(self) -> Truth:
-        """Where the robot was nearest to the goal."""
-        return min(self.run.truth, key=self.run.distance_m)
+        """Where the robot was nearest to the goal on its way."""
+        return min(self.way, key=self.run.distance_m)
 
     @property
     def is_at_rest(self) -> bool:
@@ -64,6 +83,13 @@ class GoalMissed(Symptom[Finding]):
             f"is still {left} from the goal when the observation ends, at "
             f"{speed(self.last.linear_m_s)} and {turn(self.last.angular_rad_s)}"
         )
+
+    @property
+    def drove_on(self) -> str:
+        """That it was at the goal on its way, in words; empty if it was not."""
+        if self.is_far(self.nearest):
+            return ""
+        return f": it came as near as {metres(self.run.distance_m(self.nearest))}, and drove on"
 
     def cause(self, words: str, hint: str) -> Finding:
         """The symptom in words, followed by more, with the distance over time."""
@@ -127,6 +153,40 @@ def off_course(symptom: GoalMissed | HeadingMissed) -> Finding | None:
     return why_off_course(symptom.run.recording)
 
 
+@explanation(GoalMissed, concept="executors")
+def loop_in_a_callback(symptom: GoalMissed) -> Finding | None:
+    """A callback does not return: its loop never sees newer odometry."""
+    if symptom.is_at_rest:
+        return None
+    stand = stuck(symptom.run.recording)
+    if stand is None:
+        return None
+    return at_its_place(symptom.cause("", ""), symptom.seen, stand)
+
+
+@explanation(GoalMissed)
+def not_told_where(symptom: GoalMissed) -> Finding | None:
+    """It steers by a camera or a LiDAR alone: nothing tells it where it and the goal are."""
+    recording = symptom.run.recording
+    heard = {one.topic for one in recording.student_endpoints(Kind.SUBSCRIPTION)}
+    types = {
+        one.type
+        for one in recording.endpoints
+        if one.kind is Kind.PUBLISHER and one.owner is not Owner.STUDENT and one.topic in heard
+    }
+    if not types or not types <= _SIGHTS:
+        return None
+    return symptom.cause(symptom.drove_on, remedy("not_told_where"))
+
+
+@explanation(GoalMissed)
+def still_driving(symptom: GoalMissed) -> Finding | None:
+    """A bag ends while the robot drives."""
+    if symptom.is_at_rest or symptom.run.recording.bag is None:
+        return None
+    return symptom.cause(symptom.drove_on, remedy("still_driving"))
+
+
 @explanation(GoalMissed)
 def wrong_place(symptom: GoalMissed) -> Finding | None:
     """It drove to another place: x and y swapped, a wrong sign, or counted from its start."""
@@ -148,17 +208,6 @@ def wrong_place(symptom: GoalMissed) -> Finding | None:
     return None
 
 
-@explanation(GoalMissed, concept="executors")
-def loop_in_a_callback(symptom: GoalMissed) -> Finding | None:
-    """A callback does not return: its loop never sees newer odometry."""
-    if symptom.is_at_rest:
-        return None
-    stand = stuck(symptom.run.recording)
-    if stand is None:
-        return None
-    return at_its_place(symptom.cause("", ""), symptom.seen, stand)
-
-
 @explanation(GoalMissed, concept="angles")
 def yaw_misread(symptom: GoalMissed) -> Finding | None:
     """The yaw is computed wrongly from the quaternion."""
@@ -172,9 +221,9 @@ def angle_not_wrapped(symptom: GoalMissed) -> Finding | None:
     if symptom.is_at_rest:
         return None
     run = symptom.run
-    far = [step for step in run.truth if run.distance_m(step) > symptom.position_m]
+    far = list(takewhile(symptom.is_far, symptom.way))
     detours = list(long_turns(far, run.bearing_error_rad, _ASTRAY_RAD))
-    turns = abs(turned_rad(run.truth)) / math.tau
+    turns = abs(turned_rad(far)) / math.tau
     if detours:
         times = "once" if len(detours) == 1 else f"{len(detours)} times"
         turned = f"on its way it turned away from the goal, the long way round, {times}"
@@ -188,12 +237,7 @@ def angle_not_wrapped(symptom: GoalMissed) -> Finding | None:
 @explanation(GoalMissed)
 def drove_on(symptom: GoalMissed) -> Finding | None:
     """It was at the goal and drove on."""
-    nearest_m = symptom.run.distance_m(symptom.nearest)
-    if nearest_m > symptom.position_m:
-        return None
-    return symptom.cause(
-        f": it came as near as {metres(nearest_m)}, and drove on", remedy("drove_on")
-    )
+    return symptom.cause(symptom.drove_on, remedy("drove_on")) if symptom.drove_on else None
 
 
 @explanation(GoalMissed)
@@ -207,8 +251,9 @@ def stopped_elsewhere(symptom: GoalMissed) -> Finding | None:
 @explanation(GoalMissed)
 def drives_away(symptom: GoalMissed) -> Finding | None:
     """It drives away from the goal: atan(dy / dx), or x and y exchanged in atan2()."""
-    began_m = symptom.run.distance_m(symptom.run.truth[0])
-    if symptom.run.distance_m(symptom.last) <= began_m:
+    first = symptom.run.truth[0]
+    began_m = symptom.run.distance_m(first)
+    if not symptom.is_far(first) or symptom.run.distance_m(symptom.last) <= began_m:
         return None
     return symptom.cause(f", farther than at the start ({metres(began_m)})", remedy("drives_away"))
 

@@ -120,6 +120,18 @@ def why_rejected(recording: Recording) -> Finding | None:
     )
 
 
+def why_misread(recording: Recording) -> Finding | None:
+    """Commands with a number that ROS misread, such as a numpy.float32; None without any."""
+    for item in commands(recording):
+        twist = item.twist
+        for field, number in (("linear.x", twist.linear_m_s), ("angular.z", twist.angular_rad_s)):
+            if was_integer(number):
+                seen = misread_words(code(field))
+                shown = evidence_at(recording, "command misread", item.time_ns)
+                return Finding(seen, remedy("float_field"), shown)
+    return None
+
+
 @explanation(NotMoved, after=(process_ended,))
 def nothing_published(symptom: NotMoved) -> Finding | None:
     """Nothing was published on the topic of velocity commands."""
@@ -173,13 +185,8 @@ def _fields_not_zero(recording: Recording, topic: str) -> list[str]:
 @explanation(NotMoved)
 def integer_in_command(symptom: NotMoved) -> Finding | None:
     """A float field holds an integer, which ROS misreads."""
-    twist = symptom.first.twist
-    for field, value in (("linear.x", twist.linear_m_s), ("angular.z", twist.angular_rad_s)):
-        if was_integer(value):
-            return Finding(
-                f"{_STILL}: {misread_words(code(field))}", remedy("float_field"), symptom.evidence
-            )
-    return None
+    cause = why_misread(symptom.recording)
+    return cause and cause.after(_STILL)
 
 
 @explanation(NotMoved, general=True)

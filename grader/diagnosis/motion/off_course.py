@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.motion.contact import why_touched
-from grader.diagnosis.motion.no_motion import why_cut_short
+from grader.diagnosis.motion.no_motion import why_cut_short, why_misread
+from grader.diagnosis.no_messages import why_unheard
 from grader.findings.finding import Finding, evidence_at
 from grader.measure.motion.command import commands, is_zero
 from grader.measure.motion.track import speed_plot
@@ -22,7 +23,12 @@ def why_interrupted(recording: Recording) -> Finding | None:
 
 def why_off_course(recording: Recording) -> Finding | None:
     """A cause that lies deeper than the way in which the robot is steered, or None."""
-    return why_interrupted(recording) or why_unsteered(recording)
+    return (
+        why_interrupted(recording)
+        or why_misread(recording)
+        or why_unheard(recording)
+        or why_unsteered(recording)
+    )
 
 
 def why_unsteered(recording: Recording) -> Finding | None:
