@@ -16,13 +16,11 @@ from grader.findings.finding import Evidence, Finding, nodes_seen, until_the_end
 from grader.findings.words import INIT, code, codes
 from grader.measure import declarations
 from grader.recording.interaction import EXECUTOR_SERVICES
-from grader.recording.model import Ending, Node, Process, Recording
+from grader.recording.model import Ending, Process, Recording
 from grader.spec.name import TOPIC
 from grader.spec.nearest_name import meant, nearest
 
 _LOG_LINES = 10
-# Of `ros2 launch` itself, and what the commands of ros2 hide.
-_OF_ROS2 = re.compile(r"/(.*/)?(_.*|launch_ros_\d+)")
 # The name becomes an argument.
 _NAME = re.compile(TOPIC)
 # How the cell calls the wait for a process that it could not start.
@@ -73,7 +71,7 @@ class OtherNode(NotDone, concept="names"):
     @property
     def names(self) -> list[str]:
         """The names of the student's nodes."""
-        return [node.name for node in self.recording.student_nodes]
+        return [node.name for node in self.recording.written_nodes]
 
     @property
     def seen(self) -> str:
@@ -98,11 +96,6 @@ def why_not_node(recording: Recording, name: str) -> Finding | None:
     return why_no_node(recording) or cause_of(OtherNode(recording, name))
 
 
-def written_nodes(recording: Recording) -> list[Node]:
-    """The student's nodes, without those that ROS makes by itself."""
-    return [node for node in recording.student_nodes if not _OF_ROS2.fullmatch(node.name)]
-
-
 def meant_node(recording: Recording, name: str) -> str | None:
     """The name of the one node that a student probably means, or None.
 
@@ -117,7 +110,7 @@ def meant_node(recording: Recording, name: str) -> str | None:
         for call in recording.calls
         if not call.service.endswith(tuple(EXECUTOR_SERVICES))
     }
-    nodes = {node.name for node in written_nodes(recording) if _NAME.fullmatch(node.name)} - asked
+    nodes = {node.name for node in recording.written_nodes if _NAME.fullmatch(node.name)} - asked
     bases = {node: node.rpartition("/")[2] for node in nodes}
     meant_base = meant(name.rpartition("/")[2], bases.values())
     candidates = [node for node in nodes if bases[node] == meant_base]
@@ -205,7 +198,8 @@ def node_never_appeared(symptom: OtherNode) -> Finding | None:
     # A process may declare anything, also what is no text.
     declared = {str(item.data.get("node")) for item in symptom.recording.declared("node")}
     # A process that shows as many nodes as it declared only calls them by other names.
-    if symptom.wanted not in declared or len(declared) <= len(set(symptom.names)):
+    seen = {node.name for node in symptom.recording.student_nodes}
+    if symptom.wanted not in declared or len(declared) <= len(seen):
         return None
     cause = why_never_appeared(symptom.recording, f"the node {code(symptom.wanted)}")
     return cause.after(symptom.seen)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken
 from grader.diagnosis.no_answer import NoAnswer, why_late
 from grader.diagnosis.no_endpoint import SERVICE
-from grader.diagnosis.no_node import why_not_node, written_nodes
+from grader.diagnosis.no_node import why_not_node
 from grader.diagnosis.process.not_called import ANSWER_S
 from grader.diagnosis.process.process_exit import why_ended
 from grader.findings.finding import Evidence, Finding, Moment, evidence_at, moment, nodes_seen
@@ -127,7 +127,7 @@ def why_for_no_node(recording: Recording) -> Finding | None:
     launched = {process.name.rpartition("/")[2] for process in recording.processes} - programs
     if not any(name.endswith(_LAUNCH_FILES) for name in launched):
         return None
-    nodes = [node.name for node in written_nodes(recording)]
+    nodes = [node.name for node in recording.written_nodes]
     entries = [(file.path, *entry) for file in submission.parameter_files for entry in file.nodes]
     lacking = {
         node.rpartition("/")[2]: node

@@ -169,7 +169,7 @@ class Search:
 
     def _seen(self, recording: Recording) -> Iterator[str]:
         variable, of, role = self.variable, self.of, self.role
-        nodes = [node.name for node in recording.student_nodes]
+        nodes = [node.name for node in recording.written_nodes]
         if variable.in_ == "nodes":
             for node in nodes:
                 if all(_does(recording, node, *one) for one in role.parts):

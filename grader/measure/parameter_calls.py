@@ -80,7 +80,7 @@ def undeclared(recording: Recording) -> list[str]:
         for call in recording.calls
         if call.service.endswith("/list_parameters") and call.response is not None
     }
-    nodes = [node.name for node in recording.student_nodes]
+    nodes = [node.name for node in recording.written_nodes]
     if not nodes or not answered.issuperset(nodes):
         return []
     declared = {name for node in nodes for name in names(recording, node)}

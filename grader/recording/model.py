@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from bisect import bisect_left
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -28,6 +29,8 @@ PROBE_NODE = "rosgrade_probe"
 BAG, BAG_NOTES, BAG_RECEIVED = "bag", "bag_notes", "bag_received"
 BAG_RENAMED = "bag_renamed"
 """Keys of ``Recording.environment``, where a bag was read in place of a run."""
+# Of `ros2 launch` itself, what the commands of ros2 hide, and that of a TransformListener in C++.
+_OF_ROS2 = re.compile(r"/(.*/)?(_.*|launch_ros_\d+|transform_listener_impl_[0-9a-f]+)")
 
 
 class Owner(str, Enum):
@@ -415,6 +418,12 @@ class Recording:
     def student_nodes(self) -> tuple[Node, ...]:
         """The student's nodes, in the order of their appearance."""
         return tuple(node for node in self.nodes if node.owner is Owner.STUDENT)
+
+    @cached_property
+    def written_nodes(self) -> tuple[Node, ...]:
+        """The student's nodes without those that ROS makes by itself, unless there are no others."""
+        there = self.student_nodes
+        return tuple(node for node in there if not _OF_ROS2.fullmatch(node.name)) or there
 
     def student_endpoints(self, kind: Kind, topic: str | None = None) -> tuple[Endpoint, ...]:
         """The student's endpoints of a kind, on one topic or on all."""

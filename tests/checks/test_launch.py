@@ -63,9 +63,22 @@ def test_a_node_that_is_not_started_is_named() -> None:
     assert "`/driver`" in text
 
 
+LISTENER = "/transform_listener_impl_55d0ac2bf090"
+
+
 def test_nodes_of_ros2_itself_do_not_count() -> None:
-    run = started("/driver", "/launch_ros_4711", "/_ros2cli_12")
+    run = started("/driver", "/launch_ros_4711", "/_ros2cli_12", LISTENER)
     assert judge("launch.graph", run, nodes=["/driver"]).status is Status.PASSED
+
+
+def test_what_the_node_of_a_transform_listener_in_cpp_subscribes_to_counts() -> None:
+    ends = (
+        endpoint("/tf", kind=Kind.SUBSCRIPTION, node=LISTENER),
+        endpoint("/cmd_vel", kind=Kind.SUBSCRIPTION, node="/_ros2cli_12"),
+    )
+    run = recording(nodes=(node("/driver"), node(LISTENER)), endpoints=ends)
+    for topics, status in ((["/tf"], Status.PASSED), ([], Status.FAILED)):
+        assert judge("launch.graph", run, nodes=["/driver"], topics=topics).status is status
 
 
 def test_topics_that_lack_or_are_too_many_are_named() -> None:

@@ -83,7 +83,7 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
     timer.
     """
     stop_if(why_no_node(recording))
-    nodes = target_nodes(recording) or recording.student_nodes
+    nodes = target_nodes(recording) or recording.written_nodes
     names = list(dict.fromkeys(node.name for node in nodes))
     by_node = [_judged_calls(recording, name, parameters.within) for name in names]
     by_node = [calls for calls in by_node if calls.judged]

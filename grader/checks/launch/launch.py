@@ -9,7 +9,7 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.diagnosis.explanation import mistaken
-from grader.diagnosis.no_node import why_no_node, why_not_node, written_nodes
+from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.process_exit import why_crashed
 from grader.findings.finding import Evidence, Finding, Table, moment, nodes_seen
 from grader.findings.words import code, codes
@@ -48,7 +48,7 @@ def graph(recording: Recording, parameters: Graph) -> Finding:
     stop_if(why_no_node(recording))
     for name in parameters.nodes:
         stop_if(why_not_node(recording, name))
-    started = {node.name for node in written_nodes(recording)}
+    started = {node.name for node in recording.written_nodes}
     evidence = Evidence(moments=nodes_seen(recording))
     others = started.difference(parameters.nodes)
     if others:
@@ -57,7 +57,9 @@ def graph(recording: Recording, parameters: Graph) -> Finding:
         endpoint.topic
         for kind in Kind
         for endpoint in recording.student_endpoints(kind)
-        if endpoint.node in parameters.nodes and "/_" not in endpoint.topic
+        # A TransformListener in C++ subscribes with a node of its own.
+        if (endpoint.node in parameters.nodes or "/_" not in endpoint.node)
+        and "/_" not in endpoint.topic
     }.difference(_OF_EVERY_NODE)
     wanted = topics if parameters.topics is None else set(parameters.topics)
     if topics != wanted:

@@ -114,7 +114,7 @@ def target_nodes(recording: Recording) -> tuple[Node, ...]:
         if item.owner is Owner.STUDENT
         and any(kind is not item.kind and topic == item.topic for kind, topic in ends)
     }
-    return tuple(node for node in recording.student_nodes if node.name in names)
+    return tuple(node for node in recording.written_nodes if node.name in names)
 
 
 class Alive(Parameters):
