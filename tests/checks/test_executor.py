@@ -6,7 +6,7 @@ import pytest
 
 from grader.findings.finding import Status
 from grader.recording.interaction import Service
-from grader.recording.model import Ending
+from grader.recording.model import Ending, Kind, Owner
 from tests.checks.builder import (
     NODE,
     at,
@@ -111,6 +111,15 @@ class TestGood:
             calls=(*calls(), *(call(t, None, of=settings) for t in (1.0, 1.5, 2.0, 2.5))),
         )
         assert responsive(run).status is Status.PASSED
+
+    def test_the_node_of_a_transform_listener_in_cpp_which_answers_nothing(self):
+        listener = "/transform_listener_impl_55d0ac2bf090"
+        ends = [endpoint("/tf", kind=Kind.SUBSCRIPTION, node=listener)]
+        run = recording(nodes=(node(), node(listener)), messages={})
+        unanswered = (call(t, None, of=listener) for t in (1.0, 1.5, 2.0, 2.5))
+        for more in ((), (endpoint("/tf", owner=Owner.PROBE),)):
+            seen = replace(run, endpoints=(*ends, *more), calls=(*run.calls, *unanswered))
+            assert responsive(seen).status is Status.PASSED
 
     def test_a_node_that_publishes_nothing_is_judged_from_its_appearance(self):
         run = recording(messages={}, endpoints=(reader(),))
