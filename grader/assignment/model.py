@@ -133,6 +133,8 @@ class Withheld(Model):
 
 
 NOTHING_WITHHELD = Withheld()
+_IN_CPP = {"rclpy": "rclcpp", "tf2_ros_py": "tf2_ros"}
+"""What takes the place of a package for Python in C++."""
 
 
 class Package(Model):
@@ -147,8 +149,9 @@ class Package(Model):
     )
     depends: tuple[str, ...] = Field(
         (),
-        description="ROS packages that the solution needs; the starter package names them. `rclpy` "
-        "stands for `rclcpp` too if students may write C++.",
+        description="ROS packages that the solution needs; the starter package names them. If "
+        "students may write C++, `rclpy` stands for `rclcpp` too, `tf2_ros_py` for `tf2_ros`, and "
+        "others that begin with `rclcpp` are for C++ only.",
     )
     executables: tuple[str, ...] = Field(
         (), description="Executables that `ros2 run` must find in the package."
@@ -158,6 +161,16 @@ class Package(Model):
     def build_type(self) -> str:
         """The build type of the reference solution and of the starter package."""
         return self.build_types[0]
+
+    @property
+    def depends_in_python(self) -> tuple[str, ...]:
+        """What the solution needs in Python."""
+        return tuple(name for name in self.depends if not name.startswith("rclcpp"))
+
+    @property
+    def depends_in_cpp(self) -> tuple[str, ...]:
+        """What the solution needs in C++."""
+        return tuple(_IN_CPP.get(name, name) for name in self.depends)
 
 
 class Launch(Model):

@@ -19,6 +19,7 @@ from grader.diagnosis.not_generated import InterfaceName
 from grader.errors import UsageError
 from grader.machine import resources
 from grader.report.files import check_folder, write_whole
+from grader.submission.read.rosdistro import UNKNOWN_TO_CMAKE
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -85,6 +86,8 @@ def package_files(
 ) -> dict[str, str]:
     """Make a package around what its programs do."""
     cpp = is_cpp(package)
+    if package.build_type == "ament_python":
+        package = package.model_copy(update={"depends": package.depends_in_python})
     if cpp and "rclcpp" not in package.depends:
         package = package.model_copy(update={"depends": ("rclcpp", *package.depends)})
     if package.build_type == "ament_cmake":
@@ -102,6 +105,7 @@ def package_files(
             description=description,
             programs=programs(package),
             cpp=cpp,
+            found=[one for one in package.depends if one not in UNKNOWN_TO_CMAKE],
             interfaces=interfaces,
         )
     for program in programs(package):
@@ -125,8 +129,8 @@ def in_cpp(package: Package) -> Package:
             f"the assignment takes {package.name} in Python only (build_type: ament_python): leave "
             "out --cpp"
         )
-    depends = tuple("rclcpp" if name == "rclpy" else name for name in package.depends)
-    return package.model_copy(update={"build_types": ("ament_cmake",), "depends": depends})
+    changed = {"build_types": ("ament_cmake",), "depends": package.depends_in_cpp}
+    return package.model_copy(update=changed)
 
 
 def programs(package: Package) -> tuple[Program, ...]:

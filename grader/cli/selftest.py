@@ -29,6 +29,7 @@ from grader.errors import UsageError
 from grader.grading.graded import Graded
 from grader.grading.grading import Grading
 from grader.grading.reference_run import keep_reference
+from grader.grading.type_support import wanted_underlays
 from grader.machine import ros
 from grader.machine.load import cpu_count
 from grader.machine.resources import cache_folder
@@ -36,7 +37,6 @@ from grader.report.files import refuse_part
 from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
 from grader.spec.nearest_name import nearest_or_all
-from grader.submission.underlay.definition import find_underlay
 from grader.submission.underlay.store import UnderlayStore
 
 
@@ -79,8 +79,6 @@ def selftest(
             "--record keeps the recordings of the reference in Python: leave out --cpp"
         )
     language = CPP if cpp else PYTHON
-    if cpp:
-        UnderlayStore(cache_folder(), ros.find()).fetched([find_underlay("rclcpp")])
 
     def is_chosen(trial: Trial) -> bool:
         if record:
@@ -93,6 +91,7 @@ def selftest(
     for name in assignments or list_assignments():
         loaded = load_assignment(name)
         reference = reference_of(loaded.assignment.id, loaded.folder, language)
+        UnderlayStore(cache_folder(), ros.find()).fetched(wanted_underlays(loaded, reference))
         if keep is not None:
             refuse_part(keep, loaded.folder, f"the assignment in {loaded.folder}")
             refuse_part(keep, reference, f"the reference solution in {reference}")

@@ -18,7 +18,7 @@ from grader.machine.scratch import Scratch
 from grader.submission.prepare import needed_packages
 from grader.submission.underlay.building import packages_in
 from grader.submission.underlay.definition import Underlay, find_underlay, packages_of_ros
-from grader.submission.underlay.store import UnderlayStore, on_top
+from grader.submission.underlay.store import CARRIED, MissingUnderlay, UnderlayStore, on_top
 
 _WORD = re.compile(r"\w+")
 _INTERFACES = "share/ament_index/resource_index/rosidl_interfaces"
@@ -37,25 +37,28 @@ def wanted_underlays(loaded: LoadedAssignment, submission: Path | None = None) -
     if submission is not None:
         used = needed_packages(submission, ros)
     else:
-        used = {"rclcpp"} if any(map(_may_be_cpp, loaded.assignment.packages)) else set()
+        packages = loaded.assignment.packages
+        in_cpp = (package for package in packages if "ament_cmake" in package.build_types)
+        used = {
+            name
+            for package in in_cpp
+            for name in {*package.depends_in_cpp} - {*package.depends_in_python}
+        }
     listed = {package for underlay in named for package in underlay.listed}
-    return [*named, *map(packages_of_ros, sorted(used - ros.packages - listed))]
-
-
-def _may_be_cpp(package: Package) -> bool:
-    """Whether students may write nodes in C++ in a package."""
-    has_nodes = "rclpy" in package.depends or "rclcpp" in package.depends
-    return has_nodes and "ament_cmake" in package.build_types
+    carried = {folder.name for folder in CARRIED.iterdir()}
+    more = map(packages_of_ros, sorted(used - ros.packages - listed - carried))
+    return list({underlay.place: underlay for underlay in (*named, *more)}.values())
 
 
 def missing_underlays(loaded: LoadedAssignment) -> list[str]:
-    """What has to be built before an assignment can be graded here, and by which command."""
+    """What has to be built before an assignment can be graded here, and by which one command."""
     try:
         store = UnderlayStore(cache_folder(), find())
     except GraderFault:
         # Without any ROS another message tells what to install first.
         return []
-    return [str(missing) for missing in store.missing(underlays_of(loaded))]
+    missing = store.missing(underlays_of(loaded))
+    return [str(MissingUnderlay(*missing))] if missing else []
 
 
 class TypeSupport:
@@ -76,7 +79,7 @@ class TypeSupport:
             own: Packages of interfaces of the student's own, which the probe has to read.
 
         Raises:
-            MissingUnderlay: The assignment needs one that is not on this machine.
+            MissingUnderlay: The assignment needs some that are not on this machine.
         """
         UnderlayStore(cache, ros).fetched(underlays_of(loaded))
         self._loaded = loaded

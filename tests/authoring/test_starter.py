@@ -14,6 +14,7 @@ from catkin_pkg.package import parse_package_string
 from grader.assignment.load import LoadedAssignment, list_assignments, load_assignment
 from grader.authoring.starter import starter_files, write_starter
 from grader.errors import UsageError
+from grader.machine import resources
 
 LESSON = """\
 rosgrade: 1
@@ -125,6 +126,20 @@ def test_each_assignment_has_a_starter_in_cpp(name: str) -> None:
             (source,) = re.findall(rf"add_executable\({executable} (\S+)\)", cmake)
             assert "rclcpp::spin(" in files[f"{package.name}/{source}"]
             assert f"install(TARGETS {executable}\n  DESTINATION lib/${{PROJECT_NAME}}" in cmake
+
+
+def test_each_language_is_given_what_it_needs() -> None:
+    loaded = load_assignment(resources.root() / "docs/examples/autonomy_stack")
+    depends = {}
+    for cpp in (False, True):
+        files = starter_files(loaded, cpp=cpp)
+        manifest = parse_package_string(files["autonomy/package.xml"])
+        depends[cpp] = {one.name for one in manifest.exec_depends}
+    assert depends[False] - depends[True] == {"rclpy", "tf2_ros_py"}
+    assert depends[True] - depends[False] == {"rclcpp", "rclcpp_lifecycle", "tf2_ros"}
+    # CMake does not find what is built by setup.py.
+    cmake = files["autonomy/CMakeLists.txt"]
+    assert "find_package(tf2_ros REQUIRED)" in cmake and "launch" not in cmake
 
 
 def test_cpp_is_refused_where_an_assignment_takes_python_only(tmp_path: Path) -> None:

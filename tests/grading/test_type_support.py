@@ -44,7 +44,7 @@ def test_rclcpp_is_wanted_where_a_submission_is_or_may_be_in_cpp(
     assert [one.name for one in wanted] == names
 
 
-def test_what_is_only_named_is_not_built_and_what_is_compiled_against_is(
+def test_what_is_only_named_or_carried_along_is_not_built_and_what_is_compiled_against_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     installation = RosInstallation("wheels", tmp_path / "python", (tmp_path,))
@@ -59,9 +59,20 @@ def test_what_is_only_named_is_not_built_and_what_is_compiled_against_is(
     )
     (package / "CMakeLists.txt").write_text(
         "find_package(tf2_ros REQUIRED)\nfind_package(OpenCV REQUIRED)\ninstall(DIRECTORY launch)\n"
+        "find_package(turtlesim REQUIRED)\n"
     )
     wanted = wanted_underlays(load_assignment("timed_publisher"), package)
     assert [one.name for one in wanted] == ["rclcpp_action", "tf2_ros"]
+
+
+def test_what_only_cpp_needs_is_wanted_where_students_may_write_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    installation = RosInstallation("wheels", tmp_path / "python", (tmp_path,))
+    monkeypatch.setattr("grader.grading.type_support.find", lambda: installation)
+    loaded = load_assignment(resources.root() / "docs/examples/autonomy_stack")
+    names = [one.name for one in wanted_underlays(loaded)]
+    assert names == ["tf2", "launch", "rclcpp", "rclcpp_lifecycle", "tf2_ros"]
 
 
 def test_the_copy_is_that_of_the_reference() -> None:

@@ -12,6 +12,8 @@ PACKAGES = frozenset(" ".join(_LISTS["packages"].values()).split())
 """Packages of Jazzy, or of sources that courses build beside it."""
 NOT_IN_JAZZY = frozenset(_LISTS["not in Jazzy"].split())
 """Names that students take from ROS 1, or from a build type, and that are no packages of Jazzy."""
+UNKNOWN_TO_CMAKE = frozenset(_LISTS["unknown to CMake"].split())
+"""Packages of Jazzy that ``find_package()`` does not find, as their setup.py builds them."""
 ROSDEP_KEYS = frozenset(_LISTS["rosdep keys"].split())
 """rosdep keys of system packages; most are known by pattern, in ``dependencies.py``."""
 LIBRARIES: dict[str, str] = _LISTS["libraries"]

@@ -43,13 +43,16 @@ CARRIED = carried_interfaces()
 
 
 class MissingUnderlay(GraderFault):
-    """An underlay is not built on this machine."""
+    """Underlays are not built on this machine."""
 
-    def __init__(self, underlay: Underlay) -> None:
-        """Name it, and the command that builds it."""
+    def __init__(self, *underlays: Underlay) -> None:
+        """Name them, and the one command that builds them."""
+        names = ", ".join(repr(one.name) for one in underlays)
+        is_one = len(underlays) == 1
         super().__init__(
-            f"the underlay {underlay.name!r} is not built here for this ROS installation; "
-            f"to get it: rosgrade underlay add {underlay.given}"
+            f"the underlay{'' if is_one else 's'} {names} {'is' if is_one else 'are'} not built "
+            f"here for this ROS installation; to get {'it' if is_one else 'them'}: "
+            f"rosgrade underlay add {' '.join(one.given for one in underlays)}"
         )
 
 
@@ -102,19 +105,21 @@ class UnderlayStore:
         """Install spaces of those underlays that have to be added; quick, builds nothing.
 
         Raises:
-            MissingUnderlay: One is not built.
+            MissingUnderlay: Some are not built.
         """
         added = [one for one in underlays if not one.folder]
+        if missing := self.missing(added):
+            raise MissingUnderlay(*missing)
         return list(self.lay(added).underlays)
 
-    def missing(self, underlays: Iterable[Underlay]) -> list[MissingUnderlay]:
+    def missing(self, underlays: Iterable[Underlay]) -> list[Underlay]:
         """Those that have to be added and are not there."""
         missing = []
-        for underlay in underlays:
+        for underlay in (one for one in underlays if not one.folder):
             try:
-                self.fetched([underlay])
-            except MissingUnderlay as error:
-                missing.append(error)
+                self.lay([underlay])
+            except MissingUnderlay:
+                missing.append(underlay)
         return missing
 
     def add(self, underlays: Sequence[Underlay], answer_s: float) -> list[str]:

@@ -74,10 +74,14 @@ def test_what_is_missing_is_a_fault_of_ours_with_the_command_that_gets_it(
     store = UnderlayStore(tmp_path, named_ros)
     with pytest.raises(MissingUnderlay, match=r"rosgrade underlay add tf2$"):
         store.lay([find_underlay("tf2")])
-    assert [str(one) for one in store.missing([find_underlay("launch")])] == [
+    asked = [find_underlay(name) for name in ("launch", "tf2")]
+    assert store.missing(asked) == asked
+    assert str(MissingUnderlay(asked[0])) == (
         "the underlay 'launch' is not built here for this ROS installation; to get it: "
         "rosgrade underlay add launch"
-    ]
+    )
+    with pytest.raises(MissingUnderlay, match=r"'launch', 'tf2' are .* add launch tf2$"):
+        store.fetched(asked)
 
 
 def test_two_versions_of_a_package_are_refused_before_anything_is_built(
