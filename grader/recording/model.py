@@ -421,7 +421,7 @@ class Recording:
 
     @cached_property
     def written_nodes(self) -> tuple[Node, ...]:
-        """The student's nodes without those that ROS makes by itself; all if there are no others."""
+        """The student's nodes but those that ROS makes by itself; all if there are no others."""
         there = self.student_nodes
         return tuple(node for node in there if not _OF_ROS2.fullmatch(node.name)) or there
 
