@@ -9,7 +9,6 @@ from pathlib import Path
 
 from grader.assignment.interfaces import FOLDER, FOLDERS, write_interfaces
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.model import Package
 from grader.errors import GraderFault
 from grader.grading.own_interfaces import OWN, Definitions, write_packages
 from grader.machine.resources import cache_folder
