@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from grader.assignment.contract.expand import expanded_with
 from grader.assignment.load import LoadedAssignment, bound_checks
 from grader.assignment.model import Visibility, Withheld
-from grader.assignment.mutant import required_by
 from grader.assignment.repeat import with_runs
 from grader.assignment.variable import Values
 from grader.checks.check import Subject
@@ -59,6 +58,18 @@ def select(
         }
     )
     return dataclasses.replace(loaded, assignment=assignment, checks=tuple(parts))
+
+
+def required_by(check: str, requires: Mapping[str, tuple[str, ...]]) -> set[str]:
+    """Everything that a check requires, directly or not; without itself."""
+    required: set[str] = set()
+    waiting = list(requires.get(check, ()))
+    while waiting:
+        name = waiting.pop()
+        if name not in required:
+            required.add(name)
+            waiting.extend(requires.get(name, ()))
+    return required - {check}
 
 
 def visible_part(loaded: LoadedAssignment) -> LoadedAssignment:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from grader.assignment.load import ASSIGNMENT_FILE
 from grader.assignment.model import Package
-from grader.assignment.mutant import CPP, PYTHON
+from grader.assignment.reference import CPP, PYTHON
 from grader.authoring.starter import package_files, programs, rendered
 from grader.errors import UsageError
 from grader.report.files import check_folder, write_whole

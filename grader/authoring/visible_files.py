@@ -12,7 +12,7 @@ from grader.assignment.contract.table import with_table
 from grader.assignment.lesson_checks import FOLDER, lesson_checks
 from grader.assignment.load import ASSIGNMENT_FILE, LoadedAssignment
 from grader.assignment.model import Assignment, Visibility
-from grader.assignment.mutant import LANGUAGES
+from grader.assignment.reference import LANGUAGES
 from grader.assignment.repeat import runs_of
 from grader.assignment.selection import visible_part
 from grader.grading.reference_run import REFERENCE_FILE, only_scenarios

@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from grader.assignment.load import list_assignments, load_assignment
-from grader.assignment.mutant import CPP, PYTHON, reference_of
+from grader.assignment.reference import CPP, PYTHON, reference_of
 from grader.authoring.mutants.selftest import (
     Role,
     Setup,

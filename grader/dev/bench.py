@@ -24,7 +24,7 @@ from statistics import median
 from typing import Any
 
 from grader.assignment.load import load_assignment
-from grader.assignment.mutant import reference_of
+from grader.assignment.reference import reference_of
 from grader.grading.files import write_graded
 from grader.grading.graded import RECORDINGS_FOLDER
 from grader.grading.grading import Grading

@@ -8,8 +8,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+from grader.assignment.changed_reference import apply
 from grader.assignment.load import load_assignment
-from grader.assignment.mutant import apply, load_mutants
+from grader.assignment.mutant_file import load_mutants
 
 ASSIGNMENT = "timed_publisher"
 BROKEN = "sleeps_in_main"

@@ -23,7 +23,7 @@ from itertools import product
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment, load_assignment
-from grader.assignment.mutant import CPP, PYTHON, Language, reference_of
+from grader.assignment.reference import CPP, PYTHON, Language, reference_of
 from grader.authoring.mutants.selftest import Role, Setup, Trial, TrialResult, run_trial, trials
 from grader.grading.grading import Grading
 from grader.machine import ros

@@ -14,8 +14,8 @@ from graphlib import TopologicalSorter
 from grader.assignment.binding import BoundCheck
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Counts, Scenario
-from grader.assignment.mutant import required_by
 from grader.assignment.random_values import fixed_values
+from grader.assignment.selection import required_by
 from grader.checks.check import Subject
 from grader.checks.parameter.parameter import PARAMETERS_GIVEN
 from grader.diagnosis.not_built import why_not_built

@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.mutant import CPP, LANGUAGES, reference_of
+from grader.assignment.reference import CPP, LANGUAGES, reference_of
 from grader.authoring.starter import starter_files
 from grader.batch.ledger import Entry, Ledger
 from grader.errors import RosgradeError, UsageError

@@ -8,16 +8,10 @@ from xml.etree import ElementTree
 
 import pytest
 
+from grader.assignment.changed_reference import apply
 from grader.assignment.load import LoadedAssignment, list_assignments, load_assignment
-from grader.assignment.mutant import (
-    CPP,
-    LANGUAGES,
-    Language,
-    Mutants,
-    apply,
-    load_mutants,
-    reference_of,
-)
+from grader.assignment.mutant_file import Mutants, load_mutants
+from grader.assignment.reference import CPP, LANGUAGES, Language, reference_of
 from grader.authoring.mutants.standard import with_standard_mutants
 from grader.checks.check import Subject
 from grader.machine import resources

@@ -6,14 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from grader.assignment.changed_reference import mutate
+from grader.assignment.expected_statuses import deviations, expected_statuses
 from grader.assignment.model import Assignment
-from grader.assignment.mutant import (
-    Mutant,
-    Variant,
-    deviations,
-    expected_statuses,
-    mutate,
-)
+from grader.assignment.mutant import Mutant, Variant
 from grader.findings.finding import Status
 
 FILES = {

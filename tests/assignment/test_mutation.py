@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from grader.assignment.changed_reference import apply
 from grader.assignment.model import Assignment
-from grader.assignment.mutant import CPP, apply, load_mutants, reference_of
+from grader.assignment.mutant_file import load_mutants
+from grader.assignment.reference import CPP, reference_of
 from grader.errors import AssignmentError, UsageError
 from grader.spec.source import parse_source
 from tests.assignment.lessons import HEAD

@@ -90,7 +90,7 @@ def told_by(contract: Contract) -> dict[str, list[str]]:
     """The checks that hold what a row of the contract's table promises, by the row."""
     found: dict[str, list[str]] = {}
     for row in rows(contract):
-        for one in Derivation(contract).kept:
+        for one in Derivation(contract).judged:
             if one.place == row.place and one.fact.name in row.facts:
                 found.setdefault(str(row), []).append(one.id)
     return found

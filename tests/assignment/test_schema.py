@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from grader.assignment.load import load_assignment
-from grader.assignment.mutant import PYTHON
+from grader.assignment.reference import PYTHON
 from grader.assignment.schema import assignment_schema, mutants_schema
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check

@@ -17,7 +17,7 @@ import yaml
 from hatchling.builders.wheel import WheelBuilder
 
 from grader.assignment.load import list_assignments, load_assignment
-from grader.assignment.mutant import LANGUAGES, reference_of
+from grader.assignment.reference import LANGUAGES, reference_of
 from grader.assignment.selection import visible_part
 from grader.authoring.course_kit import write_kit
 from grader.authoring.starter import starter_files
@@ -329,7 +329,8 @@ def test_the_solutions_that_instructors_install_beside_it_are_found(tmp_path: Pa
             wheel.extractall(site)
     code = (
         "from grader.machine import resources; from grader.assignment.load import *\n"
-        "from grader.assignment.mutant import *\n"
+        "from grader.assignment.mutant_file import *\n"
+        "from grader.assignment.reference import LANGUAGES\n"
         "for name in list_assignments():\n"
         "    loaded = load_assignment(name)\n"
         "    for language in LANGUAGES:\n"

@@ -9,7 +9,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from grader.assignment.mutant import Mutant, mutate
+from grader.assignment.changed_reference import mutate
+from grader.assignment.mutant import Mutant
 from grader.authoring.mutants.manifest import CHANGES, EDITS, Files, PackageFiles, misspelt
 from grader.checks.catalogue import CATALOGUE
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import pytest
 
 from grader.assignment.load import list_assignments, load_assignment
-from grader.assignment.mutant import reference_of
+from grader.assignment.reference import reference_of
 from grader.authoring.mutants.selftest import Role, Setup, Trial, mutation_score, selftest, trials
 from grader.grading.grading import Grading
 from grader.grading.type_support import missing_underlays

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from grader.assignment.load import list_assignments, load_assignment
-from grader.assignment.mutant import CPP, LANGUAGES, PYTHON, Language, read_files, reference_of
+from grader.assignment.reference import CPP, LANGUAGES, PYTHON, Language, read_files, reference_of
 from grader.authoring.mutants.standard import Standard, standard_mutants
 
 

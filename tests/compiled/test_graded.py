@@ -10,7 +10,7 @@ from typing import NamedTuple
 import pytest
 
 from grader.assignment.load import load_assignment
-from grader.assignment.mutant import CPP, PYTHON
+from grader.assignment.reference import CPP, PYTHON
 from grader.authoring.mutants.selftest import Role, Setup, TrialResult, selftest, trials
 from grader.findings.finding import Status
 from grader.grading.graded import Graded

@@ -15,8 +15,9 @@ from pathlib import Path
 
 import pytest
 
+from grader.assignment.changed_reference import apply
 from grader.assignment.load import load_assignment
-from grader.assignment.mutant import apply, load_mutants
+from grader.assignment.mutant_file import load_mutants
 from grader.dev.demo import ASSIGNMENT, BROKEN
 from grader.machine import resources
 

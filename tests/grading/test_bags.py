@@ -11,8 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from grader.assignment.changed_reference import apply, mutate
 from grader.assignment.load import load_assignment
-from grader.assignment.mutant import Edits, apply, load_mutants, mutate, read_files
+from grader.assignment.mutant import Edits
+from grader.assignment.mutant_file import load_mutants
+from grader.assignment.reference import read_files
 from grader.assignment.selection import select
 from grader.dev.bag import bag_of
 from grader.errors import AssignmentError

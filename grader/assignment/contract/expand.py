@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from grader.assignment.contract.derive import Derivation, Derived
+from grader.assignment.contract.derive import Derivation, StandardCheck
 from grader.assignment.contract.model import Contract
 from grader.assignment.variable import Values, filled
 from grader.errors import AssignmentError
@@ -124,7 +124,7 @@ def _misfits(source: Source, derivation: Derivation) -> Iterator[tuple[Place, st
             yield (key,), "expected a list: each entry begins with '- '"
     if "packages" in source.data:
         yield ("packages",), "the packages stand in the contract: leave 'packages' out"
-    standard_ids = [check.id for check in derivation.kept]
+    standard_ids = [check.id for check in derivation.judged]
     authors_checks = source.data.get("checks")
     if not isinstance(authors_checks, list):
         return
@@ -153,13 +153,13 @@ def _packages(contract: Contract) -> Iterator[_Made]:
 
 def _checks(source: Source, derivation: Derivation) -> Iterator[_Made]:
     """The standard checks, as entries of ``checks``."""
-    for check in derivation.kept:
+    for check in derivation.judged:
         entry = derivation.entry(check)
         yield _Made(entry, check.place, dict(_changed(source, check, entry)))
 
 
 def _changed(
-    source: Source, check: Derived, entry: Mapping[str, Any]
+    source: Source, check: StandardCheck, entry: Mapping[str, Any]
 ) -> Iterator[tuple[Place, Place]]:
     """What of a standard check its author wrote under its id, with where it is written."""
     for key, value in entry.items():

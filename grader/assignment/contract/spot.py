@@ -37,6 +37,10 @@ class Fact:
         asked: Gives what the check is asked about a part.
         requires: Facts whose checks must pass first, of this part or of those around it.
         weight: Its share of the points, where the contract gives only their sum.
+        requires_in_depends: The same of this package, else of packages that it depends on.
+        may_take_remap_over: Whether its check puts a nearly right name right, where the check
+            before it that does so is not judged.
+        is_before_runs: Whether its check is judged without a scenario though it is a program's.
     """
 
     name: str
@@ -46,6 +50,9 @@ class Fact:
     hint: str | Words
     requires: tuple[str, ...] = ()
     weight: int = 1
+    requires_in_depends: tuple[str, ...] = ()
+    may_take_remap_over: bool = False
+    is_before_runs: bool = False
 
 
 @dataclass(frozen=True)

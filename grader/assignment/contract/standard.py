@@ -145,7 +145,8 @@ PACKAGE = (
         _built,
         "The package{of_package} builds with colcon",
         "Run `colcon build` in your workspace (the folder above src) and read its first error.",
-        requires=("package", "generated"),
+        requires=("package",),
+        requires_in_depends=("generated",),
     ),
     Fact(
         "dependencies",
@@ -176,6 +177,7 @@ PROGRAM = (
         ),
         requires=("builds",),
         weight=2,
+        is_before_runs=True,
     ),
     Fact(
         "starts",
@@ -243,6 +245,7 @@ PUBLICATION = (
         ),
         requires=("topic",),
         weight=2,
+        may_take_remap_over=True,
     ),
     Fact(
         "qos",
@@ -360,6 +363,7 @@ SUBSCRIPTION = (
         ),
         requires=("subscribes",),
         weight=2,
+        may_take_remap_over=True,
     ),
     Fact(
         "subscribed_qos",

@@ -14,18 +14,12 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
+from grader.assignment.changed_reference import apply
+from grader.assignment.expected_statuses import deviations, expected_statuses
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.mutant import (
-    CPP,
-    PYTHON,
-    Change,
-    Language,
-    Mutant,
-    apply,
-    deviations,
-    expected_statuses,
-    load_mutants,
-)
+from grader.assignment.mutant import Change, Mutant
+from grader.assignment.mutant_file import load_mutants
+from grader.assignment.reference import CPP, PYTHON, Language
 from grader.authoring.mutants.standard import with_standard_mutants
 from grader.authoring.starter import write_starter
 from grader.findings.finding import Status

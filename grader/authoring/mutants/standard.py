@@ -17,17 +17,10 @@ from xml.etree import ElementTree
 
 from grader.assignment.binding import BoundCheck
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.mutant import (
-    LANGUAGES,
-    Language,
-    Mutant,
-    Mutants,
-    has_standard_mutants,
-    load_mutants,
-    read_files,
-    reference_of,
-    required_by,
-)
+from grader.assignment.mutant import Mutant
+from grader.assignment.mutant_file import Mutants, has_standard_mutants, load_mutants
+from grader.assignment.reference import LANGUAGES, Language, read_files, reference_of
+from grader.assignment.selection import required_by
 from grader.authoring.mutants import manifest
 from grader.authoring.mutants.manifest import Files, PackageFiles
 from grader.authoring.mutants.misbehaviour import RULES, RunCheck

@@ -10,8 +10,9 @@ from functools import cache
 
 import pytest
 
+from grader.assignment.changed_reference import apply
 from grader.assignment.load import load_assignment
-from grader.assignment.mutant import apply, load_mutants
+from grader.assignment.mutant_file import load_mutants
 from grader.gradebook.similarity import (
     FEWEST,
     all_hashes,
