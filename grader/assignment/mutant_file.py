@@ -1,7 +1,4 @@
-"""Loading the mutants of an assignment from ``mutants.yaml`` and ``mutants_cpp.yaml``.
-
-``mutants_cpp.yaml`` holds what there is only for C++.
-"""
+"""Loading the mutants of an assignment from ``mutants.yaml`` and ``mutants_cpp.yaml``."""
 
 from __future__ import annotations
 
@@ -59,7 +56,7 @@ def load_mutants(
             is_default = file_language is language
             reader = _Reader(read_source(file), language, is_default, assignment, files)
             mutants = _joined(mutants, reader.read())
-    if not mutants.mutants and not has_standard_mutants(assignment):
+    if not mutants.mutants and assignment.contract is None:
         source = read_source(folder / language.mutants)
         problem = source.problem(("mutants",), "there is no mutant")
         raise AssignmentError(source.file, [problem])
@@ -80,11 +77,6 @@ def _joined(first: Mutants, second: Mutants) -> Mutants:
         variants=first.variants + second.variants,
         derived={**first.derived, **second.derived},
     )
-
-
-def has_standard_mutants(assignment: Assignment) -> bool:
-    """Whether mutants follow from the assignment."""
-    return assignment.contract is not None
 
 
 @dataclass(frozen=True)
@@ -123,8 +115,8 @@ class _Reader:
         ]
         if problems:
             raise AssignmentError(self.source.file, in_order(problems))
-        read = tuple(mutants.values()), tuple(variants.values())
-        return Mutants(self.source.file, Path(), *read, content.derived)
+        changes = tuple(mutants.values()), tuple(variants.values())
+        return Mutants(self.source.file, Path(), *changes, content.derived)
 
     def _in_language(
         self, key: str, entries: Iterable[_C], default_file: str | None
@@ -138,8 +130,7 @@ class _Reader:
             edits = entry.edits_under(self.language.key)
             names_no_language = entry.python is None and entry.cpp is None
             if edits is not None:
-                place: Place = (key, index, self.language.key)
-                changes[place] = _with_edits(entry, edits, default_file)
+                changes[(key, index, self.language.key)] = _with_edits(entry, edits, default_file)
             elif self.is_default and (entry.has_edits or names_no_language):
                 # One that changes nothing at all is read too, so that its author is told.
                 changes[key, index] = _with_edits(entry, entry, default_file)
@@ -154,7 +145,6 @@ class _Reader:
                 yield self.source.problem((key, index), text)
 
     def _misfits(self, changes: Mapping[Place, Change]) -> Iterator[Problem]:
-        """Edits that do not apply to the reference."""
         for place, change in changes.items():
             for inside, text in mutate(change, self.files)[1]:
                 yield self.source.problem((*place, *inside), text)

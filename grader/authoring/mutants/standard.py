@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 from grader.assignment.binding import BoundCheck
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.mutant import Mutant
-from grader.assignment.mutant_file import Mutants, has_standard_mutants, load_mutants
+from grader.assignment.mutant_file import Mutants, load_mutants
 from grader.assignment.reference import LANGUAGES, Language, read_files, reference_of
 from grader.assignment.selection import required_by
 from grader.authoring.mutants import manifest
@@ -59,7 +59,7 @@ def with_standard_mutants(loaded: LoadedAssignment, written: Mutants) -> tuple[S
     Raises:
         AssignmentError: The author wrote a mutant with the id of one.
     """
-    if not has_standard_mutants(loaded.assignment):
+    if loaded.assignment.contract is None:
         return ()
     standard = standard_mutants(loaded, read_files(written.reference))
     ids = {one.mutant.id for one in standard}
@@ -112,7 +112,7 @@ def _has_mutants(loaded: LoadedAssignment, language: Language) -> bool:
         reference_of(loaded.assignment.id, loaded.folder, language)
     except UsageError:
         return False
-    return has_standard_mutants(loaded.assignment)
+    return loaded.assignment.contract is not None
 
 
 def standard_mutants(loaded: LoadedAssignment, files: Mapping[str, bytes]) -> tuple[Standard, ...]:
