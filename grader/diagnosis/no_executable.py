@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from grader.diagnosis.explanation import Symptom, cause_of, explanation, mistaken
-from grader.diagnosis.not_built import existing_package, why_not_built
+from grader.diagnosis.no_package import existing_package
+from grader.diagnosis.not_built import why_not_built
 from grader.findings.finding import Evidence, Finding
 from grader.findings.words import code, codes
 from grader.recording.submission import CPP, PYTHON, PackageRecord, SourceError, SubmissionRecord

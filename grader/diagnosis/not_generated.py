@@ -7,7 +7,8 @@ from functools import cached_property
 from pathlib import PurePosixPath
 
 from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation, mistaken, remedy
-from grader.diagnosis.not_built import existing_package, why_no_package, why_not_built
+from grader.diagnosis.no_package import existing_package, why_no_package
+from grader.diagnosis.not_built import why_not_built
 from grader.findings.finding import Evidence, Finding, Status
 from grader.findings.words import code, codes
 from grader.recording.interface import DefinitionError, sections_of

@@ -15,7 +15,7 @@ Starting >>> other
 running egg_info
 Finished <<< other [0.30s]
 Starting >>> bot_publisher
-\x1b[31mTraceback (most recent call last):\x1b[0m
+Traceback (most recent call last):
   File "src/bot_publisher/setup.py", line 12, in <module>
     x
 NameError: name 'x' is not defined
@@ -120,7 +120,7 @@ class TestBuilds:
         finding = self.found(build=failed_build("notes", NAME, culprit=other, log=log))
         assert "src/notes/setup.py:1: RuntimeError: not finished" in finding.observed
 
-    def test_the_log_is_the_packages_own_without_colour_and_chatter(self):
+    def test_the_log_is_the_packages_own_without_chatter(self):
         finding = self.found(build=failed_build(NAME))
         assert finding.evidence.log == (
             "Traceback (most recent call last):",
@@ -128,6 +128,11 @@ class TestBuilds:
             "    x",
             "NameError: name 'x' is not defined",
         )
+
+    def test_the_log_is_not_that_of_a_package_whose_name_begins_the_same(self):
+        log = f"{LOG}Starting >>> {NAME}_msgs\nanother\nFailed   <<< {NAME}_msgs [1s]\n"
+        finding = self.found(build=failed_build(NAME, log=log))
+        assert finding.evidence.log[-1] == "NameError: name 'x' is not defined"
 
     def test_the_log_ends_at_the_first_error(self):
         noise = "subprocess.CalledProcessError: Command '...' returned non-zero exit status 1."

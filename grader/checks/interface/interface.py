@@ -29,7 +29,7 @@ from grader.checks.interface.definition_differences import (
 )
 from grader.checks.wrong_name import Named
 from grader.diagnosis.explanation import mistaken
-from grader.diagnosis.not_built import existing_package, why_no_manifest
+from grader.diagnosis.no_package import existing_package, why_no_manifest
 from grader.diagnosis.not_generated import (
     GENERATORS,
     GROUP,

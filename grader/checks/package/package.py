@@ -19,14 +19,13 @@ from grader.checks.need import Need, StudentTests, Submitted
 from grader.checks.wrong_name import Named
 from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_executable import why_no_executable, why_nothing_to_run
-from grader.diagnosis.not_built import (
+from grader.diagnosis.no_package import (
     breach_of_rep_144,
     existing_package,
     why_misnamed,
     why_no_manifest,
-    why_not_built,
-    why_too_new,
 )
+from grader.diagnosis.not_built import why_not_built, why_too_new
 from grader.diagnosis.wrong_dependencies import why_unknown_imports, why_wrong_dependencies
 from grader.findings.finding import Evidence, Finding
 from grader.findings.words import code, codes, counted, worded

@@ -9,7 +9,8 @@ from pydantic import Field, field_validator
 from grader.checks.check import stop_if
 from grader.checks.package.package import OfPackage
 from grader.diagnosis.explanation import mistaken
-from grader.diagnosis.not_built import existing_package, why_no_package, why_too_new
+from grader.diagnosis.no_package import existing_package, why_no_package
+from grader.diagnosis.not_built import why_too_new
 from grader.findings.finding import Evidence, Finding
 from grader.findings.words import code, percent
 from grader.recording.submission import (
