@@ -362,33 +362,45 @@ CASES: list[Group] = [
         "log.follows",
         LOGS,
         {
-            "NotLogged.not_delivered": logging(endpoints=(stimulus(),)),
-            "NotLogged.process_ended": logging(processes=(died(1, 3.0),)),
-            "NotLogged.too_few_sent": logging(sent=sent([1.0], values=[{"data": 1.5}])),
-            "NotLogged.no_cpu_time": logging(disturbance=BUSY, calls=()),
-            "NotLogged.subscription_destroyed": logging(
+            "ReceivedNotLogged.not_delivered": logging(endpoints=(stimulus(),)),
+            "ReceivedNotLogged.process_ended": logging(processes=(died(1, 3.0),)),
+            "ReceivedNotLogged.too_few_sent": logging(sent=sent([1.0], values=[{"data": 1.5}])),
+            "ReceivedNotLogged.no_cpu_time": logging(disturbance=BUSY, calls=()),
+            "ReceivedNotLogged.subscription_destroyed": logging(
                 endpoints=(gone(LISTENER, 3.0), stimulus())
             ),
-            "NotLogged.callback_raised": logging(log=SURVIVED),
-            "NotLogged.never_spun": logging(declarations=declarations(spin=False)),
-            "NotLogged.blocked_executor": logging(calls=HANGS),
-            "NotLogged.output_dropped": logging(processes=(process(dropped_bytes=9),)),
-            "NotLogged.slow_callbacks": logging("hm", calls=builder.calls(0.9)),
-            "NotLogged.only_some_logged": logging(
+            "ReceivedNotLogged.callback_raised": logging(log=SURVIVED),
+            "ReceivedNotLogged.never_spun": logging(declarations=declarations(spin=False)),
+            "ReceivedNotLogged.blocked_executor": logging(calls=HANGS),
+            "ReceivedNotLogged.output_dropped": logging(processes=(process(dropped_bytes=9),)),
+            "ReceivedNotLogged.slow_callbacks": logging("hm", calls=builder.calls(0.9)),
+            "ReceivedNotLogged.only_some_logged": logging(
                 log=output("12.34", time_s=1.01) + output("12.34", time_s=1.31)
             ),
-            "NotLogged.no_f_string": logging("x = {msg.data}"),
-            "NotLogged.other_values": logging("x = 5.67"),
-            "NotLogged.nothing_logged": logging(),
+            "ReceivedNotLogged.no_f_string": logging("x = {msg.data}"),
+            "ReceivedNotLogged.other_values": logging("x = 5.67"),
+            "ReceivedNotLogged.nothing_logged": logging(),
         },
     ),
     (
         "log.follows",
         {**LOGS, "sent": "before_launch"},
         {
-            "NotLogged.no_history": logging(
+            "ReceivedNotLogged.no_history": logging(
                 sent=sent(every(-0.1, 5, -0.1), values=[{"data": 12.34}] * 5)
             ),
+        },
+    ),
+    (
+        "log.follows",
+        {**LOGS, "own": True},
+        {
+            f"PublishedNotLogged.{name}": logging(
+                messages=messages(every(0.3, count, 1.0), {"data": 12.34}, topic="/chatter"),
+                sent={},
+                endpoints=(endpoint("/chatter"),),
+            )
+            for name, count in {"too_few_published": 1, "own_not_logged": 5}.items()
         },
     ),
     (

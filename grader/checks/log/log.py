@@ -12,7 +12,7 @@ from pydantic import Field
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.need import SentOrOwn
 from grader.diagnosis.explanation import cause_of, mistaken
-from grader.diagnosis.no_log import NotLogged
+from grader.diagnosis.no_log import PublishedNotLogged, ReceivedNotLogged
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.not_called import Uncalled, slow_callbacks
 from grader.findings.finding import Evidence, Finding, endpoints_seen, evidence_at
@@ -126,7 +126,8 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     wanted = wanted_values(messages, parameters.fields, ready_ns, sooner_ns)
     logged = echoes(recording, wanted, parameters.decimals, within_ns)
     if len(logged) < parameters.at_least:
-        symptom = NotLogged(
+        not_logged = PublishedNotLogged if parameters.own else ReceivedNotLogged
+        symptom = not_logged(
             recording,
             parameters.topic,
             wanted,
@@ -134,7 +135,6 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
             needed=parameters.at_least,
             decimals=parameters.decimals,
             within_ns=within_ns,
-            own=parameters.own,
         )
         return cause_of(symptom)
     stop_if(_why_too_seldom(recording, parameters, wanted, logged))
