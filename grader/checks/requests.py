@@ -16,7 +16,7 @@ from grader.diagnosis.explanation import mistaken
 from grader.diagnosis.no_endpoint import (
     ACTION,
     SERVICE,
-    Word,
+    EntityKind,
     meant_endpoint,
     offered,
     why_not_met,
@@ -40,28 +40,28 @@ class Offered(Named):
     """Part of the parameters of the checks that a service or an action is offered."""
 
     doubt = Doubt.ANSWER_MISSED
-    word: ClassVar[Word]
+    kind: ClassVar[EntityKind]
 
     type: InterfaceName | None = Field(
         None, description="Its interface, as `ros2 interface list` shows it; by default any."
     )
 
     def _asked(self) -> str:
-        article = "an" if self.word is ACTION else "a"
+        article = "an" if self.kind is ACTION else "a"
         type_ = f" of {code(self.type)}" if self.type else ""
-        return f"{article} {self.word.noun} {code(self.asked_name[1])}{type_}"
+        return f"{article} {self.kind.noun} {code(self.asked_name[1])}{type_}"
 
 
 def is_offered(recording: Recording, parameters: Offered) -> Finding:
     """The finding of a check that a node of the student offers a service or action."""
-    word, (_, name) = parameters.word, parameters.asked_name
-    cause = why_not_offered(recording, word, name, parameters.type)
-    servers = offered(recording, word, name)
+    kind, (_, name) = parameters.kind, parameters.asked_name
+    cause = why_not_offered(recording, kind, name, parameters.type)
+    servers = offered(recording, kind, name)
     times_s = [recording.since_launch_s(one.appeared_ns) for one in servers[:1]]
-    shown = Evidence(moments=tuple(Moment(f"{word.noun} {name} appeared", s) for s in times_s))
-    meant = meant_endpoint(recording, word, name, parameters.type)
+    shown = Evidence(moments=tuple(Moment(f"{kind.noun} {name} appeared", s) for s in times_s))
+    meant = meant_endpoint(recording, kind, name, parameters.type)
     stop_if(misnamed(recording, parameters, cause, meant, shown))
-    stop_if(why_withdrawn(recording, f"the {word.noun} {code(name)}", servers))
+    stop_if(why_withdrawn(recording, f"the {kind.noun} {code(name)}", servers))
     found = servers[0]
     return Finding.as_asked(
         f"{code(found.node)} offers it, with the type {code(found.type)}, seen {times_s[0]:.2f} s "
@@ -72,7 +72,7 @@ def is_offered(recording: Recording, parameters: Offered) -> Finding:
 
 def judged_requests(
     recording: Recording,
-    kind: Word,
+    kind: EntityKind,
     name: str,
     sent: Sequence[Request],
     fields: Mapping[str, Any],

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 from grader.diagnosis.explanation import cause_of, explanation, mistaken
-from grader.diagnosis.no_endpoint import Word, offered
+from grader.diagnosis.no_endpoint import EntityKind, offered
 from grader.diagnosis.process.not_called import (
     NotCalled,
     at_its_place,
@@ -35,7 +35,7 @@ class NoAnswer(NotCalled, concept="executors"):
     """
 
     what: str
-    server: Word
+    server: EntityKind
     name: str
     asked_ns: int
     within_s: float

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
 
 from grader.diagnosis.destroyed_endpoint import why_dropped
 from grader.diagnosis.explanation import cause_of, explanation, mistaken
@@ -31,20 +34,32 @@ _FUNCTION = re.compile(r"(\w+)(?:<\{full\}>)?\(")
 _NAME = re.compile(TOPIC)
 
 
+class Entity(NamedTuple):
+    """One publisher, subscription, server or client that a node of the student has."""
+
+    node: str
+    name: str
+    type: str
+
+
 @dataclass(frozen=True)
-class Word:
-    """How an endpoint, a server or a client is called, and made.
+class EntityKind:
+    """What a node can have in the ROS graph: how one is called, made and found.
 
     Attributes:
         does: What a node does that has one, before its name.
         python: The code that makes one; ``{type}`` and ``{name}`` stand for its own.
         cpp: The same, with ``{full}``: the type with its package.
+        entities: The student's in a recording, without what every node has.
+        endpoint: The kind of endpoint that it is on a topic, if it is one.
     """
 
     noun: str
     does: str
     python: str
     cpp: str
+    entities: Callable[[Recording], list[Entity]]
+    endpoint: Kind | None = None
 
     @property
     def functions(self) -> frozenset[str]:
@@ -52,46 +67,82 @@ class Word:
         return frozenset(_FUNCTION.findall(f"{self.python} {self.cpp}"))
 
 
-PUBLISHER = Word(
+def _on_topics(kind: Kind, recording: Recording) -> list[Entity]:
+    ends = recording.student_endpoints(kind)
+    return [Entity(end.node, end.topic, end.type) for end in ends if end.topic not in OWN_TOPICS]
+
+
+def _services(services: Iterable[Service]) -> list[Entity]:
+    """Those that the student wrote: no node's own ones, and none that an action brings along."""
+    return [Entity(one.node, one.name, one.type) for one in services if not _is_own(one)]
+
+
+def _is_own(service: Service) -> bool:
+    prefix, _, base = service.name.rpartition("/")
+    of_node = prefix == service.node and _OWN_SERVICE.fullmatch(base) is not None
+    return of_node or "/_action/" in service.name
+
+
+def _actions(services: Iterable[Service]) -> list[Entity]:
+    return [Entity(one.node, one.name, one.type) for one in _with_goals(services)]
+
+
+def _with_goals(services: Iterable[Service]) -> Iterable[Service]:
+    """The services that take goals, with the names and types of their actions."""
+    for service in services:
+        if service.name.endswith(_SEND_GOAL):
+            name, type_ = service.name.removesuffix(_SEND_GOAL), service.type
+            yield replace(service, name=name, type=type_.removesuffix("_SendGoal"))
+
+
+PUBLISHER = EntityKind(
     "publisher",
     "publishes on",
     python="self.create_publisher({type}, '{name}', 10)",
     cpp='this->create_publisher<{full}>("{name}", 10)',
+    entities=partial(_on_topics, Kind.PUBLISHER),
+    endpoint=Kind.PUBLISHER,
 )
-SUBSCRIPTION = Word(
+SUBSCRIPTION = EntityKind(
     "subscription",
     "subscribes to",
     python="self.create_subscription({type}, '{name}', self.callback, 10)",
     cpp='this->create_subscription<{full}>("{name}", 10, callback)',
+    entities=partial(_on_topics, Kind.SUBSCRIPTION),
+    endpoint=Kind.SUBSCRIPTION,
 )
-SERVICE = Word(
+SERVICE = EntityKind(
     "service",
     "offers the service",
     python="self.create_service({type}, '{name}', self.callback)",
     cpp='this->create_service<{full}>("{name}", callback)',
+    entities=lambda recording: _services(recording.services),
 )
-ACTION = Word(
+ACTION = EntityKind(
     "action",
     "offers the action",
     python="ActionServer(self, {type}, '{name}', self.execute_callback)",
     cpp='rclcpp_action::create_server<{full}>(this, "{name}", handle_goal, '
     "handle_cancel, handle_accepted)",
+    entities=lambda recording: _actions(recording.services),
 )
-CLIENT = Word(
+CLIENT = EntityKind(
     "client",
     "has a client of",
     python="self.create_client({type}, '{name}')",
     cpp='this->create_client<{full}>("{name}")',
+    entities=lambda recording: _services(recording.clients),
 )
-ACTION_CLIENT = Word(
+ACTION_CLIENT = EntityKind(
     "action client",
     "has an action client of",
     python="ActionClient(self, {type}, '{name}')",
     cpp='rclcpp_action::create_client<{full}>(this, "{name}")',
+    entities=lambda recording: _actions(recording.clients),
 )
-_WORDS = (PUBLISHER, SUBSCRIPTION, SERVICE, ACTION, CLIENT, ACTION_CLIENT)
+_KINDS = (PUBLISHER, SUBSCRIPTION, SERVICE, ACTION, CLIENT, ACTION_CLIENT)
 ENDPOINTS = {Kind.PUBLISHER: PUBLISHER, Kind.SUBSCRIPTION: SUBSCRIPTION}
-"""The word for each kind of endpoint."""
+"""What is on topics, by its kind of endpoint."""
 
 
 @dataclass(frozen=True)
@@ -102,23 +153,23 @@ class NoEndpoint(NotDone, concept="names"):
         types: Any of which it may have; empty where any will do.
     """
 
-    word: Word
+    kind: EntityKind
     name: str
     types: tuple[str, ...] = ()
     only_failures = True
 
     @property
-    def there(self) -> tuple[Service, ...]:
-        """What the student's nodes have of this kind, without what every node has."""
-        return _of_students(self.recording, self.word)
+    def entities(self) -> list[Entity]:
+        """What the student's nodes have of this kind, under any name."""
+        return self.kind.entities(self.recording)
 
     @property
     def evidence(self) -> Evidence:
         """What there is instead."""
         rows = [
-            (item.node, word.noun, item.name, item.type)
-            for word in _WORDS
-            for item in _of_students(self.recording, word)
+            (item.node, kind.noun, item.name, item.type)
+            for kind in _KINDS
+            for item in kind.entities(self.recording)
         ]
         header = ("node", "kind", "name", "type")
         table = Table("What the student's nodes have", header, tuple(rows[:_MOST_ROWS]))
@@ -127,17 +178,16 @@ class NoEndpoint(NotDone, concept="names"):
     @property
     def create(self) -> str:
         """The code that creates it."""
-        names = self.types[0].split("/") if self.types else ["Type"]
-        full, name = "::".join(names), self.name.lstrip("/")
-        return code(
-            worded(self.word.python, self.word.cpp).format(type=names[-1], full=full, name=name)
-        )
+        parts = self.types[0].split("/") if self.types else ["Type"]
+        template = worded(self.kind.python, self.kind.cpp)
+        name = self.name.lstrip("/")
+        return code(template.format(type=parts[-1], full="::".join(parts), name=name))
 
 
-def offered(recording: Recording, word: Word, name: str) -> tuple[Service, ...]:
-    """What the student's nodes have under a name, parameter services too."""
-    items = recording.services if word is SERVICE else _of_students(recording, word)
-    return tuple(item for item in items if item.name == name)
+def offered(recording: Recording, kind: EntityKind, name: str) -> tuple[Service, ...]:
+    """The servers that the student's nodes have under a name, parameter services too."""
+    services = _with_goals(recording.services) if kind is ACTION else recording.services
+    return tuple(item for item in services if item.name == name)
 
 
 def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Finding | None:
@@ -156,37 +206,37 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Finding | N
 
 
 def why_not_offered(
-    recording: Recording, word: Word, name: str, interface: str | None = None
+    recording: Recording, kind: EntityKind, name: str, interface: str | None = None
 ) -> Finding | None:
     """Why no node of the student offers a service or action, or None if one does."""
-    symptom = NoEndpoint(recording, word, name, (interface,) if interface else ())
-    if any(one.name == name and interface in (None, one.type) for one in symptom.there):
+    symptom = NoEndpoint(recording, kind, name, (interface,) if interface else ())
+    if any(one.name == name and interface in (None, one.type) for one in symptom.entities):
         return None
     return cause_of(symptom)
 
 
-def why_not_met(recording: Recording, word: Word, name: str, asked_ns: int) -> Finding:
+def why_not_met(recording: Recording, kind: EntityKind, name: str, asked_ns: int) -> Finding:
     """Why something that was offered could not be asked."""
     return mistaken(
         "not_met",
-        f"the {word.noun} {code(name)} could not be asked: it was there, but went away, or did not "
+        f"the {kind.noun} {code(name)} could not be asked: it was there, but went away, or did not "
         "match a client with the default QoS",
         evidence_at(recording, "rosgrade gave up", asked_ns),
-        noun=word.noun,
+        noun=kind.noun,
     )
 
 
 def meant_endpoint(
-    recording: Recording, word: Word, name: str, type_: str | None = None
+    recording: Recording, kind: EntityKind, name: str, type_: str | None = None
 ) -> str | None:
     """The wrong name that the student probably gave: of the only one that has the right type.
 
     Args:
         type_: The right type; by default what the probe has or asks under the name.
     """
-    if word is SERVICE:
+    if kind is SERVICE:
         asked = [(call.service, call.type) for call in recording.calls]
-    elif word is ACTION:
+    elif kind is ACTION:
         asked = [(goal.action, goal.type) for goal in recording.goals]
     else:
         ends = (end for end in recording.endpoints if end.owner is not Owner.STUDENT)
@@ -195,7 +245,7 @@ def meant_endpoint(
     right_names = dict(asked)
     candidates = {
         item.name
-        for item in _of_students(recording, word)
+        for item in kind.entities(recording)
         if item.type in right_types and item.name not in right_names and _NAME.fullmatch(item.name)
     }
     return candidates.pop() if len(candidates) == 1 else None
@@ -210,12 +260,12 @@ def no_node(symptom: NoEndpoint) -> Finding | None:
 @explanation(NoEndpoint, concept="interfaces")
 def other_interface(symptom: NoEndpoint) -> Finding | None:
     """The service or action has another type."""
-    same = [item for item in symptom.there if item.name == symptom.name]
+    same = [item for item in symptom.entities if item.name == symptom.name]
     if not same or not symptom.types:
         return None
     return mistaken(
         "other_interface",
-        f"the {symptom.word.noun} {code(symptom.name)} has the type {code(same[0].type)}",
+        f"the {symptom.kind.noun} {code(symptom.name)} has the type {code(same[0].type)}",
         symptom.evidence,
         type=code(type_in_code(symptom.types[0])),
     )
@@ -224,40 +274,49 @@ def other_interface(symptom: NoEndpoint) -> Finding | None:
 @explanation(NoEndpoint, before=(process_ended,))
 def misspelt_name(symptom: NoEndpoint) -> Finding | None:
     """Its name is misspelt, private, in a namespace, or in wrong upper or lower case."""
-    ended, wanted = symptom.ended, symptom.name
+    ended = symptom.ended
     # What a process that lives has is no misspelling of what another never came to create.
     names = [
         item.name
-        for item in symptom.there
+        for item in symptom.entities
         if not ended or declarations.process_of(symptom.recording, item.node) in (None, *ended)
     ]
-    match = nearest(wanted, names)
-    mistake, why = "misspelt_name", ""
-    for name in names:
-        if name.lower() == wanted.lower():
-            match, why = name, ": upper and lower case differ"
-        elif name.endswith(wanted):
-            match, why = name, f": {code(name.removesuffix(wanted))} stands in front of the name"
-            mistake = "prefixed_name"
-    if match is None:
+    resemblance = _resemblance(symptom.name, names)
+    if resemblance is None:
         return None
-    seen = f"the node {symptom.word.does} {code(match)} instead of {code(wanted)}{why}"
-    return mistaken(mistake, seen, symptom.evidence, create=symptom.create)
+    match, mistake, difference = resemblance
+    return mistaken(
+        mistake,
+        f"the node {symptom.kind.does} {code(match)} instead of {code(symptom.name)}{difference}",
+        symptom.evidence,
+        create=symptom.create,
+    )
+
+
+def _resemblance(wanted: str, names: Sequence[str]) -> tuple[str, str, str] | None:
+    """The name that is likest to the wanted one, which mistake that is, and how they differ."""
+    for name in reversed(names):
+        if name.lower() == wanted.lower():
+            return name, "misspelt_name", ": upper and lower case differ"
+        if name.endswith(wanted):
+            prefix = name.removesuffix(wanted)
+            return name, "prefixed_name", f": {code(prefix)} stands in front of the name"
+    match = nearest(wanted, names)
+    return (match, "misspelt_name", "") if match else None
 
 
 @explanation(NoEndpoint, after=(process_ended,))
 def dropped(symptom: NoEndpoint) -> Finding | None:
     """It ended with the constructor or the callback that created it."""
-    for kind, word in ENDPOINTS.items():
-        if word is symptom.word:
-            return why_dropped(symptom.recording, kind, symptom.name)
-    return None
+    if symptom.kind.endpoint is None:
+        return None
+    return why_dropped(symptom.recording, symptom.kind.endpoint, symptom.name)
 
 
 @explanation(NoEndpoint)
 def never_appeared(symptom: NoEndpoint) -> Finding | None:
     """The process created it, but it never appeared in the ROS graph."""
-    noun, name = symptom.word.noun, symptom.name
+    noun, name = symptom.kind.noun, symptom.name
     if not declarations.declares(symptom.recording, noun, topic=name):
         return None
     return why_never_appeared(symptom.recording, f"a {noun} on {code(name)}")
@@ -266,41 +325,13 @@ def never_appeared(symptom: NoEndpoint) -> Finding | None:
 @explanation(NoEndpoint, general=True)
 def others_only(symptom: NoEndpoint) -> Finding:
     """The node has only others, perhaps of the right type, or none."""
-    word, nodes = symptom.word, codes(node.name for node in symptom.recording.student_nodes)
-    there = codes(item.name for item in symptom.there)
-    same = codes(item.name for item in symptom.there if item.type in symptom.types)
-    has = f"created {word.noun}s only for {there}" if there else f"created no {word.noun}"
-    return mistaken(
-        "others_only",
-        f"{nodes} {has}" + (f"; the type is right on {same}" if same else ""),
-        symptom.evidence,
-        create=symptom.create,
-    )
-
-
-def _of_students(recording: Recording, word: Word) -> tuple[Service, ...]:
-    of_clients = word in (CLIENT, ACTION_CLIENT)
-    services = recording.clients if of_clients else recording.services
-    if word in (SERVICE, CLIENT):
-        return tuple(item for item in services if not _is_own(item))
-    if word in (ACTION, ACTION_CLIENT):
-        goals = (item for item in services if item.name.endswith(_SEND_GOAL))
-        return tuple(_action(item) for item in goals)
-    return tuple(
-        Service(item.topic, item.type, item.node, item.appeared_ns, item.vanished_ns)
-        for item in recording.student_endpoints(Kind(word.noun))
-        if item.topic not in OWN_TOPICS
-    )
-
-
-def _is_own(service: Service) -> bool:
-    """Whether every node has such a service by itself, or an action brings it along."""
-    prefix, _, base = service.name.rpartition("/")
-    of_node = prefix == service.node and _OWN_SERVICE.fullmatch(base) is not None
-    return of_node or "/_action/" in service.name
-
-
-def _action(service: Service) -> Service:
-    """The action, with its own name and type, by the service that takes its goals."""
-    name, type_ = service.name.removesuffix(_SEND_GOAL), service.type.removesuffix("_SendGoal")
-    return Service(name, type_, service.node, service.appeared_ns, service.vanished_ns)
+    noun, entities = symptom.kind.noun, symptom.entities
+    observed = codes(node.name for node in symptom.recording.student_nodes)
+    if entities:
+        observed += f" created {noun}s only for {codes(item.name for item in entities)}"
+    else:
+        observed += f" created no {noun}"
+    right_type = codes(item.name for item in entities if item.type in symptom.types)
+    if right_type:
+        observed += f"; the type is right on {right_type}"
+    return mistaken("others_only", observed, symptom.evidence, create=symptom.create)

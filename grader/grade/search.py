@@ -17,7 +17,6 @@ from grader.diagnosis.no_endpoint import (
     PUBLISHER,
     SERVICE,
     SUBSCRIPTION,
-    NoEndpoint,
 )
 from grader.diagnosis.no_executable import why_no_executable
 from grader.diagnosis.not_built import why_not_built
@@ -31,7 +30,7 @@ from grader.submission.read.cmake import read_commands
 from grader.submission.read.includes import with_own_headers
 from grader.submission.read.reachable import only_for
 
-_WORDS = {
+_KINDS = {
     "publishers": PUBLISHER,
     "subscriptions": SUBSCRIPTION,
     "services": SERVICE,
@@ -182,7 +181,7 @@ class Search:
                         if of is None or (declaration is not None and declaration.type == of):
                             yield name
         else:
-            for item in NoEndpoint(recording, _WORDS[variable.in_], "").there:
+            for item in _KINDS[variable.in_].entities(recording):
                 here = role.node in (None, item.node, item.node.rpartition("/")[2])
                 if here and of in (None, item.type):
                     yield item.name
@@ -228,8 +227,8 @@ class Search:
         types_in_use = {
             item.type
             for recording in self.recordings.values()
-            for word in _WORDS.values()
-            for item in NoEndpoint(recording, word, "").there
+            for kind in _KINDS.values()
+            for item in kind.entities(recording)
             if item.name == name
         }
         return [interface for interface in own if interface in types_in_use] or own[:1]
@@ -346,8 +345,8 @@ def _does(recording: Recording, node: str, key: str, wanted: str) -> bool:
     """Whether a node does in a run what a part of a role says."""
     return any(
         item.node == node and _is(wanted, item.name, item.type)
-        for word in _DONE_BY[key][1]
-        for item in NoEndpoint(recording, word, "").there
+        for kind in _DONE_BY[key][1]
+        for item in kind.entities(recording)
     )
 
 
@@ -359,7 +358,7 @@ def _with_headers(source: SourceFile, package: PackageRecord) -> list[SourceFile
 
 def _creates(files: Sequence[SourceFile], key: str, wanted: str) -> bool:
     """Whether files create together what a role says."""
-    functions = {name for word in _DONE_BY[key][1] for name in word.functions}
+    functions = {name for kind in _DONE_BY[key][1] for name in kind.functions}
     made = [one for file in files for one in file.calls if one.short in functions]
     if not _TYPE.fullmatch(wanted):
         return any(_is(wanted, f"/{one.literal.lstrip('/')}", "") for one in made)

@@ -42,7 +42,7 @@ from grader.spec.unit import format_duration
 class ActionExists(Offered):
     """Parameters of action.exists."""
 
-    word, thing, called = ACTION, Thing.ACTION, "{self.action}"
+    kind, thing, called = ACTION, Thing.ACTION, "{self.action}"
 
     action: TopicName = Field(description="Fully qualified action name.")
 

@@ -41,7 +41,7 @@ _TOGETHER, _APART = 0.5, 0.75
 class ServiceExists(Offered):
     """Parameters of service.exists."""
 
-    word, thing, called = SERVICE, Thing.SERVICE, "{self.service}"
+    kind, thing, called = SERVICE, Thing.SERVICE, "{self.service}"
 
     service: TopicName = Field(description="Fully qualified service name.")
 
