@@ -34,7 +34,7 @@ from grader.measure.printed import (
     quote,
     shown,
 )
-from grader.recording.model import NS, Endpoint, Kind, LogLine
+from grader.recording.model import NS, Kind, LogLine
 from grader.recording.submission import SourceError
 from grader.spec.expression import Expression
 from grader.spec.unit import format_duration
@@ -78,14 +78,9 @@ class NotLogged(CalledLate):
         return f"no log line shows a message on {code(self.topic)}"
 
     @property
-    def endpoints(self) -> tuple[Endpoint, ...]:
-        """The student's subscriptions to the topic, or publishers."""
-        return self.recording.student_endpoints(self.kind, self.topic)
-
-    @property
     def nodes(self) -> set[str]:
-        """The nodes that have them."""
-        return {item.node for item in self.endpoints}
+        """The nodes with a subscription to the topic, or with a publisher."""
+        return {end.node for end in self.recording.student_endpoints(self.kind, self.topic)}
 
     @property
     def since_ns(self) -> int:
@@ -160,7 +155,7 @@ def no_history(symptom: ReceivedNotLogged) -> Finding | None:
     wanted, recording = symptom.wanted, symptom.recording
     if not wanted or wanted[-1].message.stamp_ns >= recording.launched_ns:
         return None
-    for item in symptom.endpoints:
+    for item in recording.student_endpoints(symptom.kind, symptom.topic):
         durability, reliability = item.qos.durability, item.qos.reliability
         if durability in _KEEPS and reliability in _RESENDS:
             continue
@@ -282,14 +277,9 @@ def other_values(symptom: NotLogged) -> Finding | None:
     if swapped:
         observed += f", where {listing(map(code, swapped))} are swapped"
     names = dict.fromkeys(name for path in missing for name in Expression.of(path).fields)
-    fields = listing(code(f"msg.{name}") for name in names)
-    return mistaken(
-        "other_values_logged",
-        observed,
-        symptom.evidence(line),
-        given=symptom.given,
-        fields=fields,
-    )
+    fields, given = listing(code(f"msg.{name}") for name in names), symptom.given
+    evidence = symptom.evidence(line)
+    return mistaken("other_values_logged", observed, evidence, given=given, fields=fields)
 
 
 @explanation(ReceivedNotLogged, general=True)

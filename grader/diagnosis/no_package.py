@@ -13,7 +13,6 @@ from grader.spec.names import Thing
 from grader.spec.nearest_name import nearest
 
 _CMAKE = ("ament_cmake", "cmake")
-_MOST_PLACES = 10
 
 
 @dataclass(frozen=True)
@@ -111,11 +110,10 @@ def other_package_name(symptom: NoPackage) -> Finding:
     observed += "".join(breach_of_rep_144(item.name) for item in packages)
     places = tuple(
         SourceError(item.file("package.xml"), None, f"the package {code(item.name)}")
-        for item in packages[:_MOST_PLACES]
+        for item in packages[:10]
     )
-    return mistaken(
-        mistake, observed, Evidence(places=places), name=symptom.name, apart=advice_on_place
-    )
+    evidence = Evidence(places=places)
+    return mistaken(mistake, observed, evidence, name=symptom.name, apart=advice_on_place)
 
 
 def _unusable(observed: str, errors: list[SourceError]) -> Finding:

@@ -94,10 +94,11 @@ class NotGenerated(Symptom[Finding], concept="interfaces"):
 
     def finds(self, package: str) -> bool:
         """Whether find_package() is called for a package."""
-        found = [command.arguments[:1] for command in self.calls("find_package")]
+        calls = self.calls("find_package")
+        names = {name for command in calls for name in command.arguments[:1]}
         # A loop over names, or a variable that only CMake knows.
-        loop = any("${" in name for names in found for name in names)
-        return (package,) in found or loop or bool(self.calls(_FINDS_ALL))
+        is_variable = any("${" in name for name in names)
+        return package in names or is_variable or bool(self.calls(_FINDS_ALL))
 
     def cause(self, line: int | None, observed: str, hint: str) -> Finding:
         """A cause in CMakeLists.txt."""
@@ -146,17 +147,20 @@ def why_not_generated(
     if any(item.file == interface.file for item in package.generated):
         return None
     cause = explain(NotGenerated(package, interface, definition))
-    built = None if package.build_type != "ament_cmake" else why_not_built(submission, package.name)
-    if built is not None:
-        if cause is None or built.status is Status.ERROR:
-            return built
-        # The end of the log shows what became of what is missing.
-        return replace(cause, evidence=replace(cause.evidence, log=built.evidence.log))
+    if package.build_type == "ament_cmake":
+        failure = why_not_built(submission, package.name)
+        if failure is not None and (cause is None or failure.status is Status.ERROR):
+            return failure
+        if cause is not None and failure is not None:
+            # The end of the log shows what became of what is missing.
+            return replace(cause, evidence=replace(cause.evidence, log=failure.evidence.log))
+    if cause is not None:
+        return cause
     build = submission.build
-    if cause is None and build is not None and build.timed_out and build.waited is None:
+    if build is not None and build.timed_out and build.waited is None:
         # A recording of before, when nothing was kept of such a build.
         return Finding.ours("the build was ended, and nothing was kept of it: grade again")
-    return cause or mistaken(
+    return mistaken(
         "not_generated",
         f"the build installed no code for {code(interface.file)}",
         Evidence(places=(SourceError(package.file("CMakeLists.txt"), None, _GENERATE),)),
@@ -251,21 +255,25 @@ def not_listed(symptom: NotGenerated) -> Finding | None:
 def undeclared_package(symptom: NotGenerated) -> Finding | None:
     """A package with used messages is not found, or is not listed under DEPENDENCIES."""
     calls = symptom.calls(_GENERATE)
-    after = [call.after("DEPENDENCIES", _GENERATE_KEYWORDS) or () for call in calls]
-    declared = {name for names in after for name in names}
-    used = used_packages(symptom.interface, symptom.definition)
-    for name in (GENERATORS, *used):
+    line = calls[0].line
+    if not symptom.finds(GENERATORS):
+        return _not_found(symptom, line, GENERATORS)
+    declared = {
+        name for call in calls for name in call.after("DEPENDENCIES", _GENERATE_KEYWORDS) or ()
+    }
+    names_a_variable = any("${" in name for name in declared)
+    for name in used_packages(symptom.interface, symptom.definition):
         if not symptom.finds(name):
-            return symptom.cause(
-                calls[0].line,
-                f"has no find_package() for {code(name)}",
-                remedy("no_find_package", name=name),
-            )
-        if name in used and name not in declared and not any("${" in one for one in declared):
-            return symptom.cause(
-                calls[0].line,
+            return _not_found(symptom, line, name)
+        if name not in declared and not names_a_variable:
+            observed = (
                 f"does not name {code(name)} under DEPENDENCIES, although the definition uses "
-                "its messages",
-                remedy("no_dependencies", name=name),
+                "its messages"
             )
+            return symptom.cause(line, observed, remedy("no_dependencies", name=name))
     return None
+
+
+def _not_found(symptom: NotGenerated, line: int, package: str) -> Finding:
+    observed = f"has no find_package() for {code(package)}"
+    return symptom.cause(line, observed, remedy("no_find_package", name=package))
