@@ -72,22 +72,18 @@ def _on_topics(kind: Kind, recording: Recording) -> list[Entity]:
     return [Entity(end.node, end.topic, end.type) for end in ends if end.topic not in OWN_TOPICS]
 
 
-def _services(services: Iterable[Service]) -> list[Entity]:
-    """Those that the student wrote: no node's own ones, and none that an action brings along."""
+def _entities(services: Iterable[Service]) -> list[Entity]:
     return [Entity(one.node, one.name, one.type) for one in services if not _is_own(one)]
 
 
 def _is_own(service: Service) -> bool:
+    """Whether every node has such a service by itself, or an action brings it along."""
     prefix, _, base = service.name.rpartition("/")
     of_node = prefix == service.node and _OWN_SERVICE.fullmatch(base) is not None
     return of_node or "/_action/" in service.name
 
 
-def _actions(services: Iterable[Service]) -> list[Entity]:
-    return [Entity(one.node, one.name, one.type) for one in _with_goals(services)]
-
-
-def _with_goals(services: Iterable[Service]) -> Iterable[Service]:
+def _actions(services: Iterable[Service]) -> Iterable[Service]:
     """The services that take goals, with the names and types of their actions."""
     for service in services:
         if service.name.endswith(_SEND_GOAL):
@@ -116,7 +112,7 @@ SERVICE = EntityKind(
     "offers the service",
     python="self.create_service({type}, '{name}', self.callback)",
     cpp='this->create_service<{full}>("{name}", callback)',
-    entities=lambda recording: _services(recording.services),
+    entities=lambda recording: _entities(recording.services),
 )
 ACTION = EntityKind(
     "action",
@@ -124,21 +120,21 @@ ACTION = EntityKind(
     python="ActionServer(self, {type}, '{name}', self.execute_callback)",
     cpp='rclcpp_action::create_server<{full}>(this, "{name}", handle_goal, '
     "handle_cancel, handle_accepted)",
-    entities=lambda recording: _actions(recording.services),
+    entities=lambda recording: _entities(_actions(recording.services)),
 )
 CLIENT = EntityKind(
     "client",
     "has a client of",
     python="self.create_client({type}, '{name}')",
     cpp='this->create_client<{full}>("{name}")',
-    entities=lambda recording: _services(recording.clients),
+    entities=lambda recording: _entities(recording.clients),
 )
 ACTION_CLIENT = EntityKind(
     "action client",
     "has an action client of",
     python="ActionClient(self, {type}, '{name}')",
     cpp='rclcpp_action::create_client<{full}>(this, "{name}")',
-    entities=lambda recording: _actions(recording.clients),
+    entities=lambda recording: _entities(_actions(recording.clients)),
 )
 _KINDS = (PUBLISHER, SUBSCRIPTION, SERVICE, ACTION, CLIENT, ACTION_CLIENT)
 ENDPOINTS = {Kind.PUBLISHER: PUBLISHER, Kind.SUBSCRIPTION: SUBSCRIPTION}
@@ -186,7 +182,7 @@ class NoEndpoint(NotDone, concept="names"):
 
 def offered(recording: Recording, kind: EntityKind, name: str) -> tuple[Service, ...]:
     """The servers that the student's nodes have under a name, parameter services too."""
-    services = _with_goals(recording.services) if kind is ACTION else recording.services
+    services = _actions(recording.services) if kind is ACTION else recording.services
     return tuple(item for item in services if item.name == name)
 
 
@@ -285,12 +281,8 @@ def misspelt_name(symptom: NoEndpoint) -> Finding | None:
     if resemblance is None:
         return None
     match, mistake, difference = resemblance
-    return mistaken(
-        mistake,
-        f"the node {symptom.kind.does} {code(match)} instead of {code(symptom.name)}{difference}",
-        symptom.evidence,
-        create=symptom.create,
-    )
+    seen = f"the node {symptom.kind.does} {code(match)} instead of {code(symptom.name)}"
+    return mistaken(mistake, seen + difference, symptom.evidence, create=symptom.create)
 
 
 def _resemblance(wanted: str, names: Sequence[str]) -> tuple[str, str, str] | None:
@@ -326,11 +318,10 @@ def never_appeared(symptom: NoEndpoint) -> Finding | None:
 def others_only(symptom: NoEndpoint) -> Finding:
     """The node has only others, perhaps of the right type, or none."""
     noun, entities = symptom.kind.noun, symptom.entities
-    observed = codes(node.name for node in symptom.recording.student_nodes)
+    created = f"created no {noun}"
     if entities:
-        observed += f" created {noun}s only for {codes(item.name for item in entities)}"
-    else:
-        observed += f" created no {noun}"
+        created = f"created {noun}s only for {codes(item.name for item in entities)}"
+    observed = f"{codes(node.name for node in symptom.recording.student_nodes)} {created}"
     right_type = codes(item.name for item in entities if item.type in symptom.types)
     if right_type:
         observed += f"; the type is right on {right_type}"

@@ -158,13 +158,8 @@ def depends_on_another(symptom: NotBuilt) -> Finding:
     observed = f"it was not built, because {codes(broken)} failed to build"
     if build.culprit and broken == blamed:
         observed += f": {build.culprit}"
-    return mistaken(
-        "depends_on_another",
-        observed,
-        _evidence(build, broken[0]),
-        broken=codes(broken),
-        first=broken[0],
-    )
+    first, evidence = broken[0], _evidence(build, broken[0])
+    return mistaken("depends_on_another", observed, evidence, broken=codes(broken), first=first)
 
 
 def why_lacking(submission: SubmissionRecord, name: str) -> Finding | None:
