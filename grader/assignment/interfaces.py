@@ -18,7 +18,8 @@ from grader.assignment.stimuli.message import Find, part_of
 from grader.assignment.variable import Values, fill_interface, fill_text
 from grader.checks.check import NamedFields
 from grader.errors import GraderFault, Problem
-from grader.findings.value import NoSuchField, expected_leaves, tolerance_of, unreachable, value_at
+from grader.findings.expected import expected_leaves, unreachable
+from grader.findings.value import NoSuchField, tolerance_of, value_at
 from grader.machine import resources, ros
 from grader.recording.interface import FEEDBACK, FLOATS, TEXTS, feedback_definition, fields_of
 from grader.spec.document import Place

@@ -17,7 +17,7 @@ from grader.assignment.scenario_rules import Mistakes, no_executable, no_package
 from grader.assignment.stimuli.stimulus_model import StimulusModel
 from grader.checks import need as needs
 from grader.errors import GraderFault
-from grader.findings.value import same_value
+from grader.findings.expected import same_value
 from grader.spec.nearest_name import did_you_mean, nearest_or_all
 from grader.spec.unit import format_duration
 from grader.submission.read.lint import find_ruff, known_rules

@@ -23,9 +23,10 @@ from grader.diagnosis.no_endpoint import (
     why_not_offered,
 )
 from grader.diagnosis.process.process_exit import why_ended
+from grader.findings.expected import Difference
 from grader.findings.fields import difference_table, difference_words, fields_hint, unlike, words
 from grader.findings.finding import Evidence, Finding, Moment, Table
-from grader.findings.value import EXACT, Difference
+from grader.findings.value import EXACT
 from grader.findings.words import code
 from grader.recording.interaction import NO_SERVER, Goal
 from grader.recording.model import Call, Recording

@@ -9,9 +9,9 @@ from itertools import pairwise
 from typing import Any
 
 from grader.diagnosis.explanation import Symptom, explanation, mistaken, remedy
+from grader.findings.expected import same
 from grader.findings.fields import wanted_text
 from grader.findings.finding import Finding
-from grader.findings.value import same
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from itertools import combinations, pairwise, product
 from typing import Any
 
 from grader.diagnosis.explanation import Symptom, explanation
-from grader.findings.value import Difference, same
+from grader.findings.expected import Difference, same
 from grader.findings.words import value_text, worded
 
 # How many times too large -> what that is. People type 57.3 and 3.14: three digits must do.

@@ -8,9 +8,10 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from grader.findings.condition import is_comparison
+from grader.findings.expected import Difference, differences, expected_leaves
 from grader.findings.finding import Table
 from grader.findings.text import is_asked_of_text, text_words
-from grader.findings.value import Difference, FieldPath, Tolerance, differences, expected_leaves
+from grader.findings.value import FieldPath, Tolerance
 from grader.findings.words import codes, value_text, worded
 from grader.recording.interaction import Goal
 

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 
 from grader.findings.condition import is_comparison
+from grader.findings.expected import same_value
 from grader.findings.fields import difference_words, unlike, words
-from grader.findings.value import EXACT, NoSuchField, same_value
+from grader.findings.value import EXACT, NoSuchField
 
 
 def quaternion(heading: float) -> dict[str, float]:

@@ -13,20 +13,10 @@ from grader.diagnosis.explanation import cause_of, explain, mistaken
 from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
 from grader.diagnosis.wrong_order import WrongOrder, plain
 from grader.diagnosis.wrong_value import WrongValue, was_integer
+from grader.findings.expected import Difference, differences, expected_leaves, same
 from grader.findings.fields import FieldTolerance, difference_table, instead, within_words, words
 from grader.findings.finding import Evidence, Finding, Table, moment
-from grader.findings.value import (
-    EXACT,
-    Difference,
-    FieldPath,
-    differences,
-    expected_leaves,
-    item_at,
-    leaves,
-    number_at,
-    same,
-    tolerance_of,
-)
+from grader.findings.value import EXACT, FieldPath, item_at, leaves, number_at, tolerance_of
 from grader.findings.words import code, codes, counted
 from grader.measure.numbering import is_numbered, published
 from grader.recording.model import Kind, Message, Recording

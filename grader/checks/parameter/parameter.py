@@ -19,9 +19,9 @@ from grader.diagnosis.no_parameter import (
     why_not_taken,
     why_services_silent,
 )
+from grader.findings.expected import same, same_value
 from grader.findings.fields import wanted_text
 from grader.findings.finding import Evidence, Finding, Table, evidence_at
-from grader.findings.value import same, same_value
 from grader.findings.words import code, codes, listing, value_text
 from grader.measure.parameter_calls import (
     Descriptor,
