@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 import statistics
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pydantic import Field, model_validator
@@ -72,6 +72,29 @@ class TakesEffect(OfSetting):
         )
 
 
+@dataclass(frozen=True)
+class _Change:
+    """The accepted change of the parameter, and the messages that show its effect.
+
+    Attributes:
+        asked_ns: When the value was asked for; it was set at ``set_ns``.
+        judged: The messages from ``begin_ns`` on, when the effect is due, until ``end_ns``.
+    """
+
+    recording: Recording
+    parameters: TakesEffect
+    asked_ns: int
+    set_ns: int
+    begin_ns: int
+    end_ns: int
+    shown: Evidence
+
+    @property
+    def judged(self) -> list[Message]:
+        published = self.recording.on(self.parameters.topic)
+        return [one for one in published if self.begin_ns <= one.stamp_ns < self.end_ns]
+
+
 @check("parameter.takes_effect", Subject.RECORDING, TakesEffect)
 def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding:
     """Setting the parameter changes what the node does.
@@ -79,87 +102,86 @@ def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding:
     Judged by the messages from `within` after the node accepted the value until the same parameter
     was set again or the run ended.
     """
-    item = settings_to(recording, parameters)[0]
-    set_ns = item.call.answered_ns or 0
-    shown = evidence_at(recording, f"set to {value_text(item.value)}", set_ns)
-    if not item.accepted:
-        return mistaken("refused_value", f"the value was {refusal(item)}", shown)
-    published = recording.on(parameters.topic)
-    if not published:
+    setting = settings_to(recording, parameters)[0]
+    set_ns = setting.call.answered_ns or 0
+    shown = evidence_at(recording, f"set to {value_text(setting.value)}", set_ns)
+    if not setting.accepted:
+        return mistaken("refused_value", f"the value was {refusal(setting)}", shown)
+    if not recording.on(parameters.topic):
         stop_if(why_silent(recording, parameters.topic))
-    again_ns = [
-        other.call.requested_ns
-        for other in settings(recording, parameters.node, parameters.name)
-        if other.accepted and other.call.requested_ns > item.call.requested_ns
-    ]
-    begin_ns, end_ns = set_ns + round(parameters.within * NS), min([recording.stop_ns, *again_ns])
-    found = [one for one in published if begin_ns <= one.stamp_ns < end_ns]
-    stop_if(_why_too_few(recording, parameters, len(found), begin_ns, end_ns, shown))
-    before = [one for one in published if one.stamp_ns < item.call.requested_ns]
-    for message in found:
-        stop_if(_why_other_message(recording, parameters, message, before[-1:], set_ns, shown))
-    stop_if(_why_other_period(recording, parameters, found, shown))
-    return Finding.as_asked(f"{counted(len(found), 'message')} after it was set", shown)
+    asked_ns = setting.call.requested_ns
+    begin_ns = set_ns + round(parameters.within * NS)
+    end_ns = _end_ns(recording, parameters, asked_ns)
+    change = _Change(recording, parameters, asked_ns, set_ns, begin_ns, end_ns, shown)
+    wrong = _why_too_few(change) or _why_other_message(change) or _why_other_period(change)
+    if wrong is not None:
+        return wrong
+    return Finding.as_asked(f"{counted(len(change.judged), 'message')} after it was set", shown)
 
 
-def _why_too_few(
-    recording: Recording,
-    parameters: TakesEffect,
-    number: int,
-    begin_ns: int,
-    end_ns: int,
-    shown: Evidence,
-) -> Finding | None:
-    if number >= (1 if parameters.period is None else _LEAST_PERIODS + 1):
+def _end_ns(recording: Recording, parameters: TakesEffect, asked_ns: int) -> int:
+    """When the same parameter was set again, or the run ended."""
+    again_ns = (
+        setting.call.requested_ns
+        for setting in settings(recording, parameters.node, parameters.name)
+        if setting.accepted and setting.call.requested_ns > asked_ns
+    )
+    return min([recording.stop_ns, *again_ns])
+
+
+def _why_too_few(change: _Change) -> Finding | None:
+    recording, parameters, number = change.recording, change.parameters, len(change.judged)
+    least = 1 if parameters.period is None else _LEAST_PERIODS + 1
+    if number >= least:
         return None
-    watched_s = max((end_ns - begin_ns) / NS, 0.0)
+    watched_s = max((change.end_ns - change.begin_ns) / NS, 0.0)
     seen = f"{counted(number, 'message')} in the {format_duration(watched_s)} after that"
     ended = why_ended(recording, seen)
     if ended is not None:
         return ended
-    stolen_s = recording.stolen_s(begin_ns, end_ns)
+    stolen_s = recording.stolen_s(change.begin_ns, change.end_ns)
     if watched_s - stolen_s <= _LEAST_PERIODS * (parameters.period or 0.0):
         return Finding.held_up(f"{seen}, too few to judge", stolen_s)
-    raised = why_raised(recording, seen, begin_ns - round(parameters.within * NS))
+    raised = why_raised(recording, seen, change.set_ns)
     mistake = "stops_publishing" if parameters.period is None else "old_period"
-    return raised or mistaken(mistake, seen, shown, off="")
+    return raised or mistaken(mistake, seen, change.shown, off="")
 
 
-def _why_other_message(
-    recording: Recording,
-    parameters: TakesEffect,
-    message: Message,
-    before: Sequence[Message],
-    set_ns: int,
-    shown: Evidence,
-) -> Finding | None:
-    wrong = unlike(message.value, parameters.fields, parameters.tolerance)
-    if not wrong:
+def _why_other_message(change: _Change) -> Finding | None:
+    """Why the first message without the expected fields has others; None if there is none."""
+    recording, parameters = change.recording, change.parameters
+    for message in change.judged:
+        wrong = unlike(message.value, parameters.fields, parameters.tolerance)
+        if wrong:
+            break
+    else:
         return None
-    late_s = (message.stamp_ns - set_ns) / NS
+    late_s = (message.stamp_ns - change.set_ns) / NS
     seen = f"{format_duration(late_s)} after it was set a message has {difference_words(wrong)}"
-    was_before = [unlike(one.value, parameters.fields, parameters.tolerance) for one in before]
-    mistake = "old_value" if wrong in was_before else "other_use"
-    taken = why_taken(recording, seen, set_ns, message.stamp_ns, parameters.within)
-    table = difference_table("That message", wrong)
-    shown = replace(shown, tables=(table,))
+    taken = why_taken(recording, seen, change.set_ns, message.stamp_ns, parameters.within)
+    if taken is not None:
+        return taken
+    published = recording.on(parameters.topic)
+    before = [one.value for one in published if one.stamp_ns < change.asked_ns]
+    is_old = before and unlike(before[-1], parameters.fields, parameters.tolerance) == wrong
+    shown = replace(change.shown, tables=(difference_table("That message", wrong),))
     name, read = parameters.name, get_parameter(parameters.name)
-    return taken or mistaken(mistake, seen, shown, name=name, read=read)
+    mistake = "old_value" if is_old else "other_use"
+    return mistaken(mistake, seen, shown, name=name, read=read)
 
 
-def _why_other_period(
-    recording: Recording, parameters: TakesEffect, found: list[Message], shown: Evidence
-) -> Finding | None:
+def _why_other_period(change: _Change) -> Finding | None:
+    parameters = change.parameters
     if parameters.period is None:
         return None
-    times = [message.stamp_ns for message in found]
-    median_s = statistics.median(b - a for a, b in itertools.pairwise(times)) / NS
+    times_ns = [message.stamp_ns for message in change.judged]
+    median_s = statistics.median(b - a for a, b in itertools.pairwise(times_ns)) / NS
     off_s = median_s - parameters.period
     if abs(off_s) <= parameters.period_tolerance * parameters.period:
         return None
     seen = f"after that, messages come every {format_duration(median_s)} (median)"
-    stolen_s = recording.stolen_s(times[0], times[-1])
-    if 0.0 < off_s * (len(times) - 1) <= stolen_s:
+    stolen_s = change.recording.stolen_s(times_ns[0], times_ns[-1])
+    if 0.0 < off_s * (len(times_ns) - 1) <= stolen_s:
         return Finding.held_up(seen, stolen_s)
     off = f" The period may be {percent(parameters.period_tolerance)} off."
-    return mistaken("old_period", seen, shown, off=off)
+    return mistaken("old_period", seen, change.shown, off=off)
