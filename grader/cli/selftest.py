@@ -79,15 +79,8 @@ def selftest(
             "--record keeps the recordings of the reference in Python: leave out --cpp"
         )
     language = CPP if cpp else PYTHON
-
-    def is_chosen(trial: Trial) -> bool:
-        if record:
-            return trial.role is Role.REFERENCE
-        return not only or trial.id in only
-
-    console = output_console()
-    perfect = True
     place = chosen_sandbox(sandbox, Progress(quiet))
+    perfect = True
     for name in assignments or list_assignments():
         loaded = load_assignment(name)
         reference = reference_of(loaded.assignment.id, loaded.folder, language)
@@ -95,30 +88,48 @@ def selftest(
         if keep is not None:
             refuse_part(keep, loaded.folder, f"the assignment in {loaded.folder}")
             refuse_part(keep, reference, f"the reference solution in {reference}")
-        results: list[TrialResult] = []
-        graded: list[Graded] = []
         every = trials(loaded, language)
         _refuse_unknown(loaded.assignment.id, only or (), [trial.id for trial in every])
-        chosen = [*filter(is_chosen, every)]
-        with Runner(ros.find(), sandbox=place) as runner, Progress(quiet).shown() as progress:
+        if record:
+            chosen = [trial for trial in every if trial.role is Role.REFERENCE]
+        else:
+            chosen = [trial for trial in every if not only or trial.id in only]
+        graded: list[Graded] = []
+        on_graded = graded.append if record else lambda _: None
+        with Runner(ros.find(), sandbox=place) as runner:
             grading = Grading(loaded, runner, cache_folder())
-            on_graded = graded.append if record else lambda _: None
             setup = Setup(loaded, grading, reference, language, on_graded)
-            kept_in = keep and keep / loaded.assignment.id
-            for result in run_selftest(setup, chosen, jobs=jobs or 2 * cpu_count(), keep=kept_in):
-                results.append(result)
-                progress.say(
-                    f"{loaded.assignment.id}: {len(results)} of {len(chosen)} graded: "
-                    f"{result.trial.id}: {'WRONG' if result.wrong else 'ok'}"
-                )
+            results = _graded(setup, chosen, jobs, keep, Progress(quiet))
         if record:
             say(keep_reference(loaded, graded[0].grade, graded[0].recordings))
-            continue
-        score = mutation_score(results)
-        perfect = perfect and score.perfect
-        _print(console, loaded.assignment.id, results)
-        say(f"{loaded.assignment.id}: {score.words}")
+        else:
+            perfect = _say_score(loaded.assignment.id, results) and perfect
     raise typer.Exit(0 if perfect else 1)
+
+
+def _graded(
+    setup: Setup, chosen: Sequence[Trial], jobs: int | None, keep: Path | None, progress: Progress
+) -> list[TrialResult]:
+    """Grade the chosen trials of an assignment, and say how each went."""
+    name = setup.loaded.assignment.id
+    results: list[TrialResult] = []
+    with progress.shown():
+        kept_in = keep and keep / name
+        for result in run_selftest(setup, chosen, jobs=jobs or 2 * cpu_count(), keep=kept_in):
+            results.append(result)
+            progress.say(
+                f"{name}: {len(results)} of {len(chosen)} graded: "
+                f"{result.trial.id}: {'WRONG' if result.wrong else 'ok'}"
+            )
+    return results
+
+
+def _say_score(assignment: str, results: list[TrialResult]) -> bool:
+    """Print the results of an assignment; whether every trial ended as it must."""
+    score = mutation_score(results)
+    _print(output_console(), assignment, results)
+    say(f"{assignment}: {score.words}")
+    return score.perfect
 
 
 def _refuse_unknown(assignment: str, only: Sequence[str], ids: Sequence[str]) -> None:
