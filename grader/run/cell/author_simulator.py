@@ -20,7 +20,8 @@ from grader.recording.model import NS, Kind, Owner
 from grader.recording.simulated import Incident, Scene, Truth
 from grader.recording.tracked import RealTimeFactor, Sighting, truth_of
 from grader.run.cell.graph import GraphObserver
-from grader.run.cell.probe import Probe, import_interface
+from grader.run.cell.interfaces import import_interface
+from grader.run.cell.probe import Probe
 from grader.run.cell.signed_messages import Signed, SignedMessages
 from grader.run.cell.simulated import Simulated
 from grader.run.order import AuthorSimulatorOrder
@@ -29,52 +30,66 @@ from sim.motion import Pose, Twist, wrap_angle
 
 if TYPE_CHECKING:
     from grader.assignment.true_motion import TruthTopic
+    from sim.shapes import Capsule
 
 _FACTOR_WINDOW_S = 3.0
+"""The speed of simulated time is a mean over this window: shorter ones show pauses of the host."""
 _SILENT_S, _SILENT_AT_END_S = 3.0, 1.0
+"""A simulator without a pose for so long is at fault, while it runs and when the run ends."""
 _MOVED_M, _MOVED_RAD = 1e-3, 1e-2
+"""Smaller differences of the pose are the jitter of a simulator's physics, and not motion."""
 FORGED = "forged_truth"
 
 
 class TrackedRobot:
-    """The robot of the simulator, as far as the end of a run depends on it."""
+    """The robot of the simulator, as far as the end of a run depends on it.
+
+    Attributes:
+        sightings: Its poses, oldest first.
+        contacts: Times, and whether it touches something from then on.
+    """
 
     def __init__(self) -> None:
-        self.seen: list[Sighting] = []
+        self.sightings: list[Sighting] = []
         self.contacts: list[tuple[int, bool]] = []
         self.travelled_m = 0.0
-        self._anchor: Pose | None = None
-        self._moved_ns = 0
-        self._contact_ns: int | None = None
+        self._last_moved_pose: Pose | None = None
+        self._last_moved_ns = 0
+        self._first_contact_ns: int | None = None
 
     @property
     def at_rest_s(self) -> float:
         """Seconds since it last moved; 0 if it never has."""
-        return (self.seen[-1].time_ns - self._moved_ns) / NS if self._moved_ns else 0.0
+        if not self._last_moved_ns:
+            return 0.0
+        return (self.sightings[-1].time_ns - self._last_moved_ns) / NS
 
     @property
     def in_contact_s(self) -> float:
         """Seconds since the first contact; 0 before."""
-        return 0.0 if self._contact_ns is None else (time.time_ns() - self._contact_ns) / NS
+        if self._first_contact_ns is None:
+            return 0.0
+        return (time.time_ns() - self._first_contact_ns) / NS
 
-    def keep(self, sighting: Sighting) -> None:
-        """Keep where it is."""
-        if self.seen and sighting.time_ns <= self.seen[-1].time_ns:
+    def add_sighting(self, sighting: Sighting) -> None:
+        """Keep a pose that is newer than all before it, and note whether the robot has moved."""
+        if self.sightings and sighting.time_ns <= self.sightings[-1].time_ns:
             return
-        self.seen.append(sighting)
-        pose = sighting.pose
-        self._anchor = self._anchor or pose
-        way_m = math.hypot(pose.x_m - self._anchor.x_m, pose.y_m - self._anchor.y_m)
-        turned_rad = abs(wrap_angle(pose.yaw_rad - self._anchor.yaw_rad))
-        if way_m > _MOVED_M or turned_rad > _MOVED_RAD:
-            self._anchor, self._moved_ns = pose, sighting.time_ns
-            self.travelled_m += way_m
+        self.sightings.append(sighting)
+        pose, last = sighting.pose, self._last_moved_pose
+        if last is None:
+            self._last_moved_pose = pose
+            return
+        distance_m = math.hypot(pose.x_m - last.x_m, pose.y_m - last.y_m)
+        if distance_m > _MOVED_M or abs(wrap_angle(pose.yaw_rad - last.yaw_rad)) > _MOVED_RAD:
+            self._last_moved_pose, self._last_moved_ns = pose, sighting.time_ns
+            self.travelled_m += distance_m
 
-    def touch(self, time_ns: int, touches: bool) -> None:
+    def add_contact(self, time_ns: int, touches: bool) -> None:
         """Keep whether it touches something from then on."""
         self.contacts.append((time_ns, touches))
-        if touches and self._contact_ns is None:
-            self._contact_ns = time_ns
+        if touches and self._first_contact_ns is None:
+            self._first_contact_ns = time_ns
 
 
 class AuthorSimulator(Simulated):
@@ -83,20 +98,20 @@ class AuthorSimulator(Simulated):
     def __init__(self, probe: Probe, graph: GraphObserver, order: AuthorSimulatorOrder) -> None:
         self._probe, self._graph, self._order = probe, graph, order
         options = self._options = order.options
-        wanted = {
-            options.truth.topic: options.truth.type,
-            **({options.clock: CLOCK} if options.clock else {}),
-            **({options.contact: CONTACT} if options.contact else {}),
-        }
-        self._topics = {
+        types: dict[str, str] = {options.truth.topic: options.truth.type}
+        if options.clock:
+            types[options.clock] = CLOCK
+        if options.contact:
+            types[options.contact] = CONTACT
+        self._subscriptions = {
             topic: SignedMessages(probe.node, topic, import_interface(type))
-            for topic, type in wanted.items()
+            for topic, type in types.items()
         }
-        self._trusted = frozenset(self._topics)
+        self._truth_topics = frozenset(types)
         self._robot = TrackedRobot()
         self._began_ns = 0
         self._stop_ns = 0
-        self._heard: set[str] = set()
+        self._topics_with_messages: set[str] = set()
         self._factor = RealTimeFactor(_FACTOR_WINDOW_S)
 
     @property
@@ -106,7 +121,7 @@ class AuthorSimulator(Simulated):
 
     @property
     def name(self) -> str:
-        """Of its program."""
+        """Name of its program."""
         return self._order.name
 
     @property
@@ -115,9 +130,9 @@ class AuthorSimulator(Simulated):
         return self._options.within
 
     def begin(self) -> None:
-        """From now on the student's programs run: what comes counts."""
+        """The student's programs start now: of what came before, only the last pose counts."""
         self._began_ns = time.time_ns()
-        self._robot.seen = self._robot.seen[-1:]
+        self._robot.sightings = self._robot.sightings[-1:]
         self._factor = RealTimeFactor(_FACTOR_WINDOW_S)
 
     def stop(self) -> None:
@@ -129,27 +144,26 @@ class AuthorSimulator(Simulated):
         """Take what it has published."""
         if self._stop_ns:
             return
-        for topic, messages in self._topics.items():
-            for one in messages.take():
-                if self._graph.owner(one.gid) is Owner.COMPANION and self._keep(topic, one):
-                    self._heard.add(topic)
+        for topic, subscription in self._subscriptions.items():
+            for message in subscription.take():
+                is_own = self._graph.owner(message.gid) is Owner.COMPANION
+                if is_own and self._keep(topic, message):
+                    self._topics_with_messages.add(topic)
 
     def lacks(self) -> str | None:
         """What has to be there before the student's programs start, and is not, or None."""
-        ready = self._options.ready
-        for topic in (self._options.truth.topic, self._options.clock):
-            if topic and topic not in self._heard:
-                of = "no message of its own"
-                frame = self._options.truth.frame
-                if frame and topic == self._options.truth.topic:
-                    of += f" with the child frame {frame!r}"
-                return f"there is {of} on {topic}"
-        if ready.topic and not self._has_sent(ready.topic):
+        truth, clock, ready = self._options.truth, self._options.clock, self._options.ready
+        if truth.topic not in self._topics_with_messages:
+            frame = f" with the child frame {truth.frame!r}" if truth.frame else ""
+            return f"there is no message of its own{frame} on {truth.topic}"
+        if clock and clock not in self._topics_with_messages:
+            return f"there is no message of its own on {clock}"
+        if ready.topic and not self._has_published_on(ready.topic):
             return f"there is no message on {ready.topic}"
-        if ready.node and ready.node not in {
-            one.name for one in self._graph.nodes if one.owner is Owner.COMPANION
-        }:
-            return f"there is no node {ready.node} of its own"
+        if ready.node:
+            own_nodes = {n.name for n in self._graph.nodes if n.owner is Owner.COMPANION}
+            if ready.node not in own_nodes:
+                return f"there is no node {ready.node} of its own"
         if ready.service:
             services = self._probe.node.get_service_names_and_types()
             if ready.service not in {name for name, _ in services}:
@@ -161,7 +175,7 @@ class AuthorSimulator(Simulated):
         if not self._began_ns:
             return
         now_ns = self._stop_ns or time.time_ns()
-        silent_s = (now_ns - max(self._robot.seen[-1].time_ns, self._began_ns)) / NS
+        silent_s = (now_ns - max(self._robot.sightings[-1].time_ns, self._began_ns)) / NS
         limit_s = _SILENT_AT_END_S if self._stop_ns else _SILENT_S
         if silent_s > limit_s:
             limit = format_duration(limit_s)
@@ -177,96 +191,106 @@ class AuthorSimulator(Simulated):
     @property
     def truth(self) -> tuple[Truth, ...]:
         """Every step so far, oldest first."""
-        return truth_of(self._robot.seen, list(self._commands()), self._robot.contacts)
+        return truth_of(self._robot.sightings, list(self._commands()), self._robot.contacts)
 
     @property
     def incidents(self) -> tuple[Incident, ...]:
-        """Nodes of the student's that publish where only the simulator is believed."""
+        """Publishers of the student's on topics where only the simulator is believed."""
         return tuple(
-            Incident(one.appeared_ns, FORGED, f"{one.node} publishes on {one.topic}")
-            for one in self._graph.endpoints
-            if one.owner is Owner.STUDENT
-            and one.kind is Kind.PUBLISHER
-            and one.topic in self._trusted
+            Incident(item.appeared_ns, FORGED, f"{item.node} publishes on {item.topic}")
+            for item in self._graph.endpoints
+            if item.owner is Owner.STUDENT
+            and item.kind is Kind.PUBLISHER
+            and item.topic in self._truth_topics
         )
 
     @property
     def scenes(self) -> dict[str, Scene]:
         """The robot, and what is known of its world."""
         options, order = self._options, self._order
-        world = read_scenario_world(Path(order.map), order.values) if order.map else None
+        outlines: dict[str, tuple[Capsule, ...]] = {}
+        lines: tuple[tuple[tuple[float, float], ...], ...] = ()
+        if order.map:
+            world = read_scenario_world(Path(order.map), order.values)
+            outlines = {shape.label: tuple(shape.capsules) for shape in world.shapes}
+            lines = tuple(line.points for line in world.lines)
         return {
             "": Scene(
                 radius_m=options.radius,
                 max_linear_m_s=options.max_speed,
                 max_angular_rad_s=options.max_angular_speed,
-                outlines={one.label: tuple(one.capsules) for one in world.shapes} if world else {},
+                outlines=outlines,
                 moving=(),
                 began_ns=self._began_ns,
                 command_topic=options.command.topic,
                 odometry_topic=options.odometry.topic if options.odometry else "",
                 scan_topic=options.scan.topic if options.scan else "",
                 acceleration_m_s2=options.max_acceleration,
-                lines=tuple(line.points for line in world.lines) if world else (),
+                lines=lines,
             )
         }
 
-    def _keep(self, topic: str, one: Signed) -> bool:
-        """Keep a message; whether it says what it is for."""
+    def _keep(self, topic: str, message: Signed) -> bool:
+        """Keep a message; False if it is on the topic of the truth and has no pose of the robot."""
         if topic == self._options.clock:
-            self._factor.note(one.time_ns, _nanoseconds(one.value.clock))
+            self._factor.note(message.time_ns, _nanoseconds(message.value.clock))
         elif topic == self._options.contact:
-            self._robot.touch(one.time_ns, one.value.data)
+            self._robot.add_contact(message.time_ns, message.value.data)
         elif topic == self._options.truth.topic:
-            found = sighting_of(one, self._options.truth)
-            if found is None:
+            sighting = sighting_of(message, self._options.truth)
+            if sighting is None:
                 return False
-            self._robot.keep(found)
+            self._robot.add_sighting(sighting)
         return True
 
-    def _has_sent(self, topic: str) -> bool:
-        """Whether it has published there; from now on that is watched."""
-        if topic not in self._topics:
-            for one in self._graph.endpoints:
-                if one.topic == topic and one.kind is Kind.PUBLISHER:
-                    kind = import_interface(one.type)
-                    self._topics[topic] = SignedMessages(self._probe.node, topic, kind)
+    def _has_published_on(self, topic: str) -> bool:
+        """Whether it has published there; the first such question subscribes to the topic."""
+        if topic not in self._subscriptions:
+            for endpoint in self._graph.endpoints:
+                if endpoint.topic == topic and endpoint.kind is Kind.PUBLISHER:
+                    interface = import_interface(endpoint.type)
+                    self._subscriptions[topic] = SignedMessages(self._probe.node, topic, interface)
                     break
-        return topic in self._heard
+        return topic in self._topics_with_messages
 
     def _commands(self) -> Iterator[tuple[int, Twist]]:
-        """What was commanded from when on."""
+        """Times, and the velocity that is commanded from then on."""
         command = self._options.command
-        for one in self._probe.messages:
-            if one.topic == command.topic and not one.join:
-                value = deserialize_message(one.cdr, import_interface(command.type))
-                value = getattr(value, "twist", value)
-                twist = Twist(value.linear.x, value.angular.z)
-                if twist.is_finite:
-                    yield one.received_ns, twist
+        interface = import_interface(command.type)
+        for message in self._probe.messages:
+            # What late joiners hear was recorded before.
+            if message.topic != command.topic or message.join:
+                continue
+            value = deserialize_message(message.cdr, interface)
+            # A TwistStamped holds the Twist.
+            value = getattr(value, "twist", value)
+            twist = Twist(value.linear.x, value.angular.z)
+            if twist.is_finite:
+                yield message.received_ns, twist
 
 
-def sighting_of(one: Signed, truth: TruthTopic) -> Sighting | None:
+def sighting_of(message: Signed, truth: TruthTopic) -> Sighting | None:
     """The pose in a message, or None where it has none of the robot."""
-    value, stamp = one.value, None
+    value = message.value
     if truth.frame is not None:
         of_robot = (t for t in value.transforms if t.child_frame_id == truth.frame)
         value = next(of_robot, None)
         if value is None:
             return None
-    if hasattr(value, "header"):
-        stamp = _nanoseconds(value.header.stamp)
+    stamp_ns = _nanoseconds(value.header.stamp) if hasattr(value, "header") else 0
+    # An Odometry has pose.pose, a PoseStamped pose, a TransformStamped transform, a Pose none.
     for part in ("pose", "pose", "transform"):
         value = getattr(value, part, value)
-    place = getattr(value, "position", None) or value.translation
-    turn = getattr(value, "orientation", None) or value.rotation
-    yaw_rad = math.atan2(
-        2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2)
-    )
-    pose = Pose(place.x, place.y, yaw_rad)
+    if hasattr(value, "position"):
+        position, rotation = value.position, value.orientation
+    else:
+        position, rotation = value.translation, value.rotation
+    x, y, z, w = rotation.x, rotation.y, rotation.z, rotation.w
+    yaw_rad = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y**2 + z**2))
+    pose = Pose(position.x, position.y, yaw_rad)
     if not all(map(math.isfinite, (pose.x_m, pose.y_m, yaw_rad))):
         return None
-    return Sighting(one.time_ns, stamp or one.time_ns, pose)
+    return Sighting(message.time_ns, stamp_ns or message.time_ns, pose)
 
 
 def _nanoseconds(stamp: Any) -> int:

@@ -183,7 +183,8 @@ class Cell:
             sorted((*printed, *self._probe.logs), key=lambda line: line.time_ns),
             self._output.declarations,
         )
-        calls = [call for call in self._probe.calls if call.requested_ns <= self._stop_ns]
+        executor_calls = self._probe.executor_calls.calls
+        calls = [call for call in executor_calls if call.requested_ns <= self._stop_ns]
         calls += self._context.calls.calls
         environment = {**self._order.environment, "domain_id": str(self._domain_id)}
         if self._other_domains:
@@ -295,7 +296,7 @@ class Cell:
             if not paused_ns:
                 # Wakes executors that wait for nothing else.
                 for node in self._graph.nodes:
-                    self._probe.call_executor(node.name, "list_parameters")
+                    self._probe.executor_calls.call(node.name, "list_parameters")
             elif time.time_ns() - max(paused_ns) > length_s * NS:
                 break
             if watch.elapsed_s > _UNTIL_PAUSED_S + length_s:
@@ -322,7 +323,7 @@ class Cell:
         return not self._students.poll() and not self._later
 
     def _start_again(self, name: str) -> None:
-        self._probe.counts_servers = False
+        self._probe.executor_calls.counts_servers = False
         self._start(next(item for item in self._order.commands if item.name == name))
 
     def _start(self, command: ProcessCommand) -> None:

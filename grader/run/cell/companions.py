@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from grader.run.cell.author_simulator import AuthorSimulator
 
 _PIPES_LIMIT_S = 1.0
-_SHOWN_LINES = 3
+_QUOTED_LINES = 3
 _SETTLED_S = 1.0
 """Nodes of a launch file come one after the other; what comes later would be the student's."""
 
 
 class Companions:
-    """They are started and stopped as the student's are, and nothing of theirs is judged.
+    """Starts, watches and stops them, as the student's programs; nothing of theirs is judged.
 
     In a sandbox they run in the trusted part of the cell.
     """
@@ -42,8 +42,9 @@ class Companions:
         self._simulator = simulator
         self._output = OutputReader(order.limits.output_bytes)
         self._processes = StudentProcesses(self._output, meter)
-        self._has_files = any(one.is_launch_file for one in order.companions)
-        self._started: Stopwatch | None = None
+        self._has_launch_files = any(one.is_launch_file for one in order.companions)
+        self._since_start: Stopwatch | None = None
+        """Runs until they are ready."""
 
     @property
     def pids(self) -> frozenset[int]:
@@ -53,21 +54,21 @@ class Companions:
     def start(self, domain_id: int) -> None:
         """Start them; what is new in the graph is theirs until they are ready."""
         self._graph.newcomers = Owner.COMPANION
-        self._started = Stopwatch(self._meter)
-        of_run = {"ROS_DOMAIN_ID": str(domain_id)}
+        self._since_start = Stopwatch(self._meter)
+        domain = {"ROS_DOMAIN_ID": str(domain_id)}
         environment, folder = self._order.companion_environment, Path(self._order.scratch)
-        for one in self._order.companions:
-            self._processes.launch(one.name, one.argv, environment, of_run, folder)
+        for program in self._order.companions:
+            self._processes.launch(program.name, program.argv, environment, domain, folder)
 
     def are_ready(self) -> bool:
-        """Whether all that is theirs is there; what is new in the graph then is the student's."""
-        if self._lacking() is not None:
+        """Whether all of theirs is in the graph; if so, what is new from now on is the student's."""
+        if self._missing() is not None:
             return False
-        if self._has_files and time.time_ns() - self._graph.changed_ns < _SETTLED_S * NS:
+        if self._has_launch_files and time.time_ns() - self._graph.changed_ns < _SETTLED_S * NS:
             return False
         self._processes.refresh()
         self._graph.newcomers = Owner.STUDENT
-        self._started = None
+        self._since_start = None
         if self._simulator is not None:
             self._simulator.begin()
         return True
@@ -75,47 +76,59 @@ class Companions:
     def faults(self) -> list[str]:
         """A sentence for each that ended by an error, that is not ready in time, or is silent."""
         self._processes.poll()
-        found = []
-        for one in self._processes.records():
-            simulates = self._simulator is not None and one.name == self._simulator.name
-            if one.exited_ns is not None and (one.exit_code or simulates):
-                what = "simulator" if simulates else "companion"
-                found.append(
-                    f"the {what} {one.name} of the assignment ended with exit code "
-                    f"{one.exit_code}: {self._said(one.name)}"
-                )
-        if self._simulator is not None and not found:
+        faults = self._ended()
+        if not faults and self._simulator is not None:
             self._simulator.look()
-            found += self._simulator.faults()
-        simulator = self._simulator
-        limit_s = self._order.limits.discovery_s if simulator is None else simulator.within_s
-        if self._started is not None and self._started.elapsed_s > limit_s and not found:
-            why = self._lacking() or "new nodes come all the time"
-            names = ", ".join(one.name for one in self._order.companions)
-            last = self._said(self._order.companions[0].name)
-            found.append(
-                f"the programs of the assignment ({names}) were not ready within "
-                f"{format_duration(limit_s)}: {why}. The first of them printed last: {last}"
-            )
-        return found
+            faults = list(self._simulator.faults())
+        return faults or self._late()
+
+    def _ended(self) -> list[str]:
+        """Of each that ended by an error; a simulator must not end at all."""
+        faults = []
+        for process in self._processes.records():
+            is_simulator = self._simulator is not None and process.name == self._simulator.name
+            if process.exited_ns is not None and (process.exit_code or is_simulator):
+                faults.append(
+                    f"the {'simulator' if is_simulator else 'companion'} {process.name} of the "
+                    f"assignment ended with exit code {process.exit_code}: "
+                    f"{self._last_lines(process.name)}"
+                )
+        return faults
+
+    def _late(self) -> list[str]:
+        """That they are not ready in time."""
+        limit_s = self._order.limits.discovery_s
+        if self._simulator is not None:
+            limit_s = self._simulator.within_s
+        if self._since_start is None or self._since_start.elapsed_s <= limit_s:
+            return []
+        why = self._missing() or "new nodes come all the time"
+        programs = self._order.companions
+        return [
+            f"the programs of the assignment ({', '.join(one.name for one in programs)}) were not "
+            f"ready within {format_duration(limit_s)}: {why}. The first of them printed last: "
+            f"{self._last_lines(programs[0].name)}"
+        ]
 
     def stop(self) -> list[str]:
-        """End them; what went wrong before."""
-        found = self.faults()
+        """End them, and say what went wrong before."""
+        faults = self.faults()
         self._processes.stop(self._order.limits)
-        return found
+        return faults
 
     def clean_up(self) -> None:
-        """Take what is left of them."""
+        """Kill what is left of them, and read the rest of their output."""
         self._processes.clean_up()
         self._output.close(_PIPES_LIMIT_S)
 
-    def _lacking(self) -> str | None:
-        nodes = [one for one in self._graph.nodes if one.owner is Owner.COMPANION]
+    def _missing(self) -> str | None:
+        """What is not in the graph yet, or None."""
+        nodes = [node for node in self._graph.nodes if node.owner is Owner.COMPANION]
         if len(nodes) < len(self._order.companions):
             return "they have not one node each"
         return self._simulator.lacks() if self._simulator is not None else None
 
-    def _said(self, name: str) -> str:
-        said = " ".join(self._output.tail(name, "stderr", _SHOWN_LINES))
-        return said or "it printed nothing"
+    def _last_lines(self, process: str) -> str:
+        """What a process printed last on stderr."""
+        lines = self._output.tail(process, "stderr", _QUOTED_LINES)
+        return " ".join(lines) or "it printed nothing"

@@ -24,13 +24,21 @@ from grader.recording.model import NS, Endpoint, Kind, Node, Owner, Qos
 _INFRASTRUCTURE = ("/rosout", "/parameter_events")
 _UNKNOWN_NAME = "_NODE_NAME_UNKNOWN_"
 _INFINITE_NS = 2**63 - 1
-_Found = TypeVar("_Found")
-_OfNode = Callable[[str, str], list[tuple[str, list[str]]]]
+_PREFIX_BYTES = 12
+"""Bytes of an endpoint's id that are its participant's, so the same for all of one process."""
+_Item = TypeVar("_Item")
+_ServicesOfNode = Callable[[str, str], list[tuple[str, list[str]]]]
+"""Name and namespace of a node -> its services, or clients, each with its types."""
 
 
 def full_name(namespace: str, name: str) -> str:
     """Fully qualified node name."""
     return f"{namespace.rstrip('/')}/{name}"
+
+
+def participant_of(gid: bytes) -> str:
+    """The id of the participant that an endpoint belongs to."""
+    return gid[:_PREFIX_BYTES].hex()
 
 
 def process_bits(gid: bytes) -> int:
@@ -63,10 +71,11 @@ def _seconds(duration: Any) -> float | None:
     return None if nanoseconds <= 0 or nanoseconds >= _INFINITE_NS else nanoseconds / NS
 
 
-def _note_vanished(known: dict[Any, Any], there: Collection[Any], now_ns: int) -> None:
-    for key, one in known.items():
-        if one.vanished_ns is None and key not in there:
-            known[key] = dataclasses.replace(one, vanished_ns=now_ns)
+def _note_vanished(known: dict[Any, Any], present: Collection[Any], now_ns: int) -> None:
+    """Date the disappearance of everything that is known and not among the keys that are present."""
+    for key, item in known.items():
+        if item.vanished_ns is None and key not in present:
+            known[key] = dataclasses.replace(item, vanished_ns=now_ns)
 
 
 class GraphObserver:
@@ -74,9 +83,10 @@ class GraphObserver:
 
     Args:
         private: In a private network the participants that are here now are the cell's, and
-            those that come later are the student's. Process ids tell nothing there.
+            those that come later are those of :attr:`newcomers`. Process ids tell nothing there.
 
     Attributes:
+        newcomers: Whose the programs are that are being started.
         forbidden_names: Whether a node or a topic has had a name that ROS does not allow. Every
             client library refuses such a name, also when it is asked about it.
         changed_ns: When something came up for the last time.
@@ -100,12 +110,12 @@ class GraphObserver:
         self._clients: dict[tuple[str, str, str], Service] = {}
         self._private = private
         self.newcomers = Owner.STUDENT
-        """Whose the programs are that are being started."""
         self.forbidden_names = False
         self.changed_ns = 0
-        for topic, _ in node.get_topic_names_and_types() if private else ():
-            for info in node.get_publishers_info_by_topic(topic):
-                self._owners[bytes(info.endpoint_gid)[:12].hex()] = Owner.PROBE
+        if private:
+            for topic, _ in node.get_topic_names_and_types():
+                for info in node.get_publishers_info_by_topic(topic):
+                    self._owners[participant_of(bytes(info.endpoint_gid))] = Owner.PROBE
 
     @property
     def nodes(self) -> tuple[Node, ...]:
@@ -132,9 +142,9 @@ class GraphObserver:
         now_ns = time.time_ns()
         nodes: set[tuple[str, str]] = set()
         gids: set[str] = set()
-        for topic, _ in self._found(self._node.get_topic_names_and_types):
+        for topic, _ in self._ask(self._node.get_topic_names_and_types):
             for kind in Kind:
-                for info in self._found(partial(self._infos, kind, topic)):
+                for info in self._ask(partial(self._infos, kind, topic)):
                     if info["node_name"] == _UNKNOWN_NAME:
                         continue
                     nodes.add(self._see_node(info, now_ns))
@@ -142,49 +152,52 @@ class GraphObserver:
                         gids.add(self._see_endpoint(kind, topic, info, now_ns))
         _note_vanished(self._nodes, nodes, now_ns)
         _note_vanished(self._endpoints, gids, now_ns)
-        of_node = self._node.get_service_names_and_types_by_node
-        self._see_services(self._services, of_node, now_ns)
-        of_node = self._node.get_client_names_and_types_by_node
-        self._see_services(self._clients, of_node, now_ns)
+        get_services = self._node.get_service_names_and_types_by_node
+        self._see_services(self._services, get_services, now_ns)
+        get_clients = self._node.get_client_names_and_types_by_node
+        self._see_services(self._clients, get_clients, now_ns)
 
-    def _found(self, ask: Callable[[], Iterable[_Found]]) -> Iterable[_Found]:
-        """The answer to a question about the graph; empty where ROS does not allow a name in it."""
+    def _ask(self, question: Callable[[], Iterable[_Item]]) -> Iterable[_Item]:
+        """The answer of the graph to a question; empty where ROS does not allow a name in it."""
         try:
-            return ask()
+            return question()
         except (NameValidationException, UnicodeDecodeError):
             self.forbidden_names = True
             return ()
 
     def _infos(self, kind: Kind, topic: str) -> list[dict[str, Any]]:
-        """What rclpy makes its TopicEndpointInfo of, which takes longest of all."""
+        """What rclpy makes a TopicEndpointInfo of: to make one takes long, so only new ones are."""
         validate_full_topic_name(topic)
-        ask = getattr(rclpy_implementation, f"rclpy_get_{kind.value}s_info_by_topic")
+        get_infos = getattr(rclpy_implementation, f"rclpy_get_{kind.value}s_info_by_topic")
         with self._node.handle:
-            found: list[dict[str, Any]] = ask(self._node.handle, topic, False)
-        return found
+            infos: list[dict[str, Any]] = get_infos(self._node.handle, topic, False)
+        return infos
 
-    def _services_of(self, ask: _OfNode, base: str, namespace: str) -> list[tuple[str, list[str]]]:
+    def _services_of(
+        self, get_services: _ServicesOfNode, base: str, namespace: str
+    ) -> list[tuple[str, list[str]]]:
         validate_node_name(base)
         validate_namespace(namespace)
         try:
-            return ask(base, namespace)
+            return get_services(base, namespace)
         except NodeNameNonExistentError:
             return []
 
     def _see_node(self, info: dict[str, Any], now_ns: int) -> tuple[str, str]:
         gid = bytes(info["endpoint_gid"])
-        key = (full_name(info["node_namespace"], info["node_name"]), gid[:12].hex())
+        name = full_name(info["node_namespace"], info["node_name"])
+        key = (name, participant_of(gid))
         known = self._nodes.get(key)
         if known is None or known.vanished_ns is not None:
-            self._nodes[key] = Node(key[0], self.owner(gid), now_ns)
+            self._nodes[key] = Node(name, self.owner(gid), now_ns)
             self.changed_ns = now_ns
         return key
 
-    def _see_endpoint(self, kind: Kind, topic: str, found: dict[str, Any], now_ns: int) -> str:
-        gid = bytes(found["endpoint_gid"])
+    def _see_endpoint(self, kind: Kind, topic: str, fields: dict[str, Any], now_ns: int) -> str:
+        gid = bytes(fields["endpoint_gid"])
         key = gid.hex()
         if key not in self._endpoints:
-            info = TopicEndpointInfo(**found)
+            info = TopicEndpointInfo(**fields)
             self._endpoints[key] = Endpoint(
                 kind=kind,
                 topic=topic,
@@ -204,25 +217,32 @@ class GraphObserver:
         return key
 
     def _see_services(
-        self, services: dict[tuple[str, str, str], Service], of_node: _OfNode, now_ns: int
+        self,
+        known: dict[tuple[str, str, str], Service],
+        get_services: _ServicesOfNode,
+        now_ns: int,
     ) -> None:
-        seen: set[tuple[str, str, str]] = set()
-        there = [one for one in self._nodes.values() if one.vanished_ns is None]
-        for name in {one.name for one in there if one.owner is Owner.STUDENT}:
-            namespace, _, base = name.rpartition("/")
-            found = self._found(partial(self._services_of, of_node, base, namespace or "/"))
-            seen |= {(service, kind, name) for service, kinds in found for kind in kinds}
-        for key in seen:
-            known = services.get(key)
-            if known is None or known.vanished_ns is not None:
-                first_ns = known.appeared_ns if known is not None else now_ns
-                services[key] = Service(*key, appeared_ns=first_ns)
-                self.changed_ns = now_ns
-        _note_vanished(services, seen, now_ns)
+        """Note the services, or clients, of the student's nodes: name, type and node of each."""
+        present: set[tuple[str, str, str]] = set()
+        nodes = [node for node in self._nodes.values() if node.vanished_ns is None]
+        for node in {node.name for node in nodes if node.owner is Owner.STUDENT}:
+            namespace, _, base = node.rpartition("/")
+            services = self._ask(partial(self._services_of, get_services, base, namespace or "/"))
+            present |= {(service, type, node) for service, types in services for type in types}
+        for key in present:
+            service = known.get(key)
+            if service is None:
+                known[key] = Service(*key, appeared_ns=now_ns)
+            elif service.vanished_ns is not None:
+                known[key] = Service(*key, appeared_ns=service.appeared_ns)
+            else:
+                continue
+            self.changed_ns = now_ns
+        _note_vanished(known, present, now_ns)
 
     def owner(self, gid: bytes) -> Owner:
         """Whose the participant of an endpoint is."""
-        participant = gid[:12].hex()
+        participant = participant_of(gid)
         if participant not in self._owners:
             self._owners[participant] = self._find_owner(process_bits(gid))
         return self._owners[participant]

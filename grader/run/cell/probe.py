@@ -6,10 +6,8 @@ student sends can change it.
 
 from __future__ import annotations
 
-import importlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import rclpy
@@ -17,66 +15,29 @@ from rcl_interfaces.msg import Log
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.exceptions import InvalidServiceNameException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
-from grader.recording.interface import FEEDBACK
 from grader.recording.mcap_writer import RawMessage
-from grader.recording.model import NS, PROBE_NODE, Call, Endpoint, Kind, LogLine, Owner
+from grader.recording.model import NS, PROBE_NODE, Endpoint, Kind, LogLine, Owner
+from grader.run.cell.executor_calls import ExecutorCalls
+from grader.run.cell.interfaces import import_interface, qos_profile
 from grader.run.order import RunLimits, Topic
 from grader.run.process.output import KeptLines
 
 _BEFORE_ALL_NS = 1
+"""What a source timestamp before 1970 is recorded as: earlier than all true ones."""
 _LAST_SEQUENCE = 2**32 - 1
-# One lost answer must not end the observation, and a blocked node must not be flooded.
-_MOST_UNANSWERED = 5
+"""A recording holds the sequence number of a message in 32 bits."""
 _ROSOUT = "/rosout"
 _ROSOUT_DEPTH = 1000
 _LONG_QUEUE = 100
 """Depth from which on messages may wait: at a tenth of a second, no more than 1000 Hz fill it."""
-_LONGEST = 8192
-_LONGEST_NAME = 256
+_LONGEST_LOG_TEXT, _LONGEST_LOGGER_NAME = 8192, 256
 _LEVELS = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "FATAL"}
-
-
-def import_interface(name: str) -> Any:
-    """Import a message class by its interface name."""
-    package, kind, short = name.removesuffix(FEEDBACK).split("/")
-    try:
-        found = getattr(importlib.import_module(f"{package}.{kind}"), short)
-        return found.Impl.FeedbackMessage if name.endswith(FEEDBACK) else found
-    except AttributeError as error:
-        raise ImportError(f"no interface {name}") from error
-
-
-def qos_profile(reliability: str, durability: str, depth: int) -> QoSProfile:
-    """A profile with history keep_last, in the words of the YAML."""
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=depth,
-        reliability=ReliabilityPolicy[reliability.upper()],
-        durability=DurabilityPolicy[durability.upper()],
-    )
-
-
-@dataclass
-class _Pending:
-    requested_ns: int
-    servers: int
-    future: Any = None
-    answers: int = 0
-    answered_ns: int | None = None
-
-    def answer(self) -> None:
-        """Count an answer; the call is answered when every server has."""
-        self.answers += 1
-        if self.answers == self.servers:
-            self.answered_ns = time.time_ns()
 
 
 def match_events(on_match: Callable[[Any], None]) -> SubscriptionEventCallbacks:
@@ -84,8 +45,8 @@ def match_events(on_match: Callable[[Any], None]) -> SubscriptionEventCallbacks:
     return SubscriptionEventCallbacks(matched=on_match, use_default_callbacks=False)
 
 
-class Waiting(MutuallyExclusiveCallbackGroup):
-    """A subscription whose messages wait until they are taken: to be woken for each takes long.
+class _PolledMessages(MutuallyExclusiveCallbackGroup):
+    """For a subscription whose messages the probe takes itself: to be woken for each takes long.
 
     The executor is woken by its first publisher only, because in Fast DDS a message that waits
     wakes also an executor that asked for the events of its subscription.
@@ -100,13 +61,13 @@ class Waiting(MutuallyExclusiveCallbackGroup):
 
 
 class Probe:
-    """Subscribes to the scenario's topics and calls parameter services.
+    """Subscribes to the scenario's topics, and records what arrives.
 
     Attributes:
-        counts_servers: Whether a call is answered only when every server of its service has;
-            what is left of a killed process stays in the graph, but answers nothing.
+        executor_calls: The calls that show whether nodes spin.
+        counts: Topic of the student -> how many messages have arrived.
         recording: Whether what is received is still recorded.
-        afterwards: Topic -> when messages were received since then.
+        afterwards: Topic -> when messages were received since recording ended.
     """
 
     def __init__(self, domain_id: int) -> None:
@@ -122,22 +83,22 @@ class Probe:
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self._waiting: list[tuple[Any, Callable[[Any, Any], None]]] = []
+        self.executor_calls = ExecutorCalls(self.node)
+        self._polled: list[tuple[Any, Callable[[Any, Any], None]]] = []
+        """Subscriptions with a long queue, and what receives their messages."""
         self._is_flooded = False
         self._topics: dict[str, Topic] = {}
         self._limits: RunLimits | None = None
-        self._fallbacks: set[str] = set()
-        self._seen: set[tuple[str, int, int]] = set()
-        self._clients: dict[str, Any] = {}
-        self._calls: dict[str, list[_Pending]] = {}
+        self._topics_heard_twice: set[str] = set()
+        self._messages_heard_twice: set[tuple[str, int, int]] = set()
         self.messages: list[RawMessage] = []
         self._logs = KeptLines(0)
         self.counts: dict[str, int] = {}
-        self._kept: dict[tuple[str, str], int] = {}
+        self._received: dict[tuple[str, str], int] = {}
+        """Topic and late joiner -> how many messages have arrived, kept or not."""
         self.last_message_ns: int | None = None
         self.recording = True
         self.afterwards: dict[str, list[int]] = {}
-        self.counts_servers = True
         self._has_met = False
 
     def listen(self, topics: tuple[Topic, ...], limits: RunLimits) -> None:
@@ -159,8 +120,9 @@ class Probe:
         Services, what is in short queues, and a publisher that comes or goes end the wait.
         """
         self._executor.spin_once(timeout_sec=0.0 if self._is_flooded else limit_s)
-        taken = [self._take(*one) for one in self._waiting]
-        self._is_flooded = any(number > _LONG_QUEUE // 4 for number in taken)
+        taken = [self._take(subscription, receive) for subscription, receive in self._polled]
+        # A queue that was a quarter full may run over in the next wait.
+        self._is_flooded = any(count > _LONG_QUEUE // 4 for count in taken)
 
     def has_met(self) -> bool:
         """Whether an endpoint came or went at one of the probe's since this was last asked."""
@@ -180,12 +142,16 @@ class Probe:
 
     def interval_s(self) -> float:
         """How far apart the student's messages are on average, where they are rarest."""
-        times: dict[str, list[int]] = {name: [] for name in self.student_topics}
-        for item in self.messages:
-            if item.topic in times:
-                times[item.topic].append(item.received_ns)
-        found = ((all_[-1] - all_[0]) / NS / (len(all_) - 1) for all_ in times.values() if all_[1:])
-        return max(found, default=0.0)
+        times_ns: dict[str, list[int]] = {name: [] for name in self.student_topics}
+        for message in self.messages:
+            if message.topic in times_ns:
+                times_ns[message.topic].append(message.received_ns)
+        means_s = [
+            (times[-1] - times[0]) / NS / (len(times) - 1)
+            for times in times_ns.values()
+            if len(times) > 1
+        ]
+        return max(means_s, default=0.0)
 
     def join(self, name: str, topic: str, type: str, profile: QoSProfile) -> Any:
         """Subscribe to a topic from now on, and record it under a name of its own."""
@@ -205,60 +171,14 @@ class Probe:
     def subscribe_leniently(self, endpoint: Endpoint) -> None:
         """Also hear a publisher whose QoS does not match what the probe requested."""
         topic = self._topics[endpoint.topic]
-        if endpoint.kind is not Kind.PUBLISHER:
-            return
         offered = endpoint.qos
-        heard = not (
-            (topic.reliability == "reliable" and offered.reliability == "best_effort")
-            or (topic.durability == "transient_local" and offered.durability == "volatile")
-        )
-        if heard or topic.name in self._fallbacks:
+        if endpoint.kind is not Kind.PUBLISHER or topic.name in self._topics_heard_twice:
             return
-        self._fallbacks.add(topic.name)
-        self._subscribe(topic, "best_effort", "volatile")
-
-    def answers(self, node: str) -> bool | None:
-        """Whether a node answered what it answers only while it spins; None if not called."""
-        calls = [call for name in executor_services(node) for call in self._calls.get(name, ())]
-        return any(call.answered_ns is not None for call in calls) if calls else None
-
-    def last_called_ns(self, node: str) -> int:
-        """When such a service of a node was called for the last time; 0 for never."""
-        calls = (call for name in executor_services(node) for call in self._calls.get(name, ()))
-        return max((call.requested_ns for call in calls), default=0)
-
-    def call_executor(self, node: str, name: str) -> None:
-        """Call a service that a node answers only while it spins, unless many are unanswered."""
-        kind = import_interface(EXECUTOR_SERVICES[name])
-        service = f"{node}/{name}"
-        if service not in self._clients:
-            try:
-                self._clients[service] = self.node.create_client(kind, service)
-            except InvalidServiceNameException:
-                # A node of a very long name, whose own services ROS would not allow either.
-                return
-            self._calls[service] = []
-            _count_answers(self._clients[service], self._calls[service])
-        client, calls = self._clients[service], self._calls[service]
-        unanswered = sum(call.answered_ns is None for call in calls)
-        if unanswered >= _MOST_UNANSWERED or not client.service_is_ready():
-            return
-        servers = self.node.count_services(service) if self.counts_servers else 1
-        pending = _Pending(time.time_ns(), max(1, servers))
-        pending.future = client.call_async(kind.Request())
-        calls.append(pending)
-
-    @property
-    def calls(self) -> tuple[Call, ...]:
-        """Every call so far, oldest first."""
-        found = []
-        for service, calls in self._calls.items():
-            kind = EXECUTOR_SERVICES[service.rpartition("/")[2]]
-            found += [
-                Call(service, kind, call.requested_ns, call.answered_ns, servers=call.servers)
-                for call in calls
-            ]
-        return tuple(sorted(found, key=lambda call: call.requested_ns))
+        too_unreliable = topic.reliability == "reliable" and offered.reliability == "best_effort"
+        too_volatile = topic.durability == "transient_local" and offered.durability == "volatile"
+        if too_unreliable or too_volatile:
+            self._topics_heard_twice.add(topic.name)
+            self._subscribe(topic, "best_effort", "volatile")
 
     def _subscribe(self, topic: Topic, reliability: str, durability: str) -> None:
         profile = qos_profile(reliability, durability, topic.depth)
@@ -278,7 +198,7 @@ class Probe:
         *,
         raw: bool = True,
     ) -> Any:
-        group = Waiting() if profile.depth >= _LONG_QUEUE else None
+        group = _PolledMessages() if profile.depth >= _LONG_QUEUE else None
 
         def met(event: Any) -> None:
             if group is not None:
@@ -295,12 +215,12 @@ class Probe:
             raw=raw,
         )
         if group is not None:
-            self._waiting.append((subscription, receive))
+            self._polled.append((subscription, receive))
         return subscription
 
     def _take(self, subscription: Any, receive: Callable[[Any, Any], None]) -> int:
         """Hand over what waits in a subscription; returns how many messages."""
-        for number in range(_ROSOUT_DEPTH):
+        for count in range(_ROSOUT_DEPTH):
             try:
                 with subscription.handle:
                     taken = subscription.handle.take_message(
@@ -309,7 +229,7 @@ class Probe:
             except RuntimeError:  # a payload that is no such message
                 continue
             if taken is None:
-                return number
+                return count
             receive(*taken)
         return _ROSOUT_DEPTH
 
@@ -320,10 +240,8 @@ class Probe:
 
     def _take_log(self, record: Any, _: Any) -> None:
         stamp_ns = record.stamp.sec * NS + record.stamp.nanosec
-        name, text = (
-            str(value)[:longest].encode(errors="replace").decode()
-            for value, longest in ((record.name, _LONGEST_NAME), (record.msg, _LONGEST))
-        )
+        name = _valid_text(record.name, _LONGEST_LOGGER_NAME)
+        text = _valid_text(record.msg, _LONGEST_LOG_TEXT)
         level = _LEVELS.get(int(record.level), str(record.level))
         # What is recorded has a time after 1970.
         time_ns = stamp_ns if stamp_ns >= 0 else time.time_ns()
@@ -337,16 +255,16 @@ class Probe:
         if self._limits is None:
             return
         if not self.recording:
-            received = self.afterwards.setdefault(topic.name, [])
-            received += [info["received_timestamp"]] * (len(received) < self._limits.messages)
+            received_ns = self.afterwards.setdefault(topic.name, [])
+            if len(received_ns) < self._limits.messages:
+                received_ns.append(info["received_timestamp"])
             return
-        stamp_ns, sequence = info["source_timestamp"], info["publication_sequence_number"]
-        key = (topic.name, stamp_ns, sequence)
         # A topic with a lenient second subscription may deliver a message twice.
-        if key in self._seen:
+        key = (topic.name, info["source_timestamp"], info["publication_sequence_number"])
+        if key in self._messages_heard_twice:
             return
-        if topic.name in self._fallbacks:
-            self._seen.add(key)
+        if topic.name in self._topics_heard_twice:
+            self._messages_heard_twice.add(key)
         if not topic.ours:
             self.counts[topic.name] += 1
             self.last_message_ns = info["received_timestamp"]
@@ -356,8 +274,9 @@ class Probe:
         """Keep a message, within bounds for each topic and late joiner."""
         if not self.recording or self._limits is None:
             return
-        number = self._kept[topic, join] = self._kept.get((topic, join), 0) + 1
-        if number > self._limits.messages or len(data) > self._limits.message_bytes:
+        count = self._received.get((topic, join), 0) + 1
+        self._received[topic, join] = count
+        if count > self._limits.messages or len(data) > self._limits.message_bytes:
             return
         # The writer may have forged both: a value that the format of a recording cannot hold
         # becomes one that no check takes for a time or a number.
@@ -375,16 +294,6 @@ class Probe:
         )
 
 
-def _count_answers(client: Any, calls: list[_Pending]) -> None:
-    """Count every answer to a client's calls, of which rclpy hands on only the first."""
-    find = client.get_pending_request
-    asked: dict[int, _Pending] = {}
-
-    def found(sequence: int) -> Any:
-        if sequence not in asked:
-            future = find(sequence)
-            asked[sequence] = next(call for call in calls if call.future is future)
-        asked[sequence].answer()
-        return find(sequence)
-
-    client.get_pending_request = found
+def _valid_text(text: Any, most: int) -> str:
+    """The beginning of a text; what is no Unicode (a lone surrogate) becomes a question mark."""
+    return str(text)[:most].encode(errors="replace").decode()

@@ -48,7 +48,7 @@ class Readiness:
     def never_answered(self) -> bool:
         """Whether it is there, but its node never answered what it answers while it spins."""
         node = self._context.server(self._service) if self._there is not None else None
-        return node is not None and self._context.probe.answers(node) is False
+        return node is not None and self._context.probe.executor_calls.has_answered(node) is False
 
     @property
     def is_missing(self) -> bool:
@@ -77,9 +77,9 @@ class Readiness:
         node = self._context.server(self._service)
         if node is None:
             return None
-        if time.time_ns() - self._context.probe.last_called_ns(node) > _LOOK_NS:
+        if time.time_ns() - self._context.probe.executor_calls.last_called_ns(node) > _LOOK_NS:
             self._context.call_executor(node)
-        return self._context.probe.answers(node)
+        return self._context.probe.executor_calls.has_answered(node)
 
 
 class Requesting(Playing):

@@ -86,7 +86,7 @@ class StimulusContext:
         appeared_ns = seen.get(f"{node}/{second}")
         settled = appeared_ns is not None and time.time_ns() - appeared_ns > _SETTLED_NS
         lacks_first = f"{node}/{first}" not in seen and settled
-        self.probe.call_executor(node, second if lacks_first else first)
+        self.probe.executor_calls.call(node, second if lacks_first else first)
 
     @property
     def student_nodes(self) -> list[str]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from grader.recording.model import NS
-from grader.run.cell.probe import import_interface
+from grader.run.cell.interfaces import import_interface
 
 _NOW = "now"
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from grader.assignment.stimuli.kinds.request import SendGoal
 from grader.recording.interaction import NO_SERVER, Feedback, Goal
-from grader.run.cell.probe import import_interface
+from grader.run.cell.interfaces import import_interface
 from grader.run.stimuli.calling import Requesting
 from grader.run.stimuli.context import StimulusContext, plays
 from grader.run.stimuli.filling import filled, plain

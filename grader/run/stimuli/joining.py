@@ -8,7 +8,7 @@ from typing import Any
 
 from grader.assignment.stimuli.kinds.join import Join as JoinLate
 from grader.recording.model import Join, Qos
-from grader.run.cell.probe import qos_profile
+from grader.run.cell.interfaces import qos_profile
 from grader.run.stimuli.context import Playing, StimulusContext, plays
 
 # What a publisher keeps for late joiners arrives within this of the match.

@@ -12,7 +12,7 @@ from grader.assignment.stimuli.kinds.publish import Publish
 from grader.measure.compatibility import refusals
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import Kind, Qos
-from grader.run.cell.probe import import_interface, qos_profile
+from grader.run.cell.interfaces import import_interface, qos_profile
 from grader.run.host.stopwatch import Stopwatch
 from grader.run.stimuli.answers import Answers
 from grader.run.stimuli.context import Patience, Playing, StimulusContext, plays

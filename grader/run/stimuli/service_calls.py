@@ -9,7 +9,8 @@ from dataclasses import replace
 from typing import Any
 
 from grader.recording.model import Call
-from grader.run.cell.probe import Probe, import_interface
+from grader.run.cell.interfaces import import_interface
+from grader.run.cell.probe import Probe
 from grader.run.stimuli.filling import filled, plain
 
 

@@ -16,7 +16,7 @@ from grader.assignment.stimuli.kinds.serve import ServeService
 from grader.findings.fields import unlike
 from grader.recording.interaction import Asked
 from grader.recording.model import NS
-from grader.run.cell.probe import import_interface
+from grader.run.cell.interfaces import import_interface
 from grader.run.stimuli.context import Playing, StimulusContext, plays
 from grader.run.stimuli.filling import filled, plain
 from sim.node import make_node
@@ -71,7 +71,7 @@ class Serving(Playing):
         super().tick(elapsed_s)
         probe, there = self._context.probe, self._context.graph.clients
         for node in {one.node for one in there if one.vanished_ns is None}:
-            if time.time_ns() - probe.last_called_ns(node) > _LOOK_NS:
+            if time.time_ns() - probe.executor_calls.last_called_ns(node) > _LOOK_NS:
                 self._context.call_executor(node)
 
     @property
