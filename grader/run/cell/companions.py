@@ -61,7 +61,7 @@ class Companions:
             self._processes.launch(program.name, program.argv, environment, domain, folder)
 
     def are_ready(self) -> bool:
-        """Whether all of theirs is in the graph; if so, what is new from now on is the student's."""
+        """Whether all of them are in the graph; if so, what is new after that is the student's."""
         if self._missing() is not None:
             return False
         if self._has_launch_files and time.time_ns() - self._graph.changed_ns < _SETTLED_S * NS:

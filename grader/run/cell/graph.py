@@ -72,7 +72,7 @@ def _seconds(duration: Any) -> float | None:
 
 
 def _note_vanished(known: dict[Any, Any], present: Collection[Any], now_ns: int) -> None:
-    """Date the disappearance of everything that is known and not among the keys that are present."""
+    """Date the disappearance of what is known, and not among the keys that are present."""
     for key, item in known.items():
         if item.vanished_ns is None and key not in present:
             known[key] = dataclasses.replace(item, vanished_ns=now_ns)

@@ -15,6 +15,7 @@ from typing import Any
 from grader.recording.model import Declaration, LogLine
 
 _READ_BYTES = 1 << 16
+"""What a pipe of Linux holds."""
 _LONGEST_LINE = 8192
 # What a program writes with print(..., end=" ", flush=True) has no line end. Without a buffer
 # print(a, b) writes in four pieces, between which a busy machine may hold it up; what courses
@@ -22,16 +23,19 @@ _LONGEST_LINE = 8192
 _LONGEST_WAIT_NS = 400_000_000
 _MOST_DECLARATIONS = 10_000
 _LARGEST_NUMBER = 2**63
-_OF_ENDPOINTS = ("publisher", "subscription")
+"""A recording holds numbers in 64 bits."""
+_TRACER = "tracer"
+"""Name of the stream on which a tracer reports, besides stdout and stderr."""
+_KINDS_WITH_DEPTH = ("publisher", "subscription")
 _KINDS = frozenset(
     {
-        *_OF_ENDPOINTS,
+        *_KINDS_WITH_DEPTH,
         *("started", "imported", "init", "node", "timer", "added", "spin", "published", "held"),
         *("made", "ran", "stands", "destroyed", "paused", "leaving", "exiting"),
     }
 )
 """Kinds of declarations of a tracer; see ``tracer/sitecustomize.py``."""
-_OF_PROCESS = frozenset({"started", "leaving"})
+_KINDS_OF_LAUNCHED_PROCESS = frozenset({"started", "leaving"})
 """Kinds that count only for the process that was launched, not for those that it starts."""
 
 
@@ -67,6 +71,8 @@ class KeptLines:
 
 
 class _Stream:
+    """One pipe of a process, cut into lines."""
+
     def __init__(
         self,
         process: str,
@@ -79,11 +85,13 @@ class _Stream:
         self._on_line = on_line
         self.kept = KeptLines(limit)
         self.written_bytes = 0
+        self.launched_pid: int | None = None
         self._partial = b""
-        self.pid: int | None = None
-        self._begun_ns = 0
+        """What was written since the last line end."""
+        self._partial_began_ns = 0
         self._newest_ns = 0
-        self._ended = False
+        self._skips_line_feed = False
+        """Whether a line was ended already without the line feed that may come next."""
 
     def feed(self, data: bytes, now_ns: int | None = None) -> None:
         """Split into lines; what has no line end is cut at a bound, and after 400 ms.
@@ -92,16 +100,17 @@ class _Stream:
         """
         now_ns = time.time_ns() if now_ns is None else now_ns
         self.written_bytes += len(data)
-        waited = bool(self._partial) and now_ns - self._begun_ns > _LONGEST_WAIT_NS
-        if waited and self.name != "tracer":
+        has_waited = self._partial and now_ns - self._partial_began_ns > _LONGEST_WAIT_NS
+        if has_waited and self.name != _TRACER:
             self.finish()
-            self._ended = True
-        if self._ended:
+            self._skips_line_feed = True
+        if self._skips_line_feed:
             data = data.removeprefix(b"\n")
-        self._ended = data.endswith(b"\r")
+        # Of \r\n the second half may come with the next piece.
+        self._skips_line_feed = data.endswith(b"\r")
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         if not self._partial or b"\n" in data:
-            self._begun_ns = now_ns
+            self._partial_began_ns = now_ns
         self._newest_ns = now_ns
         *lines, self._partial = (self._partial + data).split(b"\n")
         for line in lines:
@@ -116,14 +125,13 @@ class _Stream:
             self._add(self._partial, self._newest_ns)
             self._partial = b""
 
-    def _add(self, line: bytes, now_ns: int) -> None:
-        over = max(0, len(line) - _LONGEST_LINE)
-        text = line[:_LONGEST_LINE].decode(errors="replace")
-        self.kept.dropped_bytes += over
-        kept = LogLine(now_ns, self.process, self.name, text)
-        self.kept.add(kept)
+    def _add(self, data: bytes, now_ns: int) -> None:
+        self.kept.dropped_bytes += max(0, len(data) - _LONGEST_LINE)
+        text = data[:_LONGEST_LINE].decode(errors="replace")
+        line = LogLine(now_ns, self.process, self.name, text)
+        self.kept.add(line)
         if self._on_line is not None:
-            self._on_line(kept)
+            self._on_line(line)
 
 
 class OutputReader:
@@ -135,7 +143,7 @@ class OutputReader:
         self._selector = selectors.DefaultSelector()
         self._streams: list[_Stream] = []
         self._declarations: list[Declaration] = []
-        self._foreign: set[str] = set()
+        self._forgers: set[str] = set()
         self._lock = threading.Lock()
         self._wake_read, self._wake_write = os.pipe()
         self._selector.register(self._wake_read, selectors.EVENT_READ, None)
@@ -146,7 +154,7 @@ class OutputReader:
     def add(self, fd: int, process: str, stream: str) -> None:
         """Read a pipe (stdout, stderr or tracer) until its end; it belongs to the reader now."""
         os.set_blocking(fd, False)
-        on_line = self._on_line if stream != "tracer" else None
+        on_line = self._on_line if stream != _TRACER else None
         target = _Stream(process, stream, self._limit, on_line)
         with self._lock:
             self._streams.append(target)
@@ -161,13 +169,13 @@ class OutputReader:
     @property
     def forgers(self) -> frozenset[str]:
         """Processes in which other code than the tracer wrote to the tracer's pipe."""
-        return frozenset(self._foreign)
+        return frozenset(self._forgers)
 
     def tail(self, process: str, stream: str, lines: int) -> list[str]:
         """The newest lines of a stream, for messages."""
-        for item in list(self._streams):
-            if item.process == process and item.name == stream:
-                return [line.text for line in item.kept.lines[-lines:]]
+        for known in list(self._streams):
+            if known.process == process and known.name == stream:
+                return [line.text for line in known.kept.lines[-lines:]]
         return []
 
     def close(self, limit_s: float) -> tuple[LogLine, ...]:
@@ -177,7 +185,7 @@ class OutputReader:
         self._thread.join(limit_s)
         for stream in self._streams:
             stream.finish()
-        outputs = [stream for stream in self._streams if stream.name != "tracer"]
+        outputs = [stream for stream in self._streams if stream.name != _TRACER]
         lines = [line for stream in outputs for line in stream.kept.lines]
         return tuple(sorted(lines, key=lambda line: line.time_ns))
 
@@ -191,6 +199,7 @@ class OutputReader:
         return sum(s.kept.dropped_bytes for s in self._streams if s.process == process)
 
     def _run(self) -> None:
+        # The pipe that wakes this thread is the last that is left.
         while not (self._closing and len(self._selector.get_map()) == 1):
             for key, _ in self._selector.select():
                 if key.data is None:
@@ -210,7 +219,7 @@ class OutputReader:
             os.close(fd)
             return
         stream.feed(data)
-        if stream.name == "tracer":
+        if stream.name == _TRACER:
             self._take_declarations(stream)
 
     def _take_declarations(self, stream: _Stream) -> None:
@@ -219,15 +228,17 @@ class OutputReader:
         stream.kept = KeptLines(self._limit)
         for line in lines:
             data = _parsed(line.text)
-            if not data:
-                if line.process not in self._foreign:
-                    self._foreign.add(line.process)
+            if data is None:
+                if line.process not in self._forgers:
+                    self._forgers.add(line.process)
                     self._declare(line, "foreign", {})
                 continue
-            # The first to start is the one that was launched.
-            stream.pid = data["pid"] if stream.pid is None else stream.pid
-            is_own = data["pid"] == stream.pid or data["kind"] not in _OF_PROCESS
-            if is_own and _is_fit(data):
+            if stream.launched_pid is None:
+                # The first to report is the process that was launched.
+                stream.launched_pid = data["pid"]
+            is_launched = data["pid"] == stream.launched_pid
+            counts = is_launched or data["kind"] not in _KINDS_OF_LAUNCHED_PROCESS
+            if counts and _can_be_recorded(data):
                 self._declare(line, data.pop("kind"), data)
 
     def _declare(self, line: LogLine, kind: str, data: dict[str, Any]) -> None:
@@ -235,26 +246,30 @@ class OutputReader:
             self._declarations.append(Declaration(line.time_ns, line.process, kind, data))
 
 
-def _parsed(text: str) -> dict[str, Any]:
-    """The data in a line of a tracer; empty if a tracer cannot have written it."""
+def _parsed(text: str) -> dict[str, Any] | None:
+    """The data in a line of a tracer; None if a tracer cannot have written it."""
     try:
-        data = json.loads(text, parse_constant=lambda _: None)
+        data: dict[str, Any] = json.loads(text, parse_constant=lambda _: None)
         is_known = data["kind"] in _KINDS and isinstance(data["pid"], int)
-        is_whole = data["kind"] not in _OF_ENDPOINTS or type(data["depth"]) is int
+        is_whole = data["kind"] not in _KINDS_WITH_DEPTH or type(data["depth"]) is int
     except (ValueError, RecursionError, TypeError, KeyError):
-        return {}
-    return data if is_known and is_whole else {}
+        return None
+    return data if is_known and is_whole else None
 
 
-def _is_fit(data: dict[str, Any]) -> bool:
-    """Whether it can be recorded: the student, too, can write to the pipe, large and deep."""
-    inner = [value for value in data.values() if isinstance(value, dict)]
-    values = [value for item in (data, *inner) for value in item.values() if value not in inner]
-    keys = [key for item in (data, *inner) for key in item]
-    return all(map(_is_plain, (*values, *keys)))
+def _can_be_recorded(data: dict[str, Any]) -> bool:
+    """Whether it is flat, or one level deep: the student, too, can write to the pipe."""
+    for value in data.values():
+        if isinstance(value, dict):
+            if not all(map(_is_plain, (*value.keys(), *value.values()))):
+                return False
+        elif not _is_plain(value):
+            return False
+    return all(map(_is_plain, data))
 
 
 def _is_plain(value: Any) -> bool:
+    """Whether it is nothing, a number of 64 bits, or a text without lone surrogates."""
     if isinstance(value, str):
         return not any("\ud800" <= char <= "\udfff" for char in value)
     if isinstance(value, int | float):
