@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from grader.run.stimuli.driving import command, distance_m, target
+from grader.run.stimuli.driving import Target, command, distance_m, target
 from sim.description import SimulatorOptions
 from sim.simulation import make_simulation
 from sim.world import parse_world
@@ -30,8 +30,10 @@ def test_a_pose_is_read_from_any_message(goal: object, path: str, yaw_rad: float
     assert found[2] == (yaw_rad if yaw_rad is None else pytest.approx(yaw_rad))
 
 
-@pytest.mark.parametrize("goal", [(1.0, 0.0, None), (-0.5, 0.5, 1.5), (0.0, -0.7, 3.1)])
-def test_the_robot_arrives_and_stops(goal: tuple[float, float, float | None]) -> None:
+@pytest.mark.parametrize(
+    "goal", [Target(1.0, 0.0, None), Target(-0.5, 0.5, 1.5), Target(0.0, -0.7, 3.1)]
+)
+def test_the_robot_arrives_and_stops(goal: Target) -> None:
     simulation = make_simulation(parse_world("{}"), SimulatorOptions(), seed=1)
     for _ in range(1500):
         twist = command(simulation.pose, goal, 0.2)

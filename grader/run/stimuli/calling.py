@@ -12,8 +12,8 @@ from grader.run.host.stopwatch import Stopwatch
 from grader.run.stimuli.context import Patience, Playing, StimulusContext, plays
 
 _POLL_S = 0.02
-# The server may match the client, for its answers, a moment later than the client the server.
 _GRACE_S = 0.1
+"""The server may match the client, for its answers, a moment later than the client the server."""
 _LOOK_NS = NS // 2
 """Time between two looks whether a node spins."""
 _MISSING_S = 1.0
@@ -31,8 +31,8 @@ class Readiness:
         self._service = service
         self._context = context
         self._patience = Patience(what, context)
-        self._there: Stopwatch | None = None
-        self.there_ns = 0
+        self._since_appeared: Stopwatch | None = None
+        self.appeared_ns = 0
 
     @property
     def given_up(self) -> bool:
@@ -42,43 +42,55 @@ class Readiness:
     @property
     def is_in_vain(self) -> bool:
         """Whether the wait for the server began, and it is not there."""
-        return self._patience.began_ns > 0 and self._there is None
+        return self._patience.began_ns > 0 and self._since_appeared is None
 
     @property
     def never_answered(self) -> bool:
         """Whether it is there, but its node never answered what it answers while it spins."""
-        node = self._context.server(self._service) if self._there is not None else None
-        return node is not None and self._context.probe.executor_calls.has_answered(node) is False
+        if self._since_appeared is None:
+            return False
+        node = self._context.server(self._service)
+        return node is not None and self._has_answered(node) is False
 
     @property
     def is_missing(self) -> bool:
         """Whether it is not there, and probably will not come."""
-        return self._there is None and self._context.calm_s > _MISSING_S
+        return self._since_appeared is None and self._context.calm_s > _MISSING_S
 
-    def met(self, is_there: bool) -> bool:
-        """Whether a request can be sent.
+    def may_send(self, is_there: bool) -> bool:
+        """Whether a request can be sent, to a server that is there or not; called again and again.
 
         A request during a constructor would be late through no fault of the server's: its node
         has to answer another call first, unless it does not in the time that it has to start.
         """
         if not self._patience.look(is_there):
-            self._there = None
+            self._since_appeared = None
             return False
-        if self._there is None:
-            self._there, self.there_ns = Stopwatch(self._context.meter), time.time_ns()
-        if self._there.elapsed_s < _GRACE_S:
+        if self._since_appeared is None:
+            self._since_appeared, self.appeared_ns = Stopwatch(self._context.meter), time.time_ns()
+        if self._since_appeared.elapsed_s < _GRACE_S:
             return False
-        spins = self.look()
-        limit_s = _UNCALLABLE_S if spins is None else self._context.limits.discovery_s
-        return bool(spins) or self._there.elapsed_s > limit_s
+        has_answered = self.call_node()
+        if has_answered:
+            return True
+        is_uncallable = has_answered is None
+        limit_s = _UNCALLABLE_S if is_uncallable else self._context.limits.discovery_s
+        return self._since_appeared.elapsed_s > limit_s
 
-    def look(self) -> bool | None:
-        """Call the server's node for what it answers only while it spins; whether it ever did."""
+    def call_node(self) -> bool | None:
+        """Call the server's node for what it answers only while it spins, from time to time.
+
+        Returns:
+            Whether it ever answered; None if there is nothing to call.
+        """
         node = self._context.server(self._service)
         if node is None:
             return None
         if time.time_ns() - self._context.probe.executor_calls.last_called_ns(node) > _LOOK_NS:
             self._context.call_executor(node)
+        return self._has_answered(node)
+
+    def _has_answered(self, node: str) -> bool | None:
         return self._context.probe.executor_calls.has_answered(node)
 
 
@@ -92,7 +104,7 @@ class Requesting(Playing):
         self._ready = Readiness(what, service, context)
         self._since_sent: Stopwatch | None = None
         self._now_s = 0.0
-        self._place = len(context.requests)
+        self._position = len(context.requests)
         context.requests.append(self)
 
     @property
@@ -107,10 +119,10 @@ class Requesting(Playing):
 
     def holds_up(self, other: Requesting) -> bool:
         """Whether another stimulus has to wait for this one, which is due or written earlier."""
-        if self.is_through or self._place == other._place:
+        if self.is_through or self is other:
             return False
         if self._order.after == other._order.after:
-            return self._place < other._place and not self._ready.is_missing
+            return self._position < other._position and not self._ready.is_missing
         # On a busy machine a service may be found later than another one that is due later.
         return bool(self._order.after < other._order.after)
 
@@ -131,7 +143,7 @@ class Requesting(Playing):
         self._now_s = elapsed_s
         since = self._since_sent
         if since is not None and since.elapsed_s > _GRACE_S and not self.is_done:
-            self._ready.look()
+            self._ready.call_node()
 
 
 @plays(CallService, Lifecycle)
@@ -139,15 +151,15 @@ class Calling(Requesting):
     """Requests to services of one node, one after another or several at once."""
 
     def __init__(self, order: CallService | Lifecycle, context: StimulusContext) -> None:
-        self._asked = order.asked
-        self._services = {one.service: one.type for one in self._asked}
-        service = self._asked[0].service
+        self._requests = order.asked
+        self._types = {request.service: request.type for request in self._requests}
+        service = self._requests[0].service
         super().__init__(order, f"a service {service}", service, context)
-        self._started = False
+        self._may_begin = False
         self._sent = 0
-        self._sent_s = 0.0
-        self._round: list[int] = []
-        self._failed: str | None = None
+        self._last_sent_s = 0.0
+        self._newest_calls: list[int] = []
+        self._fault: str | None = None
 
     @property
     def is_through(self) -> bool:
@@ -157,57 +169,64 @@ class Calling(Requesting):
     @property
     def is_done(self) -> bool:
         """Whether everything was sent, and answered or waited for; or there is no server."""
-        if self._failed is not None or self._ready.given_up:
+        if self._fault is not None or self._ready.given_up:
             return True
-        return self._sent >= len(self._asked) and self._is_over
+        return self._sent >= len(self._requests) and self._is_over
 
     @property
     def due_s(self) -> float | None:
         """When to look next."""
-        pause_s = self._asked[self._sent].pause_s if 0 < self._sent < len(self._asked) else None
-        return super().due_s if pause_s is None else self._sent_s + pause_s
+        if 0 < self._sent < len(self._requests):
+            pause_s = self._requests[self._sent].pause_s
+            if pause_s is not None:
+                return self._last_sent_s + pause_s
+        return super().due_s
 
     def play(self, elapsed_s: float) -> None:
         """Call when it is due."""
-        order, calls = self._order, self._context.calls
-        if self._failed is not None:
+        calls = self._context.calls
+        if self._fault is not None:
             return
         super().play(elapsed_s)
-        if not self._started:
+        if not self._may_begin:
             try:
-                there = all(calls.is_ready(*one) for one in self._services.items())
+                is_there = all(calls.is_ready(*service) for service in self._types.items())
             except ImportError as error:
-                types = " and ".join(self._services.values())
-                self._failed = f"the interface {types} is not installed ({error})"
+                types = " and ".join(self._types.values())
+                self._fault = f"the interface {types} is not installed ({error})"
                 return
-            self._started = self._ready.met(there) and self._is_turn
-        if not self._started or self._sent >= len(self._asked):
+            self._may_begin = self._ready.may_send(is_there) and self._is_turn
+        if not self._may_begin or self._sent >= len(self._requests):
             return
         if self._sent and not self._is_next_due:
             return
-        one = self._asked[self._sent]
-        at_once = range(order.at_once)
-        self._round = [calls.send(one.service, one.type, one.fields) for _ in at_once]
+        request = self._requests[self._sent]
+        self._newest_calls = [
+            calls.send(request.service, request.type, request.fields)
+            for _ in range(self._order.at_once)
+        ]
         self._sent += 1
-        self._sent_s = elapsed_s
+        self._last_sent_s = elapsed_s
         self._wait_for_answer()
 
     def finish(self) -> None:
         """Note what could not be sent, unless it was not due yet."""
-        if self._failed is not None or self._ready.is_in_vain:
-            self._note_unsent(self._failed or NO_SERVER)
-        elif self._ready.never_answered and not self._started:
-            self._note_unsent("", self._ready.there_ns)
+        if self._fault is not None or self._ready.is_in_vain:
+            self._note_unsent(self._fault or NO_SERVER)
+        elif self._ready.never_answered and not self._may_begin:
+            self._note_unsent("", self._ready.appeared_ns)
 
     def _note_unsent(self, error: str, since_ns: int = 0) -> None:
-        one = self._asked[self._sent]
-        self._context.calls.note_unsent(one.service, one.type, one.fields, error, since_ns)
+        request = self._requests[self._sent]
+        self._context.calls.note_unsent(
+            request.service, request.type, request.fields, error, since_ns
+        )
 
     @property
     def _is_next_due(self) -> bool:
-        pause_s = self._asked[self._sent].pause_s
-        return self._is_over if pause_s is None else self._now_s - self._sent_s >= pause_s
+        pause_s = self._requests[self._sent].pause_s
+        return self._is_over if pause_s is None else self._now_s - self._last_sent_s >= pause_s
 
     @property
     def _is_over(self) -> bool:
-        return all(map(self._context.calls.is_over, self._round)) or not self._waits
+        return all(map(self._context.calls.is_over, self._newest_calls)) or not self._waits

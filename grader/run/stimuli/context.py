@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from grader.assignment.stimuli.stimulus_model import StimulusModel
     from grader.run.cell.simulator import SimulatedRobot
 
-# A node that has added nothing to the graph for so long has left its constructor, or hangs in it.
 _SET_UP_S = 0.5
-# A node whose other services were seen so long ago has no parameter services.
+"""Who has added nothing to the graph for so long has left its constructors, or hangs in one."""
 _SETTLED_NS = NS // 2
+"""A node whose other services were seen so long ago has no parameter services."""
 
 P = TypeVar("P", bound="Playing")
 
@@ -35,7 +35,7 @@ class Request(Protocol):
     """A stimulus that sends requests to a server, in the order of the YAML."""
 
     def holds_up(self, other: Any) -> bool:
-        """Whether the other one has to wait for it."""
+        """Whether the other one has to wait for this one."""
 
 
 @dataclass
@@ -76,23 +76,25 @@ class StimulusContext:
 
     def server(self, service: str) -> str | None:
         """The student's node that offers a service at the moment, or None."""
-        offered = (item for item in self.graph.services if item.name == service)
-        return next((item.node for item in offered if item.vanished_ns is None), None)
+        for offered in self.graph.services:
+            if offered.name == service and offered.vanished_ns is None:
+                return offered.node
+        return None
 
     def call_executor(self, node: str) -> None:
         """Call a service of a node that it answers only while it spins."""
         first, second = EXECUTOR_SERVICES
-        seen = {item.name: item.appeared_ns for item in self.graph.services if item.node == node}
-        appeared_ns = seen.get(f"{node}/{second}")
-        settled = appeared_ns is not None and time.time_ns() - appeared_ns > _SETTLED_NS
-        lacks_first = f"{node}/{first}" not in seen and settled
+        appeared_ns = {s.name: s.appeared_ns for s in self.graph.services if s.node == node}
+        second_ns = appeared_ns.get(f"{node}/{second}")
+        is_settled = second_ns is not None and time.time_ns() - second_ns > _SETTLED_NS
+        lacks_first = is_settled and f"{node}/{first}" not in appeared_ns
         self.probe.executor_calls.call(node, second if lacks_first else first)
 
     @property
     def student_nodes(self) -> list[str]:
         """Names of the student's nodes that are there now."""
-        there = (node for node in self.graph.nodes if node.vanished_ns is None)
-        return list(dict.fromkeys(node.name for node in there if node.owner is Owner.STUDENT))
+        present = (node for node in self.graph.nodes if node.vanished_ns is None)
+        return list(dict.fromkeys(node.name for node in present if node.owner is Owner.STUDENT))
 
     @property
     def calm_s(self) -> float:
@@ -112,9 +114,9 @@ class StimulusContext:
     def is_heard(self) -> bool:
         """Whether the probe hears the student: on every topic, or on all that will be there."""
         topics = self.probe.student_topics
-        return (
-            bool(topics) and all(self.endpoints(Kind.PUBLISHER, topic) for topic in topics)
-        ) or self.is_set_up
+        if topics and all(self.endpoints(Kind.PUBLISHER, topic) for topic in topics):
+            return True
+        return self.is_set_up
 
 
 class Patience:

@@ -16,11 +16,10 @@ def filled(message: Any, value: Mapping[str, Any], now_ns: int) -> Any:
     """Set fields of a message, by name and nested; checked when the order was made."""
     types = message.get_fields_and_field_types()
     for name, item in value.items():
-        before = getattr(message, name)
         if isinstance(item, list):
             setattr(message, name, _items(item, types[name], now_ns))
         else:
-            setattr(message, name, _item(before, item, now_ns))
+            setattr(message, name, _item(getattr(message, name), item, now_ns))
     return message
 
 
@@ -40,18 +39,20 @@ def plain(value: Any) -> Any:
     return value
 
 
-def _items(items: Sequence[Any], kind: str, now_ns: int) -> list[Any]:
-    inner = kind.removeprefix("sequence<").partition(">")[0].partition("[")[0].partition(",")[0]
+def _items(items: Sequence[Any], type: str, now_ns: int) -> list[Any]:
+    """The items of a field of a type such as ``sequence<geometry_msgs/Point, 5>``."""
+    inner = type.removeprefix("sequence<").partition(">")[0].partition("[")[0].partition(",")[0]
     if "/" in inner:
-        package, _, short = inner.partition("/")
-        make = import_interface(f"{package}/msg/{short}")
+        package, _, name = inner.partition("/")
+        make = import_interface(f"{package}/msg/{name}")
         return [_item(make(), item, now_ns) for item in items]
     return [bytes([item]) for item in items] if inner == "octet" else list(items)
 
 
-def _item(before: Any, item: Any, now_ns: int) -> Any:
-    if item == _NOW and hasattr(before, "nanosec"):
-        return filled(before, {"sec": now_ns // NS, "nanosec": now_ns % NS}, now_ns)
+def _item(default: Any, item: Any, now_ns: int) -> Any:
+    """The value of a field, or of an item, that holds a default now."""
+    if item == _NOW and hasattr(default, "nanosec"):
+        return filled(default, {"sec": now_ns // NS, "nanosec": now_ns % NS}, now_ns)
     if isinstance(item, Mapping):
-        return filled(before, item, now_ns)
-    return bytes([item]) if isinstance(before, bytes) else item
+        return filled(default, item, now_ns)
+    return bytes([item]) if isinstance(default, bytes) else item

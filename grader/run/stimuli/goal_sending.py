@@ -8,6 +8,7 @@ from typing import Any
 
 from grader.assignment.stimuli.kinds.request import SendGoal
 from grader.recording.interaction import NO_SERVER, Feedback, Goal
+from grader.recording.model import NS
 from grader.run.cell.interfaces import import_interface
 from grader.run.stimuli.calling import Requesting
 from grader.run.stimuli.context import StimulusContext, plays
@@ -16,7 +17,6 @@ from grader.run.stimuli.filling import filled, plain
 _MOST_FEEDBACK = 5000
 _ACCEPT_S = 1.0
 """How soon a server says whether it accepts a goal: its callback only decides."""
-# action_msgs/msg/GoalStatus
 _STATUSES = {
     1: "accepted",
     2: "executing",
@@ -25,6 +25,7 @@ _STATUSES = {
     5: "canceled",
     6: "aborted",
 }
+"""Constants of action_msgs/msg/GoalStatus."""
 
 
 @plays(SendGoal)
@@ -32,21 +33,22 @@ class SendingGoal(Requesting):
     """One goal, from its sending to its result."""
 
     def __init__(self, order: SendGoal, context: StimulusContext) -> None:
-        # Those of the orders before it are there already, and are waited for.
-        self._before = [
-            item
-            for item in context.requests
-            if isinstance(item, SendingGoal) and item._order.send_goal == order.send_goal
+        # Stimuli are created in the order of the YAML: these goals are sent before this one.
+        self._earlier_goals = [
+            request
+            for request in context.requests
+            if isinstance(request, SendingGoal) and request._order.send_goal == order.send_goal
         ]
         send_goal = f"{order.send_goal}/_action/send_goal"
         super().__init__(order, f"an action {order.send_goal}", send_goal, context)
         self._client: Any = None
         self._handle: Any = None
         self._number: int | None = None
-        self._failed: str | None = None
+        self._fault: str | None = None
 
     @property
     def _sent(self) -> Goal | None:
+        """The record of the goal, or None before it is sent."""
         return None if self._number is None else self._context.goals[self._number]
 
     @property
@@ -57,7 +59,7 @@ class SendingGoal(Requesting):
     @property
     def is_done(self) -> bool:
         """Whether it has ended, or was waited for; or there is no server."""
-        if self._failed is not None or self._ready.given_up:
+        if self._fault is not None or self._ready.given_up:
             return True
         return self._sent is not None and (self._is_over or not self._waits)
 
@@ -77,7 +79,7 @@ class SendingGoal(Requesting):
 
     def play(self, elapsed_s: float) -> None:
         """Send it, and ask to cancel it, when that is due."""
-        if self._failed is not None:
+        if self._fault is not None:
             return
         super().play(elapsed_s)
         if self._sent is not None:
@@ -87,10 +89,10 @@ class SendingGoal(Requesting):
 
     def finish(self) -> None:
         """Note that it could not be sent, unless it was not due yet."""
-        if self._failed is not None or self._ready.is_in_vain:
-            self._note(self._order.goal, time.time_ns(), self._failed or NO_SERVER)
+        if self._fault is not None or self._ready.is_in_vain:
+            self._note(self._order.goal, time.time_ns(), self._fault or NO_SERVER)
         elif self._ready.never_answered and self._sent is None:
-            self._note(self._order.goal, self._ready.there_ns)
+            self._note(self._order.goal, self._ready.appeared_ns)
 
     def _note(self, goal: dict[str, Any], sent_ns: int, error: str = "") -> None:
         order = self._order
@@ -120,24 +122,25 @@ class SendingGoal(Requesting):
             try:
                 interface = import_interface(self._order.type)
             except ImportError as error:
-                self._failed = f"the interface {self._order.type} is not installed ({error})"
+                self._fault = f"the interface {self._order.type} is not installed ({error})"
                 return False
             node = self._context.probe.node
             self._client = ActionClient(node, interface, self._order.send_goal)
-        return self._ready.met(bool(self._client.server_is_ready()))
+        return self._ready.may_send(bool(self._client.server_is_ready()))
 
     @property
     def _is_free(self) -> bool:
         """Whether the goals before it have ended; those that it is to preempt have begun."""
         return all(
-            item.is_done or (self._order.preempt and item._handle is not None)
-            for item in self._before
+            goal.is_done or (self._order.preempt and goal._handle is not None)
+            for goal in self._earlier_goals
         )
 
     def _send(self) -> None:
-        for item in self._before if self._order.preempt else ():
-            if item._sent is not None and not item._is_over:
-                item._update(preempted=True)
+        if self._order.preempt:
+            for goal in self._earlier_goals:
+                if goal._sent is not None and not goal._is_over:
+                    goal._update(preempted=True)
         now_ns = time.time_ns()
         message = filled(import_interface(self._order.type).Goal(), self._order.goal, now_ns)
         self._note(plain(message), now_ns)
@@ -164,6 +167,7 @@ class SendingGoal(Requesting):
         self._update(result_ns=time.time_ns(), status=status, result=plain(answer.result))
 
     def _follow(self, sent: Goal) -> None:
+        """Note a change of its status, and ask to cancel it when that is due."""
         if self._handle is None:
             return
         now_ns = time.time_ns()
@@ -173,7 +177,7 @@ class SendingGoal(Requesting):
         cancel_s = self._order.cancel_after
         if cancel_s is None or sent.canceled_ns is not None or self._is_over:
             return
-        if now_ns - (sent.answered_ns or now_ns) >= cancel_s * 1e9:
+        if now_ns - (sent.answered_ns or now_ns) >= cancel_s * NS:
             self._update(canceled_ns=now_ns)
             # A server that works on the goal to its end takes that in only then.
             self._wait_for_answer()

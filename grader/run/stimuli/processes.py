@@ -56,13 +56,14 @@ class Restarting(_OfProcess):
 
     def __init__(self, order: Restart, context: StimulusContext) -> None:
         super().__init__(order, context)
-        self._steps = [signal.SIGINT, signal.SIGTERM, signal.SIGKILL]
-        self._since: Stopwatch | None = None
+        self._signals = [signal.SIGINT, signal.SIGTERM, signal.SIGKILL]
+        """Those that were not sent yet."""
+        self._since_signal: Stopwatch | None = None
 
     @property
     def due_s(self) -> float | None:
         """Its time; then whenever the cell looks."""
-        return None if self._since is not None else super().due_s
+        return None if self._since_signal is not None else super().due_s
 
     @property
     def keeps_run(self) -> bool:
@@ -80,10 +81,11 @@ class Restarting(_OfProcess):
             context.start(process)
             self._note("restart")
             return
-        patience_s = limits.shutdown_s if len(self._steps) == 2 else limits.terminate_s
-        waiting = self._since is not None and self._since.elapsed_s <= patience_s
-        if not waiting and self._steps:
-            number = self._steps.pop(0)
+        is_interrupted_only = len(self._signals) == 2
+        patience_s = limits.shutdown_s if is_interrupted_only else limits.terminate_s
+        is_waiting = self._since_signal is not None and self._since_signal.elapsed_s <= patience_s
+        if not is_waiting and self._signals:
+            number = self._signals.pop(0)
             context.students.kill(process, number)
-            self._since = Stopwatch(context.meter)
+            self._since_signal = Stopwatch(context.meter)
             self._note("kill", number.name)

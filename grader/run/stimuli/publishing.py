@@ -19,8 +19,8 @@ from grader.run.stimuli.context import Patience, Playing, StimulusContext, plays
 from grader.run.stimuli.filling import filled
 
 _POLL_S = 0.02
-# Where the tracer declares nothing, the publisher of the answers may match a moment later.
 _GRACE_S = 0.1
+"""Where the tracer declares nothing, the publisher of the answers may match a moment later."""
 
 
 @plays(Publish)
@@ -45,11 +45,11 @@ class Publishing(Playing):
         )
         self._sent = 0
         self._patience = Patience(f"a subscription on {order.publish}", context)
-        self._ready_s: float | None = None
+        self._listened_to_s: float | None = None
         self._next_s: float | None = None
         self._answers = Answers(order.within)
         self._since_sent = Stopwatch(context.meter)
-        self._read = 0
+        self._messages_read = 0
         self._now_s = 0.0
         for _ in range(min(order.before_launch, len(order.due))):
             self._publish()
@@ -70,16 +70,17 @@ class Publishing(Playing):
         """When the next message is due; until something subscribes, in short steps."""
         if self._next_s is None:
             return max(self._order.after, self._now_s + _POLL_S)
-        if self._order.answer and self._sent > self._order.before_launch:
-            return max(self._next_s, self._now_s + _POLL_S) if not self.is_done else None
-        return self._next_s if self._is_more else None
+        waits_for_answers = self._order.answer and self._sent > self._order.before_launch
+        if waits_for_answers:
+            return None if self.is_done else max(self._next_s, self._now_s + _POLL_S)
+        return self._next_s if self._has_more else None
 
     def play(self, elapsed_s: float) -> None:
         """Publish what is due."""
         self._now_s = elapsed_s
         if self._next_s is None:
             self._await_listener(elapsed_s)
-        while self._is_more and self._next_s is not None and elapsed_s >= self._next_s:
+        while self._has_more and self._next_s is not None and elapsed_s >= self._next_s:
             self._listen()
             if not self._answers.may_go_on(self._since_sent.elapsed_s):
                 return
@@ -91,42 +92,45 @@ class Publishing(Playing):
             self._next_s = max(self._next_s, elapsed_s - self._gap_s()) + self._gap_s()
 
     @property
-    def _is_more(self) -> bool:
+    def _has_more(self) -> bool:
         return self._sent < len(self._order.due) or not self._order.has_end
 
     def _gap_s(self) -> float:
+        """Time between the last message and the next one."""
         due, number = self._order.due, self._sent
         if 0 < number < len(due):
-            return due[number][1] - due[number - 1][1]
+            (_, before_s), (_, next_s) = due[number - 1], due[number]
+            return float(next_s - before_s)
         return 0.0 if self._order.has_end else float(self._order.every or 0.0)
 
     def _await_listener(self, elapsed_s: float) -> None:
         if not self._patience.look(self._is_listened_to()):
-            self._ready_s = None
+            self._listened_to_s = None
             return
-        if self._ready_s is None:
-            self._ready_s = elapsed_s
-        if elapsed_s - self._ready_s >= _GRACE_S:
+        if self._listened_to_s is None:
+            self._listened_to_s = elapsed_s
+        if elapsed_s - self._listened_to_s >= _GRACE_S:
             self._next_s = elapsed_s
 
     def _is_listened_to(self) -> bool:
         """Whether every subscription of the student's that can match has, and there is one."""
-        able = [
-            item
-            for item in self._context.endpoints(Kind.SUBSCRIPTION, self._order.publish)
-            if item.type == self._order.type and not refusals(self._qos, item.qos)
+        compatible = [
+            endpoint
+            for endpoint in self._context.endpoints(Kind.SUBSCRIPTION, self._order.publish)
+            if endpoint.type == self._order.type and not refusals(self._qos, endpoint.qos)
         ]
         matched = self._publisher.get_subscription_count()
-        return bool(able) and matched >= len(able) and self._context.is_heard
+        return bool(compatible) and matched >= len(compatible) and self._context.is_heard
 
     def _listen(self) -> None:
+        """Take in the answers that have been recorded since the last look."""
         if self._order.answer is None:
             return
         messages = self._context.probe.messages
-        for message in messages[self._read :]:
+        for message in messages[self._messages_read :]:
             if message.topic == self._order.answer and not (message.is_sent or message.join):
                 self._answers.hear(message.cdr, self._since_sent.elapsed_s)
-        self._read = len(messages)
+        self._messages_read = len(messages)
 
     def _publish(self) -> None:
         order = self._order

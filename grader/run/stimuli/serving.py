@@ -21,12 +21,13 @@ from grader.run.stimuli.context import Playing, StimulusContext, plays
 from grader.run.stimuli.filling import filled, plain
 from sim.node import make_node
 
-# What a client does with the last answer, or asks too much, is still of interest.
 _LINGER_NS = NS
-# A float32 that went over the wire is not the number of the YAML any more.
+"""What a client does with the last answer, or asks too much, is still of interest."""
 _SAME = 1e-6
+"""A float32 that went over the wire is not the number of the YAML any more."""
 _MOST_AT_ONCE = 64
 _FOREVER_S = 1e6
+"""Longer than any run; time.sleep refuses infinity."""
 _LOOK_NS = NS // 2
 
 
@@ -34,18 +35,19 @@ class Serving(Playing):
     """A server with a node and threads of its own, so that its callbacks may wait."""
 
     asks = True
-    takes = ""
+    request_suffix = ""
     """What stands behind its name in the name of the service that takes requests."""
 
     def __init__(self, order: Any, context: StimulusContext) -> None:
         super().__init__(order, context)
-        self.server = order.serve + self.takes
+        self.server = order.serve + self.request_suffix
         self._interface: Any = import_interface(order.type)
-        self._given: set[int] = set()
-        self._open = 0
+        self._used_answers: set[int] = set()
+        self._open_requests = 0
         self._leaves_waiting = False
+        """Whether the newest request is never answered."""
         self._lock = threading.Lock()
-        self._is_there = False
+        self._is_offered = False
         if order.after == 0.0:
             self.play(0.0)
 
@@ -55,9 +57,9 @@ class Serving(Playing):
 
     def play(self, elapsed_s: float) -> None:
         """Offer it from now on."""
-        if self._is_there:
+        if self._is_offered:
             return
-        self._is_there = True
+        self._is_offered = True
         context = self._context.probe.node.context
         node = make_node(f"rosgrade{self._order.serve.replace('/', '_')}", context)
         self.create(node, ReentrantCallbackGroup())
@@ -69,22 +71,24 @@ class Serving(Playing):
     def tick(self, elapsed_s: float | None) -> None:
         """Appear when it is due, and see whether the executors of its clients spin."""
         super().tick(elapsed_s)
-        probe, there = self._context.probe, self._context.graph.clients
-        for node in {one.node for one in there if one.vanished_ns is None}:
-            if time.time_ns() - probe.executor_calls.last_called_ns(node) > _LOOK_NS:
+        calls, clients = self._context.probe.executor_calls, self._context.graph.clients
+        for node in {client.node for client in clients if client.vanished_ns is None}:
+            if time.time_ns() - calls.last_called_ns(node) > _LOOK_NS:
                 self._context.call_executor(node)
 
     @property
     def due_s(self) -> float | None:
         """When it appears."""
-        return None if self._is_there else float(self._order.after)
+        return None if self._is_offered else float(self._order.after)
 
     @property
     def is_done(self) -> bool:
         """Whether every answer was given, the last one a moment ago."""
-        waits = self._open or self._leaves_waiting
-        through = len(self._given) == len(self._order.answers) and not waits
-        return through and time.time_ns() - (self.last_ns or 0) > _LINGER_NS
+        if self._open_requests or self._leaves_waiting:
+            return False
+        if len(self._used_answers) < len(self._order.answers):
+            return False
+        return time.time_ns() - (self.last_ns or 0) > _LINGER_NS
 
     def noting_faults(self, callback: Callable[..., Any]) -> Callable[..., Any]:
         """The callback, whose exceptions make the run a fault: no client must lose by them."""
@@ -99,31 +103,33 @@ class Serving(Playing):
 
         return called
 
-    def ask(self, message: Any) -> tuple[int, Any]:
-        """Note a request or a goal; its number, and the answer to it after its delay.
-
-        It is the next answer that fits, the last one again and again; None if none fits.
-        """
+    def receive(self, message: Any) -> tuple[int, Any]:
+        """Note a request or a goal; its number and, after its delay, the answer to it."""
         now_ns, fields, order = time.time_ns(), plain(message), self._order
-        fitting = [
-            number
-            for number, answer in enumerate(order.answers)
-            if not unlike(fields, answer.when, _SAME)
-        ]
         asked = self._context.asked
         with self._lock:
-            fresh = [number for number in fitting if number not in self._given] or fitting[-1:]
-            self._given.update(fresh[:1])
-            answer = order.answers[fresh[0]] if fresh else None
+            answer = self._choose_answer(fields)
             delay_s = answer.delay_s if answer is not None else 0.0
             self._leaves_waiting = math.isinf(delay_s)
-            self._open += not self._leaves_waiting
+            if not self._leaves_waiting:
+                self._open_requests += 1
             status = "unanswered" if self._leaves_waiting else ""
             number = len(asked)
             if self._context.probe.recording and number < self._context.limits.messages:
                 asked.append(Asked(order.serve, order.type, fields, now_ns, status))
         time.sleep(min(delay_s, _FOREVER_S))
         return number, answer
+
+    def _choose_answer(self, fields: Any) -> Any:
+        """The next answer that fits a request, the last one again and again; None if none fits."""
+        answers = self._order.answers
+        fitting = [n for n, answer in enumerate(answers) if not unlike(fields, answer.when, _SAME)]
+        if not fitting:
+            return None
+        unused = [number for number in fitting if number not in self._used_answers]
+        chosen = unused[0] if unused else fitting[-1]
+        self._used_answers.add(chosen)
+        return answers[chosen]
 
     def note(self, number: int, *, ends: bool = False, **changes: Any) -> None:
         """Note what became of a request or a goal."""
@@ -134,7 +140,7 @@ class Serving(Playing):
             if self._context.probe.recording and number < len(asked):
                 asked[number] = replace(asked[number], **changes)
             if ends:
-                self._open -= 1
+                self._open_requests -= 1
                 self.last_ns = now_ns
 
 
@@ -149,7 +155,7 @@ class ServingService(Serving):
         node.create_service(self._interface, name, answer, callback_group=group)
 
     def _answer(self, message: Any, response: Any) -> Any:
-        number, answer = self.ask(message)
+        number, answer = self.receive(message)
         filled(response, answer.response if answer is not None else {}, time.time_ns())
         self.note(number, ends=True, status="answered", answer=plain(response))
         return response
