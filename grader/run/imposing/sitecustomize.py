@@ -27,8 +27,11 @@ with open(os.path.join(_HERE, "mutation.txt"), encoding="utf-8") as _file:
 MISTAKES = {(kind, name): value for program, kind, name, value in _lines if program == _program}
 
 
-def _bound(owner: Any, name: str, change: Any, after: Any = None) -> None:
-    """Let `change` alter the arguments of each call of a method, and `after` see its result."""
+def _change_arguments(owner: Any, name: str, change: Any, after: Any = None) -> None:
+    """Let `change` alter the arguments of each call of a method by their names.
+
+    `after` is called with the method's result, and with what `change` returned.
+    """
     import functools
     import inspect
 
@@ -39,30 +42,31 @@ def _bound(owner: Any, name: str, change: Any, after: Any = None) -> None:
     def changed(*args: Any, **kwargs: Any) -> Any:
         bound = signature.bind(*args, **kwargs)
         bound.apply_defaults()
-        seen = change(args[0], bound.arguments)
+        meant = change(args[0], bound.arguments)
         result = original(*bound.args, **bound.kwargs)
         if after is not None:
-            after(result, seen)
+            after(result, meant)
         return result
 
     setattr(owner, name, changed)
 
 
-def _renamed(node: Any, given: dict[str, Any], key: str) -> str:
-    """The name that the program means, in full; it gets another one."""
+def _rename(node: Any, arguments: dict[str, Any], key: str) -> str:
+    """Replace a name in the arguments by a wrong one; returns the right one, in full."""
     resolve = node.resolve_topic_name if key == "topic" else node.resolve_service_name
-    full: str = resolve(given[key])
-    given[key] = MISTAKES.get(("rename", full), given[key])
+    full: str = resolve(arguments[key])
+    arguments[key] = MISTAKES.get(("rename", full), arguments[key])
     return full
 
 
-def _endpoint(node: Any, given: dict[str, Any]) -> str:
+def _change_endpoint(node: Any, arguments: dict[str, Any]) -> str:
+    """Replace name, QoS and type of an endpoint by wrong ones; returns its right topic."""
     import copy
 
     from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-    topic = _renamed(node, given, "topic")
-    qos = given["qos_profile"]
+    topic = _rename(node, arguments, "topic")
+    qos = arguments["qos_profile"]
     qos = QoSProfile(depth=qos) if isinstance(qos, int) else copy.copy(qos)
     if value := MISTAKES.get(("reliability", topic)):
         qos.reliability = ReliabilityPolicy[value.upper()]
@@ -70,61 +74,66 @@ def _endpoint(node: Any, given: dict[str, Any]) -> str:
         qos.durability = DurabilityPolicy[value.upper()]
     if value := MISTAKES.get(("depth", topic)):
         qos.history, qos.depth = HistoryPolicy.KEEP_LAST, int(value)
-    given["qos_profile"] = qos
+    arguments["qos_profile"] = qos
     if value := MISTAKES.get(("type", topic)):
         import importlib
 
         package, _, name = value.split("/")
-        given["msg_type"] = getattr(importlib.import_module(f"{package}.msg"), name)
+        arguments["msg_type"] = getattr(importlib.import_module(f"{package}.msg"), name)
     return topic
 
 
-def _publisher(publisher: Any, topic: str) -> None:
+def _change_messages(publisher: Any, topic: str) -> None:
     """Let a publisher send what a mistake makes of its messages."""
     import time
 
     publish = publisher.publish
     most = MISTAKES.get(("most", topic))
-    wrong = MISTAKES.get(("field", topic))
+    wrong_field = MISTAKES.get(("field", topic))
 
-    def published(message: Any) -> None:
-        if most is not None and _sent.setdefault(topic, 0) >= int(most):
+    def publish_wrongly(message: Any) -> None:
+        if most is not None and _sent.get(topic, 0) >= int(most):
             return
         _sent[topic] = _sent.get(topic, 0) + 1
         if ("type", topic) in MISTAKES:
             message = publisher.msg_type()
-        elif wrong is not None:
-            message = _with_wrong(message, *wrong.split())
+        elif wrong_field is not None:
+            message = _with_wrong_field(message, *wrong_field.split())
         publish(message)
         if ("twice", topic) in MISTAKES:
             publish(message)
         if ("blocks", topic) in MISTAKES:
             time.sleep(float(MISTAKES["blocks", topic]))
 
-    publisher.publish = published
+    publisher.publish = publish_wrongly
 
 
 _sent: dict[str, int] = {}
+"""Topic -> number of its messages so far."""
 
 
-def _with_wrong(message: Any, path: str, other: str = "") -> Any:
+def _with_wrong_field(message: Any, path: str, other_path: str = "") -> Any:
     """A message with another value in a field, or with its value in another field."""
     import copy
 
     message = copy.deepcopy(message)
-    holder, field = _field(message, path)
+    holder, field = _holder_of(message, path)
     value = getattr(holder, field)
-    if other:
+    if other_path:
         setattr(holder, field, type(value)())
-        setattr(*_field(message, other), value)
+        setattr(*_holder_of(message, other_path), value)
     elif isinstance(value, str):
-        setattr(holder, field, chr(ord(value[0]) ^ 1) + value[1:] if value else value)
+        if value:
+            setattr(holder, field, chr(ord(value[0]) ^ 1) + value[1:])
+    elif isinstance(value, bool):
+        setattr(holder, field, not value)
     else:
-        setattr(holder, field, not value if isinstance(value, bool) else value + 1)
+        setattr(holder, field, value + 1)
     return message
 
 
-def _field(message: Any, path: str) -> tuple[Any, str]:
+def _holder_of(message: Any, path: str) -> tuple[Any, str]:
+    """The part of a message that a path such as ``linear.x`` leads to, and the field in it."""
     *outer, field = path.split(".")
     for name in outer:
         message = getattr(message, name)
@@ -136,44 +145,43 @@ def _patch_node(module: Any) -> None:
     import signal
     import time
 
-    def wait() -> None:
+    def wait_forever() -> None:
         while True:
             time.sleep(1.0)
 
-    def named(node: Any, given: dict[str, Any]) -> Any:
+    def change_node(node: Any, arguments: dict[str, Any]) -> Any:
         if ("hangs", "node") in MISTAKES:
-            wait()
-        name = given["node_name"]
-        given["node_name"] = MISTAKES.get(("node", name), name)
-        given["namespace"] = MISTAKES.get(("namespace", name), given["namespace"])
+            wait_forever()
+        name = arguments["node_name"]
+        arguments["node_name"] = MISTAKES.get(("node", name), name)
+        arguments["namespace"] = MISTAKES.get(("namespace", name), arguments["namespace"])
         if ("ignores", "SIGINT") in MISTAKES:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
         if ("lingers", "exit") in MISTAKES:
-            atexit.register(wait)
+            atexit.register(wait_forever)
         return node
 
-    def meddling(_: Any, node: Any) -> None:
+    def add_endpoints(_: Any, node: Any) -> None:
         from builtin_interfaces.msg import Time
 
-        if too := MISTAKES.get(("publishes", "node")):
-            node.create_publisher(Time, too, 10)
-        if too := MISTAKES.get(("subscribes", "node")):
-            node.create_subscription(Time, too, print, 10)
+        if topic := MISTAKES.get(("publishes", "node")):
+            node.create_publisher(Time, topic, 10)
+        if topic := MISTAKES.get(("subscribes", "node")):
+            node.create_subscription(Time, topic, print, 10)
 
-    def timed(_: Any, given: dict[str, Any]) -> None:
-        factor = float(MISTAKES.get(("period", "timers"), "1"))
-        given["timer_period_sec"] = given["timer_period_sec"] * factor
+    def change_timer(_: Any, arguments: dict[str, Any]) -> None:
+        arguments["timer_period_sec"] *= float(MISTAKES.get(("period", "timers"), "1"))
 
-    def service(node: Any, given: dict[str, Any]) -> None:
-        _renamed(node, given, "srv_name")
+    def change_service(node: Any, arguments: dict[str, Any]) -> None:
+        _rename(node, arguments, "srv_name")
 
     node_class = module.Node
-    _bound(node_class, "__init__", named, meddling)
-    _bound(node_class, "create_publisher", _endpoint, _publisher)
-    _bound(node_class, "create_subscription", _endpoint)
-    _bound(node_class, "create_service", service)
-    _bound(node_class, "create_client", service)
-    _bound(node_class, "create_timer", timed)
+    _change_arguments(node_class, "__init__", change_node, add_endpoints)
+    _change_arguments(node_class, "create_publisher", _change_endpoint, _change_messages)
+    _change_arguments(node_class, "create_subscription", _change_endpoint)
+    _change_arguments(node_class, "create_service", change_service)
+    _change_arguments(node_class, "create_client", change_service)
+    _change_arguments(node_class, "create_timer", change_timer)
 
 
 def _patch_executors(module: Any) -> None:
@@ -181,8 +189,8 @@ def _patch_executors(module: Any) -> None:
 
     executor_class = module.Executor
     wait = executor_class.wait_for_ready_callbacks
-    raises = MISTAKES.get(("raises", "executor"))
-    first: list[float] = []
+    raises_after_s = MISTAKES.get(("raises", "executor"))
+    first_waits_s: list[float] = []
 
     def wait_for_ready_callbacks(self: Any, timeout_sec: Any = None, *args: Any, **kw: Any) -> Any:
         if ("ends", "executor") in MISTAKES:
@@ -190,32 +198,33 @@ def _patch_executors(module: Any) -> None:
             raise module.ShutdownException
         while ("never_spins", "executor") in MISTAKES and self.context.ok():
             time.sleep(0.02)
-        if raises is None:
+        if raises_after_s is None:
             return wait(self, timeout_sec, *args, **kw)
-        first.append(time.monotonic())
-        left = max(0.0, first[0] + float(raises) - time.monotonic())
-        limit = getattr(timeout_sec, "timeout", timeout_sec)
-        if limit is not None and 0.0 <= limit < left:
+        if not first_waits_s:
+            first_waits_s.append(time.monotonic())
+        left_s = max(0.0, first_waits_s[0] + float(raises_after_s) - time.monotonic())
+        limit_s = getattr(timeout_sec, "timeout", timeout_sec)
+        if limit_s is not None and 0.0 <= limit_s < left_s:
             return wait(self, timeout_sec, *args, **kw)
         try:
-            return wait(self, left, *args, **kw)
+            return wait(self, left_s, *args, **kw)
         except module.TimeoutException:
             raise RuntimeError("a mistake that rosgrade selftest imposes") from None
 
     executor_class.wait_for_ready_callbacks = wait_for_ready_callbacks
 
 
-def _after(patch: Any, own: Any) -> Any:
-    def both(module: Any) -> None:
-        patch(module)
-        own(module)
+def _both(trace: Any, impose: Any) -> Any:
+    def patch(module: Any) -> None:
+        trace(module)
+        impose(module)
 
-    return both
+    return patch
 
 
 if MISTAKES:
-    for _module, _patch in {
+    for _module, _impose in {
         "rclpy.executors": _patch_executors,
         "rclpy.node": _patch_node,
     }.items():
-        rosgrade_rclpy.PATCHES[_module] = _after(rosgrade_rclpy.PATCHES[_module], _patch)
+        rosgrade_rclpy.PATCHES[_module] = _both(rosgrade_rclpy.PATCHES[_module], _impose)

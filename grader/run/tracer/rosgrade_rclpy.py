@@ -36,12 +36,40 @@ _PAUSE_POLL_S = 0.005
 _FLUSH_LIMIT_S = 0.5
 _SEEN_LIMIT_S = 2.0
 _SLICE_S = 0.5
-_OWN_TOPICS = ("/parameter_events", "/rosout")
+_TOPICS_OF_RCLPY = ("/parameter_events", "/rosout")
 _MOST_RUNS = 1000
-# Of shorter runs, those that overlap none and those that do: the 1st, 2nd, 4th, 8th, ...
 _SHORT_NS = 1_000_000
-# And the first of those that overlap another.
+"""Of shorter calls of callbacks only some are reported: those numbered 1, 2, 4, 8, ..."""
 _FIRST_SHORT = 20
+"""And so many of those that overlap another call."""
+
+_endpoints: dict[int, tuple[int, str, str]] = {}
+"""Publishers and subscriptions that are not destroyed: id -> number of the report, kind, topic."""
+_endpoint_numbers = itertools.count()
+_messages: dict[str, int] = {}
+"""Topic of the probe's -> number of messages so far."""
+_held_publishers: list[Any] = []
+_held: set[tuple[str, str]] = set()
+"""Name of the node, and topic, of publishers that were held."""
+_has_unseen_nodes = [False]
+_added: set[str] = set()
+"""Names of nodes that were added to an executor."""
+_spun: Any = weakref.WeakSet()
+"""Executors that have looked for work."""
+_has_paused = [False]
+_began: dict[int, list[tuple[int, int, int]]] = {}
+"""The calls of callbacks that still run: id of the timer, subscription or service -> when each
+began, how many others ran then, and its number."""
+_running: set[int] = set()
+"""Numbers of the calls that still run."""
+_run_numbers = itertools.count(1)
+_newest_run = [0]
+_calls: dict[tuple[int, bool], Any] = collections.defaultdict(lambda: itertools.count(1))
+"""Id of the timer, subscription or service, and whether calls overlapped -> number of the next."""
+_reported_runs = itertools.count()
+_pause_poll = select.poll()
+if PAUSE_PIPE is not None:
+    _pause_poll.register(PAUSE_FD, select.POLLIN)
 
 
 def _full_name(node: Any) -> str:
@@ -63,26 +91,32 @@ def _qos(profile: Any) -> dict[str, Any]:
 
 
 def _group(group: Any, node: Any) -> dict[str, Any]:
-    chosen = group if group is not None else node.default_callback_group
-    return {"type": type(chosen).__name__, "id": id(chosen)}
+    actual = group if group is not None else node.default_callback_group
+    return {"type": type(actual).__name__, "id": id(actual)}
 
 
 def _place() -> dict[str, Any]:
     """File and line of the student's program that does something now, if any."""
+    if not INSTALL:
+        return {}
     frame: Any = sys._getframe()
     while frame is not None and not frame.f_code.co_filename.startswith(f"{INSTALL}/"):
         frame = frame.f_back
-    return {"file": frame.f_code.co_filename, "line": frame.f_lineno} if frame and INSTALL else {}
+    return {"file": frame.f_code.co_filename, "line": frame.f_lineno} if frame else {}
+
+
+def _is_power_of_two(number: int) -> bool:
+    return not number & (number - 1)
 
 
 def _callback_name(callback: Any) -> str:
     return str(getattr(callback, "__qualname__", type(callback).__name__))
 
 
-def _endpoint(kind: str, node: Any, endpoint: Any, **more: Any) -> None:
-    if endpoint.topic_name in _OWN_TOPICS:
+def _report_endpoint(kind: str, node: Any, endpoint: Any, **details: Any) -> None:
+    if endpoint.topic_name in _TOPICS_OF_RCLPY:
         return
-    number = next(_count)
+    number = next(_endpoint_numbers)
     _endpoints[id(endpoint)] = number, kind, endpoint.topic_name
     report(
         kind,
@@ -92,7 +126,7 @@ def _endpoint(kind: str, node: Any, endpoint: Any, **more: Any) -> None:
         type=_type_name(endpoint.msg_type),
         **_qos(endpoint.qos_profile),
         **_place(),
-        **more,
+        **details,
     )
 
 
@@ -119,18 +153,22 @@ def _hold(node: Any, publisher: Any) -> None:
     _held.add(key)
     import time
 
-    began = time.monotonic()
-    own = sum(item[1:] == ("subscription", publisher.topic_name) for item in _endpoints.values())
-    while publisher.get_subscription_count() <= own:
-        if time.monotonic() - began > _HOLD_LIMIT_S:
+    began_s = time.monotonic()
+    # Subscriptions of this process match too, and at once.
+    matched_here = sum(
+        kind == "subscription" and topic == publisher.topic_name
+        for _, kind, topic in _endpoints.values()
+    )
+    while publisher.get_subscription_count() <= matched_here:
+        if time.monotonic() - began_s > _HOLD_LIMIT_S:
             break
         time.sleep(_HOLD_POLL_S)
-    _publishers.append(publisher)
+    _held_publishers.append(publisher)
     report(
         "held",
         topic=publisher.topic_name,
-        waited_s=time.monotonic() - began,
-        matched=publisher.get_subscription_count() > own,
+        waited_s=time.monotonic() - began_s,
+        matched=publisher.get_subscription_count() > matched_here,
     )
 
 
@@ -141,35 +179,13 @@ def _report_messages(publisher: Any) -> None:
         return
 
     def reported(*args: Any, **kwargs: Any) -> Any:
-        number = _messages[topic] = _messages.get(topic, 0) + 1
-        if not number & (number - 1):
+        number = _messages.get(topic, 0) + 1
+        _messages[topic] = number
+        if _is_power_of_two(number):
             report("published", topic=topic, number=number, **_place())
         return publish(*args, **kwargs)
 
     publisher.publish = reported
-
-
-_messages: dict[str, int] = {}
-_endpoints: dict[int, tuple[int, str, str]] = {}
-"""Publishers and subscriptions that are not destroyed: id -> number of the report, kind, topic."""
-_count = itertools.count()
-_publishers: list[Any] = []
-_held: set[tuple[str, str]] = set()
-_added: set[str] = set()
-_began: dict[int, list[tuple[int, int, int]]] = {}
-"""The calls that still run: id of the timer, subscription or service -> when each began, how many
-others ran then, and its number."""
-_running: set[int] = set()
-_runs = itertools.count(1)
-_newest_run = [0]
-_calls: dict[tuple[int, bool], Any] = collections.defaultdict(lambda: itertools.count(1))
-_reported_runs = itertools.count()
-_nodes: list[bool] = []
-_spun: Any = weakref.WeakSet()
-_pauses: list[bool] = []
-_pause_poll = select.poll()
-if PAUSE_PIPE is not None:
-    _pause_poll.register(PAUSE_FD, select.POLLIN)
 
 
 def flush() -> None:
@@ -180,11 +196,11 @@ def flush() -> None:
     """
     from rclpy.duration import Duration
 
-    while _publishers:
-        publisher = _publishers.pop()
+    while _held_publishers:
+        publisher = _held_publishers.pop()
         quietly(publisher.wait_for_all_acked, Duration(seconds=_FLUSH_LIMIT_S))
-    if _nodes and pipe_at(SEEN_FD):
-        _nodes.clear()
+    if _has_unseen_nodes[0] and pipe_at(SEEN_FD):
+        _has_unseen_nodes[0] = False
         report("leaving")
         # The cell closes its end.
         select.select([SEEN_FD], [], [], _SEEN_LIMIT_S)
@@ -211,11 +227,11 @@ def _patch_node(module: Any) -> None:
     node_class = module.Node
 
     def made(node: Any, _: Any) -> None:
-        _nodes.append(True)
+        _has_unseen_nodes[0] = True
         report("node", node=_full_name(node), **_place())
 
     def published(node: Any, publisher: Any) -> None:
-        _endpoint("publisher", node, publisher)
+        _report_endpoint("publisher", node, publisher)
         quietly(_report_messages, publisher)
         _hold(node, publisher)
 
@@ -230,13 +246,15 @@ def _patch_node(module: Any) -> None:
         )
 
     def subscribed(node: Any, subscription: Any) -> None:
-        told = {
-            "group": _group(subscription.callback_group, node),
-            "callback": _callback_name(subscription.callback),
+        _report_endpoint(
+            "subscription",
+            node,
+            subscription,
+            group=_group(subscription.callback_group, node),
+            callback=_callback_name(subscription.callback),
             # One of wait_for_message() is destroyed after the first message.
-            "brief": sys._getframe(3).f_code.co_name == "wait_for_message",
-        }
-        _endpoint("subscription", node, subscription, **told)
+            brief=sys._getframe(3).f_code.co_name == "wait_for_message",
+        )
 
     _wrap(node_class, "__init__", after=made)
     _wrap(node_class, "create_publisher", after=published)
@@ -267,22 +285,25 @@ def _patch_context(module: Any) -> None:
 
 def _is_paused() -> bool:
     """Whether the cell asks executors to find nothing ready: it writes, and closes its end."""
-    told = _pause_poll.poll(0)
-    return bool(told) and told[0][1] == select.POLLIN and pipe_at(PAUSE_FD) == PAUSE_PIPE
+    events = _pause_poll.poll(0)
+    if not events:
+        return False
+    _, event = events[0]
+    return event == select.POLLIN and pipe_at(PAUSE_FD) == PAUSE_PIPE
 
 
 def _pause(timeout_sec: Any) -> bool:
-    """Wait as an executor to which nothing happens; whether its timeout is over first."""
+    """Wait as an executor to which nothing happens; whether its timeout ends before the pause."""
     import time
 
-    if not _pauses:
-        _pauses.append(True)
+    if not _has_paused[0]:
+        _has_paused[0] = True
         report("paused")
     limit_s = getattr(timeout_sec, "timeout", timeout_sec)
-    limit_s = None if limit_s is None or limit_s < 0 else limit_s
-    began = time.monotonic()
+    has_limit = limit_s is not None and limit_s >= 0
+    began_s = time.monotonic()
     while _is_paused():
-        if limit_s is not None and time.monotonic() - began >= limit_s:
+        if has_limit and time.monotonic() - began_s >= limit_s:
             return True
         time.sleep(_PAUSE_POLL_S)
     return False
@@ -338,36 +359,37 @@ def _time_callbacks(group_class: Any) -> None:
     def beginning_execution(group: Any, entity: Any) -> Any:
         may_begin = begin(group, entity)
         if may_begin:
-            beside, number = len(_running), next(_runs)
+            others, number = len(_running), next(_run_numbers)
             _running.add(number)
             _newest_run[0] = number
-            _began.setdefault(id(entity), []).append((time.time_ns(), beside, number))
+            _began.setdefault(id(entity), []).append((time.time_ns(), others, number))
         return may_begin
 
     def ending_execution(group: Any, entity: Any) -> None:
-        quietly(_ran, group, entity, time.time_ns())
+        quietly(_report_run, group, entity, time.time_ns())
         end(group, entity)
 
     group_class.beginning_execution = beginning_execution
     group_class.ending_execution = ending_execution
 
 
-def _ran(group: Any, entity: Any, ended_ns: int) -> None:
+def _report_run(group: Any, entity: Any, ended_ns: int) -> None:
     """Report a call of a timer, a subscription or a service, but for those of rclpy itself."""
     import threading
 
-    began_ns, beside, run = _began[id(entity)].pop(0)
+    began_ns, others_at_begin, run = _began[id(entity)].pop(0)
     _running.discard(run)
     serves = getattr(entity, "topic_name", None) or getattr(entity, "service_name", None)
-    # What is none of them lacks one of these attributes.
-    serves = serves or f"{entity.timer_period_ns / 1e9:g} s"
+    if not serves:
+        # What is no timer either lacks this, so that nothing is reported.
+        serves = f"{entity.timer_period_ns / 1e9:g} s"
     if entity.callback.__module__.startswith("rclpy."):
         return
     is_long = ended_ns - began_ns >= _SHORT_NS
-    overlaps = beside > 0 or _newest_run[0] != run
+    overlaps = others_at_begin > 0 or _newest_run[0] != run
     number = next(_calls[id(entity), overlaps])
-    is_told = is_long or not number & (number - 1) or (overlaps and number <= _FIRST_SHORT)
-    if is_told and next(_reported_runs) < _MOST_RUNS:
+    is_sample = _is_power_of_two(number) or (overlaps and number <= _FIRST_SHORT)
+    if (is_long or is_sample) and next(_reported_runs) < _MOST_RUNS:
         report(
             "ran",
             callback=_callback_name(entity.callback),

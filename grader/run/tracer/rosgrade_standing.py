@@ -18,12 +18,16 @@ if TYPE_CHECKING:
 
 _LOOK_S = 0.1
 _LONG_NS = 90_000_000
+"""A call that lasts this long is seen by two looks, and stands somewhere."""
 _AGAIN_NS = 1_000_000_000
+"""A call that goes on is reported again after as long as it has lasted, at most after this time."""
 _MOST_REPORTS = 500
 _LONGEST_TEXT = 80
 _reported = [0]
 _watched: set[int] = set()
-_loops: dict[str, list[tuple[int, int]]] = {}
+"""Ids of the process, and of its parents, that have such a thread."""
+_loops_of_files: dict[str, list[tuple[int, int]]] = {}
+"""File -> first and last line of each loop in it."""
 
 
 class _Since:
@@ -62,28 +66,15 @@ def _look() -> None:
 
     for thread, frame in sys._current_frames().items():
         if thread != _thread.get_ident():
-            _tell(frame)
+            _report_where(frame)
 
 
-def _tell(innermost: FrameType) -> None:
-    frames: list[FrameType] = []
-    frame: FrameType | None = innermost
-    while frame is not None:
-        frames.insert(0, frame)
-        frame = frame.f_back
-    files = [one.f_code.co_filename for one in frames]
-    own = [
-        n
-        for n, file in enumerate(files)
-        if file.startswith(f"{INSTALL}/") and "/rclpy/" not in file
-    ]
-    by_ros = next((n for n, file in enumerate(files) if "/rclpy/" in file), len(files))
-    called = [n for n in own if n > by_ros]
-    spins = own and any(file.endswith("/rclpy/executors.py") for file in files[own[-1] :])
-    if not INSTALL or not own or (spins and not called):
+def _report_where(innermost: FrameType) -> None:
+    """Report the call of a thread that has not returned for long, and where it is in it."""
+    path, in_callback = _calls_of_program(innermost)
+    if not path:
         return
-    path = [frames[n] for n in called or own]
-    call, now_ns = path[0] if called else _looping(path)[0], time.time_ns()
+    call, now_ns = path[0] if in_callback else _outermost_loop(path)[0], time.time_ns()
     if call.f_trace is None:
         call.f_trace = _Since(now_ns)
     since = call.f_trace
@@ -91,39 +82,75 @@ def _tell(innermost: FrameType) -> None:
         return
     since.next_ns = now_ns + min(now_ns - since.began_ns, _AGAIN_NS)
     _reported[0] += 1
-    at, (looping, loop) = path[-1], _looping(path)
+    newest, (looping, loop_line) = path[-1], _outermost_loop(path)
     report(
         "stands",
         function=call.f_code.co_name,
-        in_callback=bool(called),
-        file=at.f_code.co_filename,
-        line=at.f_lineno,
-        text=_text(at, at.f_lineno),
+        in_callback=in_callback,
+        file=newest.f_code.co_filename,
+        line=newest.f_lineno,
+        text=_text(newest, newest.f_lineno),
         loop_file=looping.f_code.co_filename,
-        loop=loop,
-        loop_text=_text(looping, loop),
+        loop=loop_line,
+        loop_text=_text(looping, loop_line),
         began_ns=since.began_ns,
         seen_ns=now_ns,
     )
 
 
-def _looping(path: list[FrameType]) -> tuple[FrameType, int]:
+def _calls_of_program(innermost: FrameType) -> tuple[list[FrameType], bool]:
+    """The calls of the program's own functions, outermost first, and whether rclpy made them.
+
+    Of those below rclpy only the callback and what it calls. None while the program waits in
+    rclpy.spin(), which is no standing.
+    """
+    frames: list[FrameType] = []
+    frame: FrameType | None = innermost
+    while frame is not None:
+        frames.insert(0, frame)
+        frame = frame.f_back
+    own, callbacks, spins = [], [], False
+    is_in_rclpy = False
+    for frame in frames:
+        file = frame.f_code.co_filename
+        if "/rclpy/" in file:
+            is_in_rclpy = True
+            spins = spins or file.endswith("/rclpy/executors.py")
+        elif INSTALL and file.startswith(f"{INSTALL}/"):
+            own.append(frame)
+            spins = False
+            if is_in_rclpy:
+                callbacks.append(frame)
+    if callbacks:
+        return callbacks, True
+    return ([] if spins else own), False
+
+
+def _outermost_loop(path: list[FrameType]) -> tuple[FrameType, int]:
     """The outermost call that is in a loop, and the line of that; or the innermost, and 0."""
-    return next(((one, line) for one in path if (line := _loop(one))), (path[-1], 0))
+    for frame in path:
+        if line := _loop_line(frame):
+            return frame, line
+    return path[-1], 0
 
 
-def _loop(frame: FrameType) -> int:
+def _loop_line(frame: FrameType) -> int:
     """The line of the innermost loop in which a function is now, or 0."""
     file = frame.f_code.co_filename
-    if file not in _loops:
+    if file not in _loops_of_files:
         import ast
 
         with open(file, "rb") as source:
             nodes = list(ast.walk(ast.parse(source.read())))
-        loops = [one for one in nodes if isinstance(one, (ast.While, ast.For, ast.AsyncFor))]
-        _loops[file] = [(one.lineno, one.end_lineno or 0) for one in loops]
-    first = frame.f_code.co_firstlineno
-    return max((a for a, b in _loops[file] if first < a <= frame.f_lineno <= b), default=0)
+        loops = [node for node in nodes if isinstance(node, (ast.While, ast.For, ast.AsyncFor))]
+        _loops_of_files[file] = [(loop.lineno, loop.end_lineno or 0) for loop in loops]
+    function_line = frame.f_code.co_firstlineno
+    around = [
+        first
+        for first, last in _loops_of_files[file]
+        if function_line < first <= frame.f_lineno <= last
+    ]
+    return max(around, default=0)
 
 
 def _text(frame: FrameType, line: int) -> str:
