@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from grader.assignment.model import Assignment, Scenario
     from grader.assignment.stimuli.kinds.publish import Publish
 
-_DEFAULT = Qos("reliable", "volatile")
+_DEFAULT_QOS = Qos("reliable", "volatile")
 _DEPTH = 1000
-_MOST_SHOWN = 10
+_MOST_PRINTED_PER_S = 10
 """Messages of a topic within a second; a burst is worth reading, a stream is not."""
-# The observation may have ended with the very answer to the last input.
 _AFTERMATH_S = 0.5
+"""The observation may have ended with the very answer to the last input."""
 _ENDING_LIMIT_S = 20.0
 
 
@@ -40,8 +40,9 @@ def published(messages: Sequence[RawMessage], qos: Qos, recording: Recording) ->
     """The messages of one topic as a stimulus; what a late joiner gets comes before the launch."""
     from grader.assignment.stimuli.kinds.publish import Publish
 
-    latched = qos.durability == "transient_local"
-    early = [one for one in messages if latched and one.stamp_ns < recording.launched_ns]
+    early: list[RawMessage] = []
+    if qos.durability == "transient_local":
+        early = [message for message in messages if message.stamp_ns < recording.launched_ns]
     later = messages[len(early) :]
     after_s = (later[0].stamp_ns - began_ns(recording)) / NS if later else 0.0
     offered: Any = {"reliability": qos.reliability, "durability": qos.durability}
@@ -53,7 +54,7 @@ def published(messages: Sequence[RawMessage], qos: Qos, recording: Recording) ->
         after=max(0.0, after_s),
         **offered,
     )
-    return stimulus.sending((one.cdr, one.stamp_ns / NS) for one in messages)
+    return stimulus.sending((message.cdr, message.stamp_ns / NS) for message in messages)
 
 
 def began_ns(recording: Recording) -> int:
@@ -83,19 +84,21 @@ def replay_scenario(file: Path, recording: Recording, assignment: Assignment) ->
         for endpoint in recording.endpoints
         if endpoint.owner is Owner.PROBE and endpoint.kind is Kind.PUBLISHER
     }
-    types = {one.topic: one.type for one in recording.student_endpoints(Kind.PUBLISHER)}
-    # Every publisher meets the weakest request.
+    published_types = {
+        endpoint.topic: endpoint.type for endpoint in recording.student_endpoints(Kind.PUBLISHER)
+    }
     elapsed_s = (recording.stop_ns - began_ns(recording)) / NS + _AFTERMATH_S
     return scenario.model_copy(
         update={
             "world": None,
             "stimuli": tuple(
-                published(messages[topic], offered.get(topic, _DEFAULT), recording)
+                published(messages[topic], offered.get(topic, _DEFAULT_QOS), recording)
                 for topic in sorted(messages)
             ),
+            # Every publisher meets the request for best effort.
             "record": tuple(
                 RecordedTopic(topic=topic, type=type, reliability="best_effort", depth=_DEPTH)
-                for topic, type in types.items()
+                for topic, type in published_types.items()
             ),
             "until": Until.model_construct(elapsed=elapsed_s, stimuli="done"),
             "timeout": elapsed_s + _ENDING_LIMIT_S,
@@ -113,21 +116,23 @@ def replay(request: RunRequest, ros: RosInstallation) -> int:
         0 when it was played to its end, 1 when the node ended or never listened, 130 when it
         was interrupted; nothing of it runs any more.
     """
-    shown, known = [], {*ros.packages}
-    known |= {path.name for prefix in request.type_support for path in prefix.glob("share/*")}
+    known_packages = set(ros.packages)
+    for prefix in request.type_support:
+        known_packages.update(path.name for path in prefix.glob("share/*"))
+    recorded = []
     for topic in request.scenario.record:
-        if topic.type.partition("/")[0] in known:
-            shown.append(topic)
+        if topic.type.partition("/")[0] in known_packages:
+            recorded.append(topic)
         else:
-            _say("rosgrade", f"{topic.topic} is not shown: no {topic.type} here")
-    scenario = request.scenario.model_copy(update={"record": tuple(shown)})
+            _print("rosgrade", f"{topic.topic} is not shown: no {topic.type} here")
+    scenario = request.scenario.model_copy(update={"record": tuple(recorded)})
     with Scratch("replay") as folder, Runner(ros, progress=_Screen(), verbose=True) as runner:
-        again = folder / "run.mcap"
+        file = folder / "run.mcap"
         try:
-            runner.run(replace(request, scenario=scenario), again)
+            runner.run(replace(request, scenario=scenario), file)
         except KeyboardInterrupt:
             return 130
-        return _tell(read_recording(again))
+        return _print_outcome(read_recording(file))
 
 
 class _Screen:
@@ -139,41 +144,41 @@ class _Screen:
     def __call__(self, _scenario: str, event: Mapping[str, Any]) -> None:
         """Print an event of the run."""
         if event["event"] == "launching":
-            _say("rosgrade", f"starting {event['process']}")
+            _print("rosgrade", f"starting {event['process']}")
         elif event["event"] == "matched":
             self._began_s = time.monotonic()
         elif event["event"] == "printed":
-            at_s = None if self._began_s is None else time.monotonic() - self._began_s
-            _say(event["process"].rpartition("/")[2], clean(event["text"]), at_s)
+            time_s = None if self._began_s is None else time.monotonic() - self._began_s
+            _print(event["process"].rpartition("/")[2], clean(event["text"]), time_s)
 
 
-def _tell(recording: Recording) -> int:
+def _print_outcome(recording: Recording) -> int:
     """Print the messages and how it ended; return the exit code."""
     for topic in sorted({one.topic for one in recording.student_endpoints(Kind.PUBLISHER)}):
         messages = recording.on(topic)
-        seconds: Counter[int] = Counter()
+        count_by_second: Counter[int] = Counter()
         for message in messages:
-            at_s = (message.stamp_ns - began_ns(recording)) / NS
-            seconds[int(at_s)] += 1
-            if seconds[int(at_s)] <= _MOST_SHOWN:
-                _say(topic, _written(message.value), at_s)
-        _say("rosgrade", f"{len(messages)} messages on {topic}")
+            time_s = (message.stamp_ns - began_ns(recording)) / NS
+            count_by_second[int(time_s)] += 1
+            if count_by_second[int(time_s)] <= _MOST_PRINTED_PER_S:
+                _print(topic, _as_yaml(message.value), time_s)
+        _print("rosgrade", f"{len(messages)} messages on {topic}")
     if recording.ending is Ending.EXITED:
         codes = ", ".join(str(process.exit_code) for process in recording.processes)
-        _say("rosgrade", f"the node has ended by itself (exit code {codes})")
+        _print("rosgrade", f"the node has ended by itself (exit code {codes})")
     missed = [wait.what for wait in recording.waits if wait.met_ns is None]
     for what in missed:
-        _say("rosgrade", f"did not come in time: {what}")
+        _print("rosgrade", f"did not come in time: {what}")
     return 0 if recording.ending is Ending.UNTIL and not missed else 1
 
 
-def _say(source: str, text: str, at_s: float | None = None) -> None:
-    at = "" if at_s is None else f"{at_s:.3f} s"
-    print(f"{at:>10}  {source}  {text}", flush=True)
+def _print(source: str, text: str, time_s: float | None = None) -> None:
+    time_text = "" if time_s is None else f"{time_s:.3f} s"
+    print(f"{time_text:>10}  {source}  {text}", flush=True)
 
 
-def _written(value: Any) -> str:
+def _as_yaml(value: Any) -> str:
     """A message in one line, as YAML writes it."""
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{name}: {_written(item)}" for name, item in value.items()) + "}"
+        return "{" + ", ".join(f"{name}: {_as_yaml(item)}" for name, item in value.items()) + "}"
     return f"{value:.6g}" if isinstance(value, float) else one_line(str(value))

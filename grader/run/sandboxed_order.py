@@ -48,34 +48,26 @@ def sandboxed(
     limits: SandboxLimits,
 ) -> CellOrder:
     """Make an order for a sandbox, and copy into the cell's folder what it needs."""
-    folder, shown = cell.folder, [install, *ros.underlays]
+    folder, for_student = cell.folder, [install, *ros.underlays]
     in_cell: dict[str, str] = {}
-    seen: dict[str, str] = {}
-    for number, path in enumerate(dict.fromkeys([*shown, *map(Path, order.type_support)])):
+    in_sandbox: dict[str, str] = {}
+    prefixes = dict.fromkeys([*for_student, *map(Path, order.type_support)])
+    for number, prefix in enumerate(prefixes):
         place = f"install{number or ''}"
-        if path not in cell.shown:
-            shutil.copytree(path, folder / place, symlinks=True)
-        in_cell[str(path)] = str(cell.shown.get(path, CELL / place))
-        if path in shown:
-            seen[str(path)] = f"{WORKSPACE}/{place}"
-    for program, name in (
-        (student_filter(guarded=True), _FILTER),
-        (student_filter(), _UNGUARDED),
-        (guard_filter(), _GUARD),
-    ):
-        shutil.copyfile(sandbox.filter_file(program), folder / name)
-    (folder / _PASSWD_FILE).write_text(_PASSWD, encoding="utf-8")
-    bubblewrap.copy_system_files(folder / _SYSTEM)
-    binds = [Bind(Path(in_cell[outside]), Path(inside)) for outside, inside in seen.items()]
+        if prefix not in cell.shown:
+            shutil.copytree(prefix, folder / place, symlinks=True)
+        in_cell[str(prefix)] = str(cell.shown.get(prefix, CELL / place))
+        if prefix in for_student:
+            in_sandbox[str(prefix)] = f"{WORKSPACE}/{place}"
+    _copy_system_files(folder, sandbox)
+    binds = [Bind(Path(in_cell[outside]), Path(inside)) for outside, inside in in_sandbox.items()]
     binds.append(Bind.same(TRACER_IN_SANDBOX))
     covered = [
-        seen[str(path)] + str(folder).removeprefix(str(path))
-        for path in ros.underlays
-        for name in sorted(order.hidden)
-        for folder in (path / "lib" / name, path / "share" / name, *path.glob(f"{_SITE}/{name}"))
-        if folder.is_dir()
+        in_sandbox[str(prefix)] + str(path).removeprefix(str(prefix))
+        for prefix in ros.underlays
+        for path in _folders_of(order.hidden, prefix)
     ]
-    places = {**seen, str(TRACER): str(TRACER_IN_SANDBOX)}
+    places = {**in_sandbox, str(TRACER): str(TRACER_IN_SANDBOX)}
     if order.compiled_tracer is not None:
         shutil.copyfile(order.compiled_tracer, folder / _COMPILED_TRACER)
         binds.append(Bind(CELL / _COMPILED_TRACER, IN_SANDBOX))
@@ -83,29 +75,32 @@ def sandboxed(
     if order.mutation is not None:
         binds.append(Bind(CELL / Path(order.mutation).name, MUTATION_IN_SANDBOX))
         places[order.mutation] = str(MUTATION_IN_SANDBOX)
-    simulator = order.simulator
+    simulator, author_simulator = order.simulator, order.author_simulator
     if simulator is not None:
         shutil.copyfile(simulator.world, folder / _WORLD)
         simulator = replace(simulator, world=str(CELL / _WORLD))
-    own = order.author_simulator
-    if own is not None and own.map is not None:
-        shutil.copyfile(own.map, folder / _WORLD)
-        own = replace(own, map=str(CELL / _WORLD))
+    if author_simulator is not None and author_simulator.map is not None:
+        shutil.copyfile(author_simulator.map, folder / _WORLD)
+        author_simulator = replace(author_simulator, map=str(CELL / _WORLD))
     return replace(
         order,
-        commands=tuple(replace(one, argv=_moved(one.argv, seen)) for one in order.commands),
-        companions=tuple(replace(one, argv=_moved(one.argv, in_cell)) for one in order.companions),
-        student_environment=sandboxed_environment(order.student_environment, places),
+        commands=tuple(
+            replace(command, argv=_moved(command.argv, in_sandbox)) for command in order.commands
+        ),
         # They run in the cell itself, where no program of the student's reaches them.
+        companions=tuple(
+            replace(program, argv=_moved(program.argv, in_cell)) for program in order.companions
+        ),
         companion_environment={
             **sandboxed_environment(order.companion_environment, in_cell),
             **COMPANION_IN_CELL,
         },
+        student_environment=sandboxed_environment(order.student_environment, places),
         prefixes=_moved(order.prefixes, in_cell),
         type_support=_moved(order.type_support, in_cell),
         scratch=str(CELL),
         simulator=simulator,
-        author_simulator=own,
+        author_simulator=author_simulator,
         process_sandbox=ProcessSandbox(
             arguments=(*_arguments(sandbox, ros, binds, covered), "--chdir", HOME),
             filter=str(CELL / _FILTER),
@@ -113,10 +108,32 @@ def sandboxed(
             guard=str(CELL / _GUARD),
             calls=guarded_calls(),
             limits=limits,
-            folders={inside: in_cell[outside] for outside, inside in seen.items()},
+            folders={inside: in_cell[outside] for outside, inside in in_sandbox.items()},
         ),
         environment={**order.environment, "sandbox": sandbox.description},
     )
+
+
+def _copy_system_files(folder: Path, sandbox: Sandbox) -> None:
+    """Put filters of system calls, and what of /etc the student sees, into the cell's folder."""
+    filters = {
+        _FILTER: student_filter(guarded=True),
+        _UNGUARDED: student_filter(),
+        _GUARD: guard_filter(),
+    }
+    for name, program in filters.items():
+        shutil.copyfile(sandbox.filter_file(program), folder / name)
+    (folder / _PASSWD_FILE).write_text(_PASSWD, encoding="utf-8")
+    bubblewrap.copy_system_files(folder / _SYSTEM)
+
+
+def _folders_of(packages: Iterable[str], prefix: Path) -> list[Path]:
+    """The folders of some packages in an install space."""
+    folders = []
+    for name in sorted(packages):
+        folders += [prefix / "lib" / name, prefix / "share" / name]
+        folders += prefix.glob(f"{_SITE}/{name}")
+    return [folder for folder in folders if folder.is_dir()]
 
 
 def _arguments(
@@ -143,13 +160,15 @@ def _arguments(
     ]
 
 
-def _moved(paths: Iterable[str], places: dict[str, str]) -> tuple[str, ...]:
-    moved = list(paths)
-    for number, text in enumerate(moved):
-        # An argument of a launch file is `name:=path`.
-        name, given, path = text.rpartition(":=")
-        for outside, inside in places.items():
-            if path == outside or path.startswith(f"{outside}/"):
-                moved[number] = name + given + inside + path[len(outside) :]
-                break
-    return tuple(moved)
+def _moved(texts: Iterable[str], places: dict[str, str]) -> tuple[str, ...]:
+    """The same paths, or arguments of commands, with the places at which they are seen inside."""
+    return tuple(_moved_one(text, places) for text in texts)
+
+
+def _moved_one(text: str, places: dict[str, str]) -> str:
+    # An argument of a launch file is `name:=path`.
+    name, separator, path = text.rpartition(":=")
+    for outside, inside in places.items():
+        if path == outside or path.startswith(f"{outside}/"):
+            return name + separator + inside + path.removeprefix(outside)
+    return text
