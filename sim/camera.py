@@ -1,10 +1,8 @@
 """The camera: a floor with lines, walls, boxes and pillars, seen through a pinhole, in numpy.
 
-Everything is made of flat polygons. Their corners are projected, which for the floor is a
-homography, and filled row by row; of two that cover a pixel the nearer one counts, as the inverse
-of depth is linear in a picture. Pixels are not blended. A picture depends on nothing but the
-world, the options, the seed, the robot's pose and the time, so that it can be made again, bit by
-bit, wherever these are known.
+Everything is made of flat polygons. A picture depends on nothing but the world, the options, the
+seed, the robot's pose and the time, so that it can be made again, bit by bit, wherever these are
+known.
 
 Frames are those of REP-103: the optical frame has z ahead, x to the right and y down, and pixel
 (u, v) has its middle at whole numbers, as in OpenCV.
@@ -19,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.camera_canvas import NEAR_M, Canvas, Floats, disc, shaded
 from sim.camera_options import CameraOptions
 from sim.colour import Rgb
 from sim.description import BASE_Z_M
@@ -26,26 +25,23 @@ from sim.motion import Pose, compose
 from sim.shapes import FloorLine, Shape, chord_clearance_m
 from sim.world import World
 
-Floats = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 """Shape (height, width, 3): red, green, blue."""
 
-_NEAR_M = 0.02
-"""What is nearer is not seen: ``clip/near`` of TurtleBot3's camera in Gazebo."""
 _SKY: Rgb = (176, 208, 232)
 _LIGHT_FROM = (math.cos(0.5), math.sin(0.5))
 """Horizontal direction of the light: faces of one box differ."""
-_ROUND = np.arange(16) * (math.tau / 16)
-"""Corners of what is round."""
-_PRIME = 7919
+_NOISE_STEP = 7919
+"""Each picture takes its noise so many pixels further on: a prime, so that none is like another."""
 _MOMENT_NS = 10_000_000
-_MOVING_FROM = 1000
-_OWN = 1000
+"""Noise changes with the steps of the simulator."""
+_FIRST_MOVING_NUMBER = 1000
+_SPAWN_KEY = 1000
 """Tells the camera's seed from those that are spawned for other sensors."""
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class VisibleObject:
     """Something that stands in view of a logical camera.
 
     Attributes:
@@ -64,6 +60,17 @@ class Seen:
     colour: Rgb
 
 
+@dataclass(frozen=True, slots=True)
+class _Footprint:
+    """Where something stands on the floor: its middle, its turn and its size."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    length_m: float
+    width_m: float
+
+
 class Camera:
     """A camera in a world."""
 
@@ -79,16 +86,16 @@ class Camera:
         self._world = world
         self.seed = seed
         self._walls, self._wall_colours = _walls(world.shapes)
-        self._floor = [(polygon, one.colour) for one in world.lines for polygon in _strips(one)]
+        self._floor = [(piece, line.colour) for line in world.lines for piece in _pieces(line)]
         pixels = options.width * options.height
-        source = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_OWN,)))
+        source = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_SPAWN_KEY,)))
         noise = source.normal(0.0, 255.0 * options.noise, 2 * pixels) if options.noise else ()
         self._noise = np.rint(noise).astype(np.int16)
 
     def picture(self, pose: Pose, time_ns: int) -> Picture:
         """What it sees from a robot at a pose in the world's frame."""
         options = self.options
-        canvas = _Canvas(self, pose)
+        canvas = Canvas(self, pose)
         for polygon, colour in self._floor:
             canvas.paint(polygon, colour)
         moving = self._world.moving_at(time_ns)
@@ -102,42 +109,47 @@ class Camera:
             plain: Picture = palette.astype(np.uint8)[canvas.numbers]
             return plain
         pixels = options.width * options.height
-        begin = time_ns // _MOMENT_NS * _PRIME % pixels
+        begin = time_ns // _MOMENT_NS * _NOISE_STEP % pixels
         noise = self._noise[begin : begin + pixels].reshape(options.height, options.width, 1)
         noisy: NDArray[np.int16] = palette.astype(np.int16)[canvas.numbers]
         noisy += noise
         return np.clip(noisy, 0, 255, out=noisy).astype(np.uint8)
 
-    def objects(self, pose: Pose, time_ns: int) -> list[Seen]:
+    def objects(self, pose: Pose, time_ns: int) -> list[VisibleObject]:
         """What stands in view, the middle of each within range and hidden by nothing else."""
-        wanted = self.options.objects
-        if wanted is None:
+        options = self.options.objects
+        if options is None:
             return []
         eye, turn = self.eye(pose)
         shapes = (*self._world.shapes, *self._world.moving_at(time_ns))
         noise = np.random.default_rng([*self.seed, time_ns // _MOMENT_NS])
-        found = []
+        objects = []
         for shape in shapes:
-            outline = _outline(shape)
-            if outline is None:
+            footprint = _footprint(shape)
+            if footprint is None:
                 continue
-            (x_m, y_m), yaw_rad, (length_m, width_m) = outline
             # Drawn for each thing, so that one in view does not change the noise of another.
-            off = wanted.noise * noise.standard_normal(3)
-            place = turn @ (np.array([x_m, y_m, 0.5 * shape.height_m]) - eye)
+            error = options.noise * noise.standard_normal(3)
+            middle = np.array([footprint.x_m, footprint.y_m, 0.5 * shape.height_m])
+            place = turn @ (middle - eye)
             right, down, ahead = place
-            distance_m = float(np.linalg.norm(place))
-            if ahead <= _NEAR_M or distance_m > wanted.range or not self._is_inside(place):
+            is_near = float(np.linalg.norm(place)) <= options.range
+            if ahead <= NEAR_M or not is_near or not self._is_in_picture(place):
                 continue
-            line = (eye[0], eye[1], x_m, y_m)
-            others = (one for other in shapes if other is not shape for one in other.capsules)
-            if any(chord_clearance_m(*line, capsule) < 0.0 for capsule in others):
+            sight = (eye[0], eye[1], footprint.x_m, footprint.y_m)
+            if _is_hidden(sight, (other for other in shapes if other is not shape)):
                 continue
-            body = (ahead + off[0], -right + off[1], -down + off[2])
-            size = (length_m, width_m, shape.height_m)
-            turned = math.remainder(yaw_rad - pose.yaw_rad, math.tau)
-            found.append(Seen(*_named(shape), body, turned, size, shape.colour))
-        return found
+            kind, number = _kind_and_number(shape)
+            visible = VisibleObject(
+                kind=kind,
+                number=number,
+                place_m=(ahead + error[0], -right + error[1], -down + error[2]),
+                yaw_rad=math.remainder(footprint.yaw_rad - pose.yaw_rad, math.tau),
+                size_m=(footprint.length_m, footprint.width_m, shape.height_m),
+                colour=shape.colour,
+            )
+            objects.append(visible)
+        return objects
 
     def pixel(self, place: Floats) -> tuple[float, float]:
         """Column and row of a place in the optical frame."""
@@ -159,136 +171,9 @@ class Camera:
         )
         return np.array([place.x_m, place.y_m, z_m + BASE_Z_M]), turn
 
-    def _is_inside(self, place: Floats) -> bool:
+    def _is_in_picture(self, place: Floats) -> bool:
         u, v = self.pixel(place)
         return -0.5 <= u <= self.options.width - 0.5 and -0.5 <= v <= self.options.height - 0.5
-
-
-class _Canvas:
-    """A picture in the making: the number of a colour for each pixel, and the depth of walls."""
-
-    def __init__(self, camera: Camera, pose: Pose) -> None:
-        options = camera.options
-        self.colours: list[Iterable[float]] = []
-        self._camera = camera
-        self._eye, self._turn = camera.eye(pose)
-        self._rows = np.arange(options.height, dtype=float)
-        self._columns = np.arange(options.width, dtype=float)
-        self._margin = np.array([0.5 * options.width, 0.5 * options.height]) / camera.focal_px
-        horizon = camera.centre_px[1] - camera.focal_px * math.tan(options.pitch)
-        self.numbers = np.zeros((options.height, options.width), np.uint16)
-        self.numbers[self._rows > horizon] = 1
-        self._near = np.zeros((options.height, options.width), np.float32)
-        """The inverse of the depth of what is painted there; the floor is behind all."""
-
-    def paint(self, corners: Floats, colour: Iterable[float]) -> None:
-        """Paint a polygon on the floor, over what lies there."""
-        self._fill(self._seen(corners), None, colour)
-
-    def paint_walls(self, walls: Floats, colours: list[Iterable[float]]) -> None:
-        """Paint upright rectangles, shape (n, 4, 3)."""
-        seen = self._seen(walls)
-        ahead, aside = seen[..., 2], np.abs(seen[..., :2])
-        wide = self._margin * ahead[..., np.newaxis]
-        signs = np.sign(seen[..., :2])
-        # Out of view: all four corners behind, or all beyond the same side of the picture.
-        beyond = (aside > wide) & (signs == signs[:, :1])
-        hidden = (ahead < _NEAR_M).all(axis=1) | beyond.all(axis=1).any(axis=1)
-        for number in np.flatnonzero(~hidden):
-            corners = seen[number]
-            normal = np.cross(corners[1] - corners[0], corners[3] - corners[0])
-            self._fill(corners, normal, colours[number])
-
-    def paint_upright(self, shape: Shape) -> None:
-        """Paint the side of a pillar, and the top of what is lower than the camera."""
-        x_m, y_m, *_, radius_m = shape.capsules[0]
-        dx_m, dy_m = x_m - self._eye[0], y_m - self._eye[1]
-        far_m = math.hypot(dx_m, dy_m)
-        if radius_m:
-            if far_m <= radius_m:
-                return
-            towards = math.atan2(-dy_m, -dx_m)
-            half = math.acos(radius_m / far_m)
-            arc = towards + np.linspace(-half, half, 9)
-            low = _ring(x_m, y_m, radius_m, arc, 0.0)
-            high = _ring(x_m, y_m, radius_m, arc[::-1], shape.height_m)
-            side = self._seen(np.concatenate((low, high)))
-            # As far away as the line between both its edges.
-            normal = self._turn @ np.array([dx_m, dy_m, 0.0])
-            self._fill(side, normal, _shaded(shape.colour, 0.9))
-            top = _ring(x_m, y_m, radius_m, _ROUND, shape.height_m)
-        elif shape.corners:
-            top = np.array([(x, y, shape.height_m) for x, y in shape.corners])
-        else:
-            return
-        if shape.height_m < self._eye[2]:
-            self._fill(self._seen(top), self._turn @ np.array([0.0, 0.0, 1.0]), shape.colour)
-
-    def _seen(self, places: Floats) -> Floats:
-        """Places of the world in the optical frame."""
-        found: Floats = (places - self._eye) @ self._turn.T
-        return found
-
-    def _fill(self, corners: Floats, normal: Floats | None, colour: Iterable[float]) -> None:
-        """Fill a polygon in the optical frame: every pixel whose middle is inside (even-odd).
-
-        Args:
-            normal: Of the plane in which it is, for its depth; None for what lies on the floor.
-        """
-        first = corners[0]
-        if corners[:, 2].min() < _NEAR_M:
-            corners = _in_front(corners)
-            if len(corners) < 3:
-                return
-        (cu, cv), focal = self._camera.centre_px, self._camera.focal_px
-        u = cu + focal * corners[:, 0] / corners[:, 2]
-        v = cv + focal * corners[:, 1] / corners[:, 2]
-        height, width = self.numbers.shape
-        top, bottom = max(0, math.ceil(v.min())), min(height, math.floor(v.max()) + 1)
-        left, right = max(0, math.ceil(u.min())), min(width, math.floor(u.max()) + 1)
-        if top >= bottom or left >= right:
-            return
-        rows, columns = self._rows[top:bottom], self._columns[left:right]
-        inside = _inside(u, v, rows, columns)
-        part = (slice(top, bottom), slice(left, right))
-        if normal is not None:
-            distance = float(normal @ first)
-            if abs(distance) < 1e-12:
-                return
-            across, down, along = normal / distance
-            by_row = along + down * (rows - cv) / focal
-            near = (by_row[:, np.newaxis] + across * (columns - cu) / focal).astype(np.float32)
-            inside &= near > self._near[part]
-            np.copyto(self._near[part], near, where=inside)
-        self.colours.append(colour)
-        np.copyto(self.numbers[part], len(self.colours) + 1, where=inside)
-
-
-def _inside(u: Floats, v: Floats, rows: Floats, columns: Floats) -> NDArray[np.bool_]:
-    """Which pixels are inside a polygon of corners (u, v)."""
-    u_next, v_next = np.roll(u, -1), np.roll(v, -1)
-    crosses = (v[:, np.newaxis] > rows) != (v_next[:, np.newaxis] > rows)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slope = (u_next - u) / (v_next - v)
-        at = u[:, np.newaxis] + slope[:, np.newaxis] * (rows - v[:, np.newaxis])
-    at = np.where(crosses, at, np.inf)
-    at.sort(axis=0)
-    inside = np.zeros((len(rows), len(columns)), bool)
-    for number in range(0, int(crosses.sum(axis=0).max(initial=0)), 2):
-        begin, end = at[number][:, np.newaxis], at[number + 1][:, np.newaxis]
-        inside |= (columns >= begin) & (columns < end)
-    return inside
-
-
-def _in_front(corners: Floats) -> Floats:
-    """The part of a polygon that is at least as far ahead as the camera sees."""
-    kept = []
-    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        if a[2] >= _NEAR_M:
-            kept.append(a)
-        if (a[2] >= _NEAR_M) != (b[2] >= _NEAR_M):
-            kept.append(a + (_NEAR_M - a[2]) / (b[2] - a[2]) * (b - a))
-    return np.array(kept)
 
 
 def _walls(shapes: Iterable[Shape]) -> tuple[Floats, list[tuple[float, float, float]]]:
@@ -303,11 +188,11 @@ def _walls(shapes: Iterable[Shape]) -> tuple[Floats, list[tuple[float, float, fl
             length = math.hypot(x2 - x1, y2 - y1)
             across = ((y1 - y2) / length, (x2 - x1) / length)
             facing = abs(across[0] * _LIGHT_FROM[0] + across[1] * _LIGHT_FROM[1])
-            colours.append(_shaded(shape.colour, 0.7 + 0.3 * facing))
+            colours.append(shaded(shape.colour, 0.7 + 0.3 * facing))
     return np.array(walls, float).reshape(-1, 4, 3), colours
 
 
-def _strips(line: FloorLine) -> Iterator[Floats]:
+def _pieces(line: FloorLine) -> Iterator[Floats]:
     """The polygons of a line on the floor: its pieces, and what is round between them."""
     half = 0.5 * line.width_m
     for (ax, ay), (bx, by) in zip(line.points, line.points[1:], strict=False):
@@ -317,33 +202,31 @@ def _strips(line: FloorLine) -> Iterator[Floats]:
             sides = ((ax + nx, ay + ny), (bx + nx, by + ny), (bx - nx, by - ny), (ax - nx, ay - ny))
             yield np.array([(x, y, 0.0) for x, y in sides])
     for x_m, y_m in line.points[1:-1]:
-        yield _ring(x_m, y_m, half, _ROUND, 0.0)
+        yield disc(x_m, y_m, half)
 
 
-def _ring(x_m: float, y_m: float, radius_m: float, angles: Floats, z_m: float) -> Floats:
-    places = (x_m + radius_m * np.cos(angles), y_m + radius_m * np.sin(angles))
-    return np.stack((*places, np.full(len(angles), z_m)), axis=1)
+def _is_hidden(sight: tuple[float, float, float, float], shapes: Iterable[Shape]) -> bool:
+    """Whether any of some shapes stands in a line of sight from (x, y) to (x, y)."""
+    capsules = (capsule for shape in shapes for capsule in shape.capsules)
+    return any(chord_clearance_m(*sight, capsule) < 0.0 for capsule in capsules)
 
 
-def _shaded(colour: Rgb, share: float) -> tuple[float, float, float]:
-    red, green, blue = colour
-    return share * red, share * green, share * blue
+def _kind_and_number(shape: Shape) -> tuple[str, int]:
+    """Kind and number of something that stands by itself; its label is such as ``boxes[2]``."""
+    key, _, index = shape.label.rstrip("]").partition("[")
+    number = int(index or 0)
+    if key == "moving":
+        number += _FIRST_MOVING_NUMBER
+    if not shape.corners:
+        return "pillar", number
+    return "obstacle" if key == "polygons" else "box", number
 
 
-def _named(shape: Shape) -> tuple[str, int]:
-    """Kind and number of something that stands by itself."""
-    key, _, number = shape.label.rstrip("]").partition("[")
-    kind = "pillar" if not shape.corners else "obstacle" if key == "polygons" else "box"
-    return kind, int(number or 0) + (_MOVING_FROM if key == "moving" else 0)
-
-
-def _outline(
-    shape: Shape,
-) -> tuple[tuple[float, float], float, tuple[float, float]] | None:
-    """Middle, turn and size of something that stands by itself; None for a wall."""
+def _footprint(shape: Shape) -> _Footprint | None:
+    """Where something that stands by itself stands; None for a wall."""
     x_m, y_m, *_, radius_m = shape.capsules[0]
     if radius_m:
-        return (x_m, y_m), 0.0, (2.0 * radius_m, 2.0 * radius_m)
+        return _Footprint(x_m, y_m, 0.0, 2.0 * radius_m, 2.0 * radius_m)
     if not shape.corners:
         return None
     corners = np.array(shape.corners)
@@ -354,4 +237,4 @@ def _outline(
     low, high = turned.min(axis=0), turned.max(axis=0)
     middle = np.array([[cos, -sin], [sin, cos]]) @ (0.5 * (low + high))
     length_m, width_m = high - low
-    return (float(middle[0]), float(middle[1])), yaw_rad, (float(length_m), float(width_m))
+    return _Footprint(float(middle[0]), float(middle[1]), yaw_rad, float(length_m), float(width_m))

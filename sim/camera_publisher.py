@@ -12,7 +12,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import ColorRGBA
 
-from sim.camera import Camera, Picture, Seen
+from sim.camera import Camera, Picture, VisibleObject
 from sim.motion import NS, Pose
 from sim.png import png
 from sim.publishers import make_publisher, set_time
@@ -55,45 +55,47 @@ class CameraPublisher:
     @property
     def is_heard(self) -> bool:
         """Whether anybody subscribes to anything of it."""
-        every = (self.image, self.compressed, self.info, self.objects)
-        return any(one is not None and one.get_subscription_count() for one in every)
+        publishers = (self.image, self.compressed, self.info, self.objects)
+        return any(one is not None and one.get_subscription_count() for one in publishers)
 
     def publish(self, pose: Pose, time_ns: int, stamp_ns: int) -> None:
         """Publish what the camera sees, as far as somebody wants it."""
         set_time(self._info.header.stamp, stamp_ns)
-        wanted = [one.get_subscription_count() > 0 for one in (self.image, self.compressed)]
-        if any(wanted):
-            self._publish(self._camera.picture(pose, time_ns), wanted, stamp_ns)
+        wants_raw = self.image.get_subscription_count() > 0
+        wants_compressed = self.compressed.get_subscription_count() > 0
+        if wants_raw or wants_compressed:
+            picture = self._camera.picture(pose, time_ns)
+            if wants_raw:
+                self._publish_raw(picture, stamp_ns)
+            if wants_compressed:
+                set_time(self._compressed.header.stamp, stamp_ns)
+                self._compressed.data = array("B", png(picture))
+                self.compressed.publish(self._compressed)
         if self.info.get_subscription_count():
             self.info.publish(self._info)
         if self.objects is not None and self.objects.get_subscription_count():
-            seen = self._camera.objects(pose, time_ns)
-            markers = [self._marker(one, stamp_ns) for one in seen]
+            visible = self._camera.objects(pose, time_ns)
+            markers = [self._marker(one, stamp_ns) for one in visible]
             self.objects.publish(self._markers.MarkerArray(markers=markers))
 
-    def _publish(self, picture: Picture, wanted: list[bool], stamp_ns: int) -> None:
-        is_raw, is_compressed = wanted
-        if is_raw:
-            set_time(self._image.header.stamp, stamp_ns)
-            is_rgb = self._camera.options.encoding == "rgb8"
-            # An array('B') is taken over as it is, as with the ranges of a scan.
-            ordered = picture if is_rgb else picture[..., ::-1]
-            self._image.data = array("B", ordered.tobytes())
-            self.image.publish(self._image)
-        if is_compressed:
-            set_time(self._compressed.header.stamp, stamp_ns)
-            self._compressed.data = array("B", png(picture))
-            self.compressed.publish(self._compressed)
+    def _publish_raw(self, picture: Picture, stamp_ns: int) -> None:
+        set_time(self._image.header.stamp, stamp_ns)
+        is_rgb = self._camera.options.encoding == "rgb8"
+        ordered = picture if is_rgb else picture[..., ::-1]
+        # An array('B') is taken over as it is, as with the ranges of a scan.
+        self._image.data = array("B", ordered.tobytes())
+        self.image.publish(self._image)
 
-    def _marker(self, seen: Seen, stamp_ns: int) -> Any:
-        marker = self._markers.Marker(ns=seen.kind, id=seen.number)
+    def _marker(self, visible: VisibleObject, stamp_ns: int) -> Any:
+        marker = self._markers.Marker(ns=visible.kind, id=visible.number)
         marker.header.frame_id = self._camera.options.link
         set_time(marker.header.stamp, stamp_ns)
-        marker.type = marker.CYLINDER if seen.kind == "pillar" else marker.CUBE
-        _set_place(marker.pose, seen, self._camera.options.pitch)
-        marker.scale.x, marker.scale.y, marker.scale.z = seen.size_m
-        red, green, blue = (share / 255.0 for share in seen.colour)
+        marker.type = marker.CYLINDER if visible.kind == "pillar" else marker.CUBE
+        _set_place(marker.pose, visible, self._camera.options.pitch)
+        marker.scale.x, marker.scale.y, marker.scale.z = visible.size_m
+        red, green, blue = (share / 255.0 for share in visible.colour)
         marker.color = ColorRGBA(r=red, g=green, b=blue, a=1.0)
+        # Until the next message, and a little longer if it is late.
         lasts_ns = round(2.0 * NS / self._camera.options.rate)
         marker.lifetime.sec, marker.lifetime.nanosec = divmod(lasts_ns, NS)
         return marker
@@ -113,10 +115,10 @@ def _camera_info(camera: Camera) -> CameraInfo:
     )
 
 
-def _set_place(pose: PoseMessage, seen: Seen, pitch_rad: float) -> None:
+def _set_place(pose: PoseMessage, visible: VisibleObject, pitch_rad: float) -> None:
     """Place and turn in the frame of a camera that looks down by an angle."""
-    pose.position.x, pose.position.y, pose.position.z = seen.place_m
-    half_yaw, half_pitch = 0.5 * seen.yaw_rad, -0.5 * pitch_rad
+    pose.position.x, pose.position.y, pose.position.z = visible.place_m
+    half_yaw, half_pitch = 0.5 * visible.yaw_rad, -0.5 * pitch_rad
     turned = pose.orientation
     turned.x = math.sin(half_pitch) * math.sin(half_yaw)
     turned.y = math.sin(half_pitch) * math.cos(half_yaw)
