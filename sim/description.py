@@ -294,25 +294,30 @@ class SimulatorOptions(Model):
     def fixed_frames(self) -> list[tuple[str, str, Pose, float]]:
         """What /tf_static says: parent, child, pose and height of the child, in metres."""
         base, link = self.odometry.child_frame, f"{self._prefix}base_link"
-        scan = (link, self.lidar.frame, self.lidar.pose, _SCAN_Z_M[self.robot.model])
-        found = [(base, link, ORIGIN, BASE_Z_M)] if base != link else []
-        own = (one for one in self.sensors if one.frame != link)
-        return [*found, scan, *((link, one.frame, one.pose, one.height_m) for one in own)]
+        frames = [(base, link, ORIGIN, BASE_Z_M)] if base != link else []
+        frames.append((link, self.lidar.frame, self.lidar.pose, _SCAN_Z_M[self.robot.model]))
+        for sensor in self.sensors:
+            if sensor.frame != link:
+                frames.append((link, sensor.frame, sensor.pose, sensor.height_m))
+        return frames
 
     @property
     def camera_frames(self) -> list[tuple[str, str, Vector, Quaternion]]:
         """What /tf_static says of the camera: parent, child, position, quaternion (x, y, z, w)."""
         if self.camera is None:
             return []
-        down = (0.0, math.sin(0.5 * self.camera.pitch), 0.0, math.cos(0.5 * self.camera.pitch))
-        body = (f"{self._prefix}base_link", self.camera.link, self.camera.position, down)
-        return [body, (self.camera.link, self.camera.frame, (0.0, 0.0, 0.0), _OPTICAL)]
+        camera, half_pitch = self.camera, 0.5 * self.camera.pitch
+        pitched = (0.0, math.sin(half_pitch), 0.0, math.cos(half_pitch))
+        return [
+            (f"{self._prefix}base_link", camera.link, camera.position, pitched),
+            (camera.link, camera.frame, (0.0, 0.0, 0.0), _OPTICAL),
+        ]
 
     @property
     def sensors(self) -> tuple[SensorOptions, ...]:
         """What it has besides LiDAR and odometry."""
-        others = (self.imu, self.joint_states, self.battery)
-        return (*(one for one in others if one is not None), *self.ranges)
+        at_most_one_each = (self.imu, self.joint_states, self.battery)
+        return (*(sensor for sensor in at_most_one_each if sensor is not None), *self.ranges)
 
     @property
     def transforms(self) -> set[tuple[str, str]]:
@@ -324,11 +329,13 @@ class SimulatorOptions(Model):
         return {(self.odometry.frame, self.odometry.child_frame), *fixed}
 
     def each(self, robots: Mapping[str, RobotOptions]) -> dict[str, SimulatorOptions]:
-        """The same for each of several robots, by their names; without any for the only one."""
-        return {name: self._named(name, one) for name, one in robots.items()} or {"": self}
+        """The same for each of several robots by name; ``""`` is the name of an only one."""
+        if not robots:
+            return {"": self}
+        return {name: self._of_robot(name, robot) for name, robot in robots.items()}
 
-    def _named(self, name: str, robot: RobotOptions) -> SimulatorOptions:
-        """Its topics and its frames begin with its name.
+    def _of_robot(self, name: str, robot: RobotOptions) -> SimulatorOptions:
+        """The same for one of several robots: its topics and its frames begin with its name.
 
         The transforms of all robots are on the same two topics, as with the ``frame_prefix`` of
         robot_state_publisher, and there is one clock.
@@ -343,19 +350,19 @@ class SimulatorOptions(Model):
             "child_frame": f"{name}/{self.odometry.child_frame}",
         }
 
-        found = SimulatorOptions(
+        options = SimulatorOptions(
             robot=robot,
             lidar=self.lidar.model_copy(update={"frame": f"{name}/{self.lidar.frame}"}),
             odometry=self.odometry.model_copy(update=frames),
             imu=self.imu and self.imu.of(name),
             joint_states=self.joint_states and self.joint_states.of(name),
             battery=self.battery and self.battery.of(name),
-            ranges=tuple(one.of(name) for one in self.ranges),
+            ranges=tuple(sensor.of(name) for sensor in self.ranges),
             camera=self.camera and self.camera.of(name),
             topics=self.topics.model_copy(update=topics),
         )
-        found._prefix = f"{name}/"
-        return found
+        options._prefix = f"{name}/"
+        return options
 
     def start(self, world_start: Pose) -> Pose:
         """Where the robot starts in a world with this ``start``."""

@@ -26,7 +26,7 @@ class Canvas:
 
     def colour(self, place: Point) -> Colour:
         """What is at a place."""
-        column, row = (min(max(round(one), 0), PIXELS - 1) for one in _pixel(place))
+        column, row = (min(max(round(value), 0), PIXELS - 1) for value in _pixel(place))
         red, green, blue = self._pixels[row, column].tolist()
         return red, green, blue
 
@@ -39,10 +39,12 @@ class Canvas:
             return
         rows, columns = np.mgrid[top:bottom, left:right]
         dx, dy = x2 - x1, y2 - y1
-        share = ((columns - x1) * dx + (rows - y1) * dy) / (dx * dx + dy * dy or 1.0)
+        # How far along the line the nearest point of it is, from 0 to 1; a dot has no length.
+        length_squared = dx * dx + dy * dy or 1.0
+        share = ((columns - x1) * dx + (rows - y1) * dy) / length_squared
         share = np.clip(share, 0.0, 1.0)
-        off = np.hypot(columns - x1 - share * dx, rows - y1 - share * dy)
-        self._pixels[top:bottom, left:right][off <= max(reach, 0.5)] = colour
+        distance = np.hypot(columns - x1 - share * dx, rows - y1 - share * dy)
+        self._pixels[top:bottom, left:right][distance <= max(reach, 0.5)] = colour
 
 
 def _pixel(place: Point) -> Point:

@@ -35,7 +35,9 @@ from sim.turtles.turtle import STEP_NS, Jump, Pen, Velocity
 NODE = "turtlesim"
 BACKGROUND: Colour = (69, 86, 255)
 _DEPTH = 7
-_LEAST_QUEUE = 100
+"""Depth of turtlesim's own queues."""
+_COMMAND_DEPTH = 100
+"""Longer than turtlesim's: commands wait here until a step begins."""
 _LONGEST_NAME = 60
 
 
@@ -50,12 +52,16 @@ class Sink(LateSink, Protocol):
 
 
 @dataclass
-class _Ends:
-    """The topics, services and the action of one turtle."""
+class _Interfaces:
+    """The topics, services and the action of one turtle.
+
+    Attributes:
+        inputs: Subscriptions and services.
+    """
 
     pose: Any
     colour: Any
-    taken: list[Any]
+    inputs: list[Any]
     rotation: RotationServer
 
 
@@ -72,16 +78,16 @@ class RosTurtles(RealTime):
         """Offer everything in a node of the caller, see :func:`make_node`; nothing moves yet."""
         super().__init__(node, sink, steady_ns, STEP_NS)
         self._turtles, self._sink = turtles, sink
-        self._inbox = Inbox(node, self._tell)
+        self._inbox = Inbox(node, self._on_answer)
         self._inbox.serve_own()
         self._inbox.serve(Spawn, "/spawn", self._spawn)
         self._inbox.serve(Kill, "/kill", self._kill)
         self._inbox.serve(Empty, "/clear", lambda request: self._do(request, turtles.clear))
         self._inbox.serve(Empty, "/reset", lambda request: self._do(request, turtles.reset))
-        self._ends: dict[str, _Ends] = {}
+        self._interfaces: dict[str, _Interfaces] = {}
         self.goals: list[RotationGoal] = []
         """Goals of the action rotate_absolute so far."""
-        self._meet()
+        self._update_interfaces()
 
     @property
     def background(self) -> Colour:
@@ -99,62 +105,63 @@ class RosTurtles(RealTime):
 
     def _advance(self) -> None:
         self._inbox.act(self._turtles.time_ns)
-        self._meet()
+        self._update_interfaces()
         self._publish(self._turtles.advance())
 
     def _publish(self, step: Step) -> None:
         if self._sink is not None:
             self._sink.on_step(step, self._stamp_ns + step.time_ns)
         for name, state in step.turtles.items():
-            ends = self._ends[name]
-            ends.rotation.tell()
-            ends.pose.publish(_pose_message(state))
+            interfaces = self._interfaces[name]
+            interfaces.rotation.tell()
+            interfaces.pose.publish(_pose_message(state))
             red, green, blue = state.colour
-            ends.colour.publish(Color(r=red, g=green, b=blue))
+            interfaces.colour.publish(Color(r=red, g=green, b=blue))
 
-    def _meet(self) -> None:
+    def _update_interfaces(self) -> None:
         """Offer what belongs to each turtle that is there, and to no other."""
-        for name in self._ends.keys() - self._turtles.turtles.keys():
-            ends = self._ends.pop(name)
+        for name in self._interfaces.keys() - self._turtles.turtles.keys():
+            interfaces = self._interfaces.pop(name)
             # Who waits for a result must hear that it was aborted.
-            ends.rotation.tell()
-            for made in (*ends.taken, *ends.rotation.services):
-                self._inbox.forget(made)
-            for publisher in (ends.pose, ends.colour, *ends.rotation.publishers):
+            interfaces.rotation.tell()
+            for entity in (*interfaces.inputs, *interfaces.rotation.services):
+                self._inbox.forget(entity)
+            for publisher in (interfaces.pose, interfaces.colour, *interfaces.rotation.publishers):
                 self._node.destroy_publisher(publisher)
-        for name in self._turtles.turtles.keys() - self._ends.keys():
-            self._ends[name] = self._offer(name)
+        for name in self._turtles.turtles.keys() - self._interfaces.keys():
+            self._interfaces[name] = self._offer(name)
 
-    def _offer(self, name: str) -> _Ends:
+    def _offer(self, name: str) -> _Interfaces:
         node, inbox, turtles = self._node, self._inbox, self._turtles
 
-        def pen(asked: Any) -> None:
-            colour, width = (asked.r, asked.g, asked.b), asked.width or Pen().width
-            turtles.set_pen(name, Pen(colour, width, is_down=not asked.off))
+        def set_pen(request: Any) -> None:
+            colour, width = (request.r, request.g, request.b), request.width or Pen().width
+            turtles.set_pen(name, Pen(colour, width, is_down=not request.off))
 
-        def teleport(asked: Any) -> None:
-            turtles.teleport(name, Jump(Pose(asked.x, asked.y, asked.theta)))
+        def teleport(request: Any) -> None:
+            turtles.teleport(name, Jump(Pose(request.x, request.y, request.theta)))
 
-        def move(asked: Any) -> None:
-            turtles.teleport(name, Jump(Pose(0.0, 0.0, asked.angular), asked.linear))
+        def move(request: Any) -> None:
+            turtles.teleport(name, Jump(Pose(0.0, 0.0, request.angular), request.linear))
 
         def command(twist: Twist) -> None:
             # turtlesim hears linear.y too, if its parameter holonomic is true.
             left_m_s = twist.linear.y if node.get_parameter("holonomic").value else 0.0
             turtles.command(name, Velocity(twist.linear.x, left_m_s, twist.angular.z))
 
-        def there(act: Callable[[Any], None]) -> Callable[[Any], None]:
+        def unless_killed(act: Callable[[Any], None]) -> Callable[[Any], None]:
+            # What has arrived may act only after the turtle was killed.
             return lambda message: act(message) if name in turtles.turtles else None
 
         def serve(kind: Any, service: str, act: Callable[[Any], None]) -> Any:
             def answer(request: Request) -> None:
-                self._do(request, lambda: there(act)(request.message))
+                self._do(request, lambda: unless_killed(act)(request.message))
 
             return inbox.serve(kind, f"/{name}/{service}", answer)
 
-        taken = [
-            inbox.subscribe(Twist, f"/{name}/cmd_vel", _LEAST_QUEUE, there(command)),
-            serve(SetPen, "set_pen", pen),
+        inputs = [
+            inbox.subscribe(Twist, f"/{name}/cmd_vel", _COMMAND_DEPTH, unless_killed(command)),
+            serve(SetPen, "set_pen", set_pen),
             serve(TeleportAbsolute, "teleport_absolute", teleport),
             serve(TeleportRelative, "teleport_relative", move),
         ]
@@ -163,9 +170,9 @@ class RosTurtles(RealTime):
         )
         pose = node.create_publisher(PoseMessage, f"/{name}/pose", _DEPTH)
         colour = node.create_publisher(Color, f"/{name}/color_sensor", _DEPTH)
-        return _Ends(pose, colour, taken, rotation)
+        return _Interfaces(pose, colour, inputs, rotation)
 
-    def _tell(self, request: Request, response: Any) -> None:
+    def _on_answer(self, request: Request, response: Any) -> None:
         if self._sink is not None:
             self._sink.on_answer(request, response)
 
@@ -174,10 +181,10 @@ class RosTurtles(RealTime):
         request.answer()
 
     def _spawn(self, request: Request) -> None:
-        asked = request.message
+        wanted = request.message
         name = ""
-        if not asked.name or _is_name(asked.name):
-            name = self._turtles.spawn(Pose(asked.x, asked.y, asked.theta), asked.name)
+        if not wanted.name or _is_valid_name(wanted.name):
+            name = self._turtles.spawn(Pose(wanted.x, wanted.y, wanted.theta), wanted.name)
         request.answer(Spawn.Response(name=name))
 
     def _kill(self, request: Request) -> None:
@@ -206,7 +213,7 @@ def make_node(context: Context) -> Node:
     return found
 
 
-def _is_name(name: str) -> bool:
+def _is_valid_name(name: str) -> bool:
     """Whether a turtle can have it: it becomes a part of the names of topics."""
     try:
         validate_full_topic_name(f"/{name}")

@@ -37,6 +37,8 @@ class RotationGoal:
     Attributes:
         turtle: Name of the turtle.
         rotation: None if it was rejected.
+        waiting: Requests for its result that were not answered yet.
+        is_settled: Whether its end was published, and its result given to all who waited.
     """
 
     turtle: str
@@ -47,16 +49,17 @@ class RotationGoal:
     canceled_ns: int | None = None
     ended_ns: int | None = None
     waiting: list[Request] = field(default_factory=list)
-    is_told: bool = False
+    is_settled: bool = False
 
     @property
     def status(self) -> int:
         """As the messages of an action say it."""
         if self.rotation is None:
             return int(GoalStatus.STATUS_UNKNOWN)
-        outcome, is_canceling = self.rotation.outcome, self.rotation.is_canceling
-        running = GoalStatus.STATUS_CANCELING if is_canceling else GoalStatus.STATUS_EXECUTING
-        return int(running if outcome is None else _STATUS[outcome])
+        if self.rotation.outcome is not None:
+            return int(_STATUS[self.rotation.outcome])
+        is_canceling = self.rotation.is_canceling
+        return int(GoalStatus.STATUS_CANCELING if is_canceling else GoalStatus.STATUS_EXECUTING)
 
 
 class RotationServer:
@@ -75,7 +78,7 @@ class RotationServer:
         Args:
             name: Of the turtle.
             rotate: Begins to turn it; None if it cannot.
-            sent: Gets each goal.
+            sent: Each goal is appended to it.
         """
         parts, action = RotateAbsolute.Impl, f"/{name}/rotate_absolute/_action"
         self._name, self._rotate, self._sent = name, rotate, sent
@@ -95,14 +98,14 @@ class RotationServer:
 
     def tell(self) -> None:
         """Publish feedback, and answer who waits for results; called after each step."""
-        for goal in [one for one in self._goals.values() if not one.is_told]:
+        for goal in [goal for goal in self._goals.values() if not goal.is_settled]:
             assert goal.rotation is not None
             if goal.rotation.outcome is None:
                 message = self._parts.FeedbackMessage(goal_id=goal.id)
                 message.feedback.remaining = goal.rotation.remaining_rad
                 self._feedback.publish(message)
                 continue
-            goal.is_told, goal.ended_ns = True, time.time_ns()
+            goal.is_settled, goal.ended_ns = True, time.time_ns()
             self._publish_status()
             for request in goal.waiting:
                 request.answer(self._result(goal))
@@ -125,7 +128,7 @@ class RotationServer:
 
     def _cancel(self, request: Request) -> None:
         response = CancelGoal.Response()
-        for goal in self._named(request.message.goal_info):
+        for goal in self._meant_by(request.message.goal_info):
             assert goal.rotation is not None
             goal.rotation.is_canceling = True
             goal.canceled_ns = goal.canceled_ns or request.arrived_ns
@@ -138,21 +141,23 @@ class RotationServer:
         request.answer(response)
         self._publish_status()
 
-    def _named(self, info: Any) -> Iterator[RotationGoal]:
-        """The goals that a request to cancel means: one, all up to a time, or all."""
-        wanted, until_ns = bytes(info.goal_id.uuid), info.stamp.sec * NS + info.stamp.nanosec
-        is_any = not any(wanted)
+    def _meant_by(self, info: Any) -> Iterator[RotationGoal]:
+        """The goals that a request to cancel means: one, all up to a time, or all.
+
+        It means all where both its id and its time are zero, see action_msgs/srv/CancelGoal.
+        """
+        id_, until_ns = bytes(info.goal_id.uuid), info.stamp.sec * NS + info.stamp.nanosec
         for key, goal in self._goals.items():
-            in_time = goal.asked_ns <= until_ns if until_ns else is_any
-            running = goal.rotation is not None and goal.rotation.outcome is None
-            if running and (key == wanted or in_time):
+            in_time = goal.asked_ns <= until_ns if until_ns else not any(id_)
+            is_running = goal.rotation is not None and goal.rotation.outcome is None
+            if is_running and (key == id_ or in_time):
                 yield goal
 
     def _give_result(self, request: Request) -> None:
         goal = self._goals.get(bytes(request.message.goal_id.uuid))
         if goal is None:
             request.answer()  # with the status UNKNOWN
-        elif goal.is_told:
+        elif goal.is_settled:
             request.answer(self._result(goal))
         else:
             goal.waiting.append(request)

@@ -17,6 +17,7 @@ from sim.turtles.canvas import Canvas
 from sim.turtles.turtle import STEP_NS, Jump, Outcome, Pen, Rotation, Turtle, Velocity
 
 FIRST = "turtle1"
+_MIDDLE = Pose(CENTRE_M, CENTRE_M, 0.0)
 MOST = 50
 """Turtles at the same time: each has ten topics and services."""
 
@@ -79,28 +80,28 @@ class Turtles:
         self.canvas = Canvas()
         self.turtles: dict[str, Turtle] = {}
         self._events: list[Event] = []
-        self._index = 0
-        self._counter = 0
+        self._steps = 0
+        self._newest_number = 0
         for name, pose in placed or ((FIRST, _MIDDLE),):
             self._add(name, pose, Act.PLACED)
 
     @property
     def time_ns(self) -> int:
         """Simulated time."""
-        return self._index * STEP_NS
+        return self._steps * STEP_NS
 
     def advance(self) -> Step:
         """Simulate one step of 16 ms."""
         states = {}
         for name, turtle in self.turtles.items():
-            landed, ran_out, colour = turtle.advance(self.canvas, self.time_ns)
-            for pose in landed:
+            step = turtle.advance(self.canvas, self.time_ns)
+            for pose in step.landings:
                 self._events.append(Event(Act.TELEPORTED, name, pose, turtle.pen))
-            if ran_out:
+            if step.timed_out:
                 self._note(Act.COMMAND_TIMEOUT, turtle)
-            states[name] = State(turtle.pose, turtle.velocity, turtle.hits_wall, colour)
+            states[name] = State(turtle.pose, turtle.velocity, turtle.hits_wall, step.colour)
         events, self._events = tuple(self._events), []
-        self._index += 1
+        self._steps += 1
         return Step(self.time_ns, events, states)
 
     def command(self, name: str, velocity: Velocity) -> None:
@@ -140,7 +141,7 @@ class Turtles:
         for turtle in self.turtles.values():
             turtle.end_rotation(Outcome.ABORTED)
         self.turtles.clear()
-        self._counter = 0
+        self._newest_number = 0
         self._events.append(Event(Act.RESET))
         self._add(self._next_name(), _MIDDLE, Act.PLACED)
 
@@ -160,10 +161,12 @@ class Turtles:
         return self.turtles[name].rotate(theta_rad) if math.isfinite(theta_rad) else None
 
     def _next_name(self) -> str:
-        while True:
-            self._counter += 1
-            if (name := f"turtle{self._counter}") not in self.turtles:
-                return name
+        """The next of turtle1, turtle2 and so on that no turtle has."""
+        name = ""
+        while not name or name in self.turtles:
+            self._newest_number += 1
+            name = f"turtle{self._newest_number}"
+        return name
 
     def _add(self, name: str, pose: Pose, act: Act) -> None:
         self.turtles[name] = Turtle(name, pose)
@@ -171,9 +174,6 @@ class Turtles:
 
     def _note(self, act: Act, turtle: Turtle) -> None:
         self._events.append(Event(act, turtle.name, turtle.pose, turtle.pen))
-
-
-_MIDDLE = Pose(CENTRE_M, CENTRE_M, 0.0)
 
 
 def _is_finite(pose: Pose) -> bool:

@@ -18,10 +18,11 @@ STEP_NS = 16_000_000
 """Length of a step: turtlesim's timer."""
 _STEP_S = STEP_NS / NS
 _COMMAND_NS = NS
-"""So long a command acts."""
+"""How long a command acts."""
 _TURN_RAD_S = 1.0
-_THERE_RAD = 0.02
-_MOST = 1e30
+_ARRIVED_RAD = 0.02
+_LARGEST = 1e30
+"""A message holds float32, which end at 3.4e38."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,9 @@ class Velocity:
     @property
     def is_finite(self) -> bool:
         """Whether no part is NaN, infinite, or too large for a float32."""
-        return all(abs(one) < _MOST for one in (self.ahead_m_s, self.left_m_s, self.turn_rad_s))
+        return all(
+            abs(part) < _LARGEST for part in (self.ahead_m_s, self.left_m_s, self.turn_rad_s)
+        )
 
 
 REST = Velocity()
@@ -63,13 +66,18 @@ class Pen:
 
 @dataclass(frozen=True, slots=True)
 class Jump:
-    """A teleport: to a pose, or from where the turtle is, then ``ahead_m`` is given."""
+    """A teleport.
+
+    Attributes:
+        pose: Where it ends; if ``ahead_m`` is given only the heading counts, as a turn.
+        ahead_m: How far it leads from where the turtle is, after the turn.
+    """
 
     pose: Pose
     ahead_m: float | None = None
 
-    def from_(self, pose: Pose) -> Pose:
-        """Where it ends."""
+    def landing(self, pose: Pose) -> Pose:
+        """Where it ends for a turtle at a pose."""
         if self.ahead_m is None:
             return replace(self.pose, y_m=min(self.pose.y_m, SIZE_M))
         yaw_rad = pose.yaw_rad + self.pose.yaw_rad
@@ -104,13 +112,29 @@ class Rotation:
     outcome: Outcome | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class TurtleStep:
+    """What happened to a turtle in a step, besides its motion.
+
+    Attributes:
+        landings: Where it was teleported to.
+        timed_out: Whether a command ran out, and stopped it.
+        colour: What its sensor sees.
+    """
+
+    landings: tuple[Pose, ...]
+    timed_out: bool
+    colour: Colour
+
+
 @dataclass
 class Turtle:
-    """A turtle that is there.
+    """A turtle on the canvas.
 
     Attributes:
         velocity: What it moves with.
         hits_wall: Whether the last step would have led it beyond a wall.
+        jumps: Teleports of the next step.
     """
 
     name: str
@@ -136,34 +160,37 @@ class Turtle:
     def end_rotation(self, outcome: Outcome) -> None:
         """The goal that it turns for, if there is one, is over."""
         if self.rotation is not None:
-            self.rotation.outcome, self.rotation = outcome, None
+            self.rotation.outcome = outcome
+            self.rotation = None
 
-    def advance(self, canvas: Canvas, time_ns: int) -> tuple[list[Pose], bool, Colour]:
-        """Do the step that begins at a time.
-
-        Returns:
-            Where it was teleported to, whether a command ran out, and the colour under it.
-        """
-        landed = []
+    def advance(self, canvas: Canvas, time_ns: int) -> TurtleStep:
+        """Do the step that begins at a time."""
+        landings = []
         for jump in self.jumps:
-            landed.append(jump.from_(self.pose))
-            self._draw(canvas, landed[-1])
-            self.pose = landed[-1]
+            landing = jump.landing(self.pose)
+            self._draw(canvas, landing)
+            self.pose = landing
+            landings.append(landing)
         self.jumps.clear()
         self._turn(time_ns)
-        is_over = self._commanded_ns is not None and time_ns - self._commanded_ns > _COMMAND_NS
-        ran_out = is_over and self.velocity != REST
-        if is_over:
-            self.velocity, self._commanded_ns = REST, None
+        timed_out = self._end_command(time_ns)
         after = self._moved()
         # The sensor looks before the line of this step is drawn.
         colour = canvas.colour((after.x_m, after.y_m))
         self._draw(canvas, after)
         self.pose = after
-        return landed, ran_out, colour
+        return TurtleStep(tuple(landings), timed_out, colour)
+
+    def _end_command(self, time_ns: int) -> bool:
+        """Stop if the last command is too old; whether that changed the motion."""
+        if self._commanded_ns is None or time_ns - self._commanded_ns <= _COMMAND_NS:
+            return False
+        was_moving = self.velocity != REST
+        self.velocity, self._commanded_ns = REST, None
+        return was_moving
 
     def _turn(self, time_ns: int) -> None:
-        """Turn on the spot for a goal."""
+        """Turn on the spot for a goal, if there is one."""
         goal = self.rotation
         if goal is None:
             return
@@ -173,7 +200,7 @@ class Turtle:
             return
         goal.remaining_rad = wrapped(wrapped(goal.theta_rad) - self.pose.yaw_rad)
         goal.delta_rad = wrapped(goal.start_rad - self.pose.yaw_rad)
-        if abs(goal.remaining_rad) < _THERE_RAD:
+        if abs(goal.remaining_rad) < _ARRIVED_RAD:
             self.velocity = REST
             self.end_rotation(Outcome.SUCCEEDED)
         else:
@@ -199,5 +226,5 @@ class Turtle:
 
 def wrapped(angle_rad: float) -> float:
     """The same direction in [-pi, pi), as turtlesim says it."""
-    found = math.remainder(angle_rad, math.tau)
-    return -math.pi if found >= math.pi else found
+    wrapped_rad = math.remainder(angle_rad, math.tau)
+    return -math.pi if wrapped_rad >= math.pi else wrapped_rad
