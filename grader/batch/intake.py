@@ -37,7 +37,7 @@ from grader.course.load import Course
 from grader.errors import GraderFault, RosgradeError, SubmissionError, UsageError
 from grader.findings.words import listing
 from grader.report.formats.canvas_comments import carrier
-from grader.report.formats.gradebook import DOWNLOAD
+from grader.report.formats.canvas_gradebook import DOWNLOAD
 from grader.submission.git import run_git
 from grader.submission.intake.archive import SUFFIXES, unpack
 from grader.submission.intake.members import MIB, ArchiveLimits

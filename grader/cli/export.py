@@ -21,7 +21,8 @@ from grader.gradebook.feedback import class_feedback, letters, write_files
 from grader.grading.files import RESULT_FILE
 from grader.report.files import refuse_inputs, refuse_part, write_whole
 from grader.report.formats.canvas_comments import carrier, upload_zip
-from grader.report.formats.gradebook import canvas_csv, grades_csv, read_canvas
+from grader.report.formats.canvas_gradebook import canvas_csv, read_canvas
+from grader.report.formats.gradebook import grades_csv
 from grader.report.formats.mail import address, mail_csv, write_mbox
 
 Folder = Annotated[Path, typer.Option("--out", help="Folder to write to.")]

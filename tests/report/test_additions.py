@@ -10,7 +10,8 @@ import pytest
 
 from grader.findings.finding import Status
 from grader.report.formats import github, gradescope, junit
-from grader.report.formats.gradebook import canvas_csv, grades_csv, read_canvas
+from grader.report.formats.canvas_gradebook import canvas_csv, read_canvas
+from grader.report.formats.gradebook import grades_csv
 from grader.report.formats.markdown import render_markdown
 from grader.report.html.overview import render_overview
 from grader.report.model.class_row import ClassRow

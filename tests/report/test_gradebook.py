@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.errors import UsageError
-from grader.report.formats.gradebook import canvas_csv, cell, csv_text, grades_csv, read_canvas
+from grader.report.formats.canvas_gradebook import canvas_csv, read_canvas
+from grader.report.formats.gradebook import cell, csv_text, grades_csv
 from grader.report.model.class_row import ClassRow
 from tests.grade.sample import Told, make_submission
 from tests.report.sample import full_points, judged, lost_points, not_graded

@@ -16,7 +16,7 @@ import tarfile
 import zipfile
 from collections.abc import Iterable, Mapping
 
-from grader.report.formats.gradebook import DOWNLOAD
+from grader.report.formats.canvas_gradebook import DOWNLOAD
 from grader.report.model.result_model import Result
 from grader.report.text.explanation import summary
 
