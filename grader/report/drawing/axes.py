@@ -45,16 +45,22 @@ class Scale:
 
 def ticks(low: float, high: float, count: int) -> list[tuple[float, str]]:
     """Round values within [low, high], about ``count`` of them, with their labels."""
-    rough = (high - low) / max(1, count)
-    power = 10.0 ** math.floor(math.log10(rough))
-    step = next(factor * power for factor in (1, 2, 5, 10) if factor * power >= rough * 0.999)
+    rough_step = (high - low) / max(1, count)
+    power = 10.0 ** math.floor(math.log10(rough_step))
+    # Rounding must not make a step that fits exactly too small.
+    step = next(f * power for f in (1, 2, 5, 10) if f * power >= rough_step * 0.999)
     digits = max(0, -math.floor(math.log10(step) + 1e-9))
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     values = [number * step for number in range(first, last + 1)]
-    return [
-        (one, f"{one:.3g}" if abs(one) >= 1e6 or digits > 4 else f"{one + 0.0:.{digits}f}")
-        for one in values
-    ]
+    return [(value, _tick_label(value, digits)) for value in values]
+
+
+def _tick_label(value: float, digits: int) -> str:
+    """A value with so many decimals; or as a power of ten where that would be long."""
+    if abs(value) >= 1e6 or digits > 4:
+        return f"{value:.3g}"
+    # Plus zero makes of -0.0 a plain 0.
+    return f"{value + 0.0:.{digits}f}"
 
 
 def value_axis(
@@ -87,6 +93,7 @@ def unit_of(text: str) -> str:
 
 
 LANE = 36
+"""Height of a row in pixels."""
 SIDE = 6
 """Pixels left free at both sides."""
 _TRACK = 12
@@ -117,12 +124,12 @@ def draw_lanes(lanes: Sequence[Lane], scale: Scale, top: float, width: float) ->
     drawn = []
     room = width - 2 * SIDE
     for index, lane in enumerate(lanes):
-        text = top + index * LANE + 12
-        y = text + 6
+        text_y = top + index * LANE + 12
+        y = text_y + 6
         track = {"y": y, "height": _TRACK, "rx": 3}
         drawn += [
-            label(fitted(lane.name, room - len(lane.note) * LETTER - 12), SIDE, text, "lane"),
-            label(lane.note, width - SIDE, text, anchor="end"),
+            label(fitted(lane.name, room - len(lane.note) * LETTER - 12), SIDE, text_y, "lane"),
+            label(lane.note, width - SIDE, text_y, anchor="end"),
             element("rect", x=SIDE, width=room, class_="track", **track),
         ]
         for bar in lane.bars:
@@ -140,5 +147,5 @@ def draw_lanes(lanes: Sequence[Lane], scale: Scale, top: float, width: float) ->
 
 
 def _columns(scale: Scale, times_s: Sequence[float]) -> list[float]:
-    """Pixels of times, each once, so that a flood stays drawable."""
+    """Pixels of times, in halves and each once, so that a flood stays drawable."""
     return sorted({round(pixel * 2) / 2 for pixel in scale.all_clipped(times_s)})

@@ -23,25 +23,30 @@ from grader.report.drawing.svg import Point
 from sim.turtles.bounds import PIXELS, SIZE_M
 
 BACKGROUND: Colour = (69, 86, 255)
+"""The background of turtlesim, if no parameter changes it."""
 MOST_LINES = 1_000
 _TOLERANCE_PX = 0.4
-_EDGE = 26.0
+_MARGIN = 26.0
 """Room for the numbers beside the canvas, in pixels."""
-_Pixel = Callable[[Point], Point]
+_TOP = 8.0
+_ToPixel = Callable[[Point], Point]
 _BODY = ((9.0, 0.0), (-6.0, 6.0), (-3.0, 0.0), (-6.0, -6.0))
+"""Corners of a turtle in pixels: ahead, and to its left."""
 
 
 def figures(assignment: Assignment, scenario: str) -> tuple[tuple[Point, ...], ...]:
     """The figures that visible checks ask for in a scenario, each once."""
-    found: dict[tuple[Point, ...], None] = {}
+    distinct: dict[tuple[Point, ...], None] = {}
     for check in assignment.checks:
-        judged = not check.scenarios or scenario in check.scenarios
-        if check.uses != "turtle.draws" or not judged or check.visibility is not Visibility.VISIBLE:
+        is_visible = check.visibility is Visibility.VISIBLE
+        is_judged = not check.scenarios or scenario in check.scenarios
+        if check.uses != "turtle.draws" or not is_judged or not is_visible:
             continue
         with contextlib.suppress(ValidationError):
-            asked = Draws.model_validate(check.with_)
-            found[(*asked.figure, *asked.figure[: asked.closed])] = None
-    return tuple(found)
+            parameters = Draws.model_validate(check.with_)
+            corners = tuple(parameters.figure)
+            distinct[(*corners, corners[0]) if parameters.closed else corners] = None
+    return tuple(distinct)
 
 
 def draw_turtles(
@@ -51,53 +56,61 @@ def draw_turtles(
     if not recording.turtles:
         return None
     lines = drawn(recording)[-MOST_LINES:]
-    last = {step.robot: step for step in recording.truth}
-    killed = [one for one in recording.turtles if one.kind == "killed"]
-    gone = {one.turtle for one in killed}
-    there = [step for step in last.values() if step.robot not in gone]
-    background = next(
-        (one.colour for one in reversed(recording.turtles) if one.kind == "background"), BACKGROUND
-    )
+    killed = [event for event in recording.turtles if event.kind == "killed"]
+    killed_names = [event.turtle for event in killed]
+    last_steps = {step.robot: step for step in recording.truth}
+    alive = [step for step in last_steps.values() if step.robot not in killed_names]
 
     def draw(width: float) -> tuple[float, list[Markup]]:
-        side = min(width - 2.0 * _EDGE, 420.0)
+        side = min(width - 2.0 * _MARGIN, 420.0)
         left, scale = (width - side) / 2.0, side / SIZE_M
 
         def pixel(place: Point) -> Point:
             # What is drawn beyond the walls ends there.
-            x_m, y_m = (min(max(one, 0.0), SIZE_M) for one in place)
-            return left + x_m * scale, 8.0 + (SIZE_M - y_m) * scale
+            x_m, y_m = (min(max(value, 0.0), SIZE_M) for value in place)
+            return left + x_m * scale, _TOP + (SIZE_M - y_m) * scale
 
+        fill = _rgb(_background(recording))
         canvas = [
-            svg.element("rect", x=left, y=8.0, width=side, height=side, fill=_rgb(background)),
-            *(_line(one, pixel, side / PIXELS) for one in lines),
-            *(svg.curve([pixel(one) for one in figure], "turtle-asked") for figure in asked),
+            svg.element("rect", x=left, y=_TOP, width=side, height=side, fill=fill),
+            *(_line(line, pixel, side / PIXELS) for line in lines),
+            *(svg.curve([pixel(corner) for corner in figure], "turtle-asked") for figure in asked),
         ]
-        marks = [mark for step in there for mark in _turtle(step, pixel)]
-        for number, one in enumerate(killed, start=1):
-            x, y = pixel((one.x_m, one.y_m))
+        marks = [mark for step in alive for mark in _turtle(step, pixel)]
+        for number, event in enumerate(killed, start=1):
+            x, y = pixel((event.x_m, event.y_m))
+            text_x = x + 8.0 if x < width - 90.0 else x - 70.0
             marks.append(svg.crosses([(x, y)], "turtle-mark"))
-            marks.append(svg.label(f"{number}. {one.turtle}", *_beside(x, y, width), "on-canvas"))
-        return side + 8.0 + _EDGE, [svg.element("g", *canvas), *marks, *_numbers(left, side)]
+            marks.append(svg.label(f"{number}. {event.turtle}", text_x, y + 4.0, "on-canvas"))
+        numbers = _numbers(left, side)
+        return side + _TOP + _MARGIN, [svg.element("g", *canvas), *marks, *numbers]
 
-    caption = _caption(lines, asked, [one.turtle for one in killed])
+    caption = _caption(lines, asked, killed_names)
     return svg.figure(name, "What the turtles drew", caption, draw)
 
 
+def _background(recording: Recording) -> Colour:
+    """The colour below the lines at the end."""
+    colours = [event.colour for event in recording.turtles if event.kind == "background"]
+    return colours[-1] if colours else BACKGROUND
+
+
 def _caption(lines: Sequence[Line], asked: Sequence[object], killed: Sequence[str]) -> str:
-    length_m = sum(line.length_m for line in lines)
-    who = listing(dict.fromkeys(line.turtle for line in lines))
-    text = f"{who} drew {metres(length_m)}" if lines else "No line is on the canvas"
-    if asked:
-        noun = "figure" if len(asked) == 1 else "figures"
-        text += f"; the dashed {noun} {'was' if len(asked) == 1 else 'were'} asked for"
+    text = "No line is on the canvas"
+    if lines:
+        turtles = listing(dict.fromkeys(line.turtle for line in lines))
+        text = f"{turtles} drew {metres(sum(line.length_m for line in lines))}"
+    if len(asked) == 1:
+        text += "; the dashed figure was asked for"
+    elif asked:
+        text += "; the dashed figures were asked for"
     if killed:
         text += f"; {counted(len(killed), 'turtle')} killed (marked ×, in order)"
     return f"{text}. The canvas is {SIZE_M:.2f} m wide."
 
 
-def _line(line: Line, pixel: _Pixel, pixel_size: float) -> Markup:
-    points = svg.simplified([pixel(one) for one in line.points], _TOLERANCE_PX)
+def _line(line: Line, pixel: _ToPixel, pixel_size: float) -> Markup:
+    points = svg.simplified([pixel(place) for place in line.points], _TOLERANCE_PX)
     path = "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
     return svg.element(
         "path",
@@ -108,28 +121,26 @@ def _line(line: Line, pixel: _Pixel, pixel_size: float) -> Markup:
     )
 
 
-def _turtle(step: Truth, pixel: _Pixel) -> Iterable[Markup]:
+def _turtle(step: Truth, pixel: _ToPixel) -> Iterable[Markup]:
     """Where a turtle is at the end, and where it looks."""
     x, y = pixel((step.x_m, step.y_m))
     cos, sin = math.cos(step.yaw_rad), math.sin(step.yaw_rad)
-    corners = [(x + a * cos - b * sin, y - a * sin - b * cos) for a, b in _BODY]
-    path = "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in corners) + "Z"
+    corners = [
+        (x + ahead * cos - aside * sin, y - ahead * sin - aside * cos) for ahead, aside in _BODY
+    ]
+    path = "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in corners) + "Z"
     yield svg.element("path", d=path, class_="turtle-body")
     yield svg.label(step.robot, x, y + 22.0, "on-canvas", "middle")
 
 
-def _beside(x: float, y: float, width: float) -> Point:
-    """Where a text beside a mark begins."""
-    return (x + 8.0 if x < width - 90.0 else x - 70.0), y + 4.0
-
-
 def _numbers(left: float, side: float) -> list[Markup]:
-    low = side + 8.0 + 16.0
+    """The size of the canvas beside its edges."""
+    bottom = _TOP + side
     return [
-        svg.label("0", left - 6.0, side + 8.0, "label", "end"),
-        svg.label(f"{SIZE_M:.2f} m", left + side, low, "label", "end"),
-        svg.label("x", left + side / 2.0, low, "label", "middle"),
-        svg.label("y", left - 6.0, 8.0 + side / 2.0, "label", "end"),
+        svg.label("0", left - 6.0, bottom, "label", "end"),
+        svg.label(f"{SIZE_M:.2f} m", left + side, bottom + 16.0, "label", "end"),
+        svg.label("x", left + side / 2.0, bottom + 16.0, "label", "middle"),
+        svg.label("y", left - 6.0, _TOP + side / 2.0, "label", "end"),
     ]
 
 

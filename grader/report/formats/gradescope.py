@@ -104,9 +104,14 @@ class Metadata(BaseModel):
 
         A due date of the student's own (an extension) goes before the assignment's.
         """
-        own = [one.assignment.due_date for one in self.users if one.assignment]
-        due = next(filter(None, reversed([self.assignment.due_date, *own])), None)
-        return max(0.0, (self.created_at - due).total_seconds()) if due else None
+        due = self.assignment.due_date
+        for user in self.users:
+            if user.assignment is not None and user.assignment.due_date is not None:
+                # Of a group the last member's counts.
+                due = user.assignment.due_date
+        if due is None:
+            return None
+        return max(0.0, (self.created_at - due).total_seconds())
 
 
 def read_metadata(file: Path) -> Metadata:

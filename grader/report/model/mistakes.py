@@ -28,32 +28,42 @@ def _reason(check: CheckPart) -> Hashable:
 
 def others(check: str, checks: Sequence[CheckPart]) -> tuple[int, int]:
     """How many other checks failed for the same reason, and how many wait for any of them."""
-    found = reasons(checks)
-    same = {name for name, reason in found.items() if reason == found[check]}
-    return len(same) - 1, sum(not same.isdisjoint(one.waits_for) for one in checks)
+    reason_of = reasons(checks)
+    same = {name for name, reason in reason_of.items() if reason == reason_of[check]}
+    waiting = [one for one in checks if not same.isdisjoint(one.waits_for)]
+    return len(same) - 1, len(waiting)
 
 
 def only_shown(checks: Sequence[CheckPart]) -> frozenset[str]:
     """Ids of the checks without points that did not pass, and that nothing else waits for."""
-    lost = (Status.FAILED, Status.ERROR)
-    mild = {check.id for check in checks if check.status in lost and not check.max_points}
-    return frozenset(mild).difference(*(check.waits_for for check in checks))
+    not_passed = (Status.FAILED, Status.ERROR)
+    pointless = {
+        check.id for check in checks if check.status in not_passed and not check.max_points
+    }
+    return frozenset(pointless).difference(*(check.waits_for for check in checks))
 
 
 def first_to_fix(checks: Sequence[CheckPart]) -> str | None:
-    """Find the failed check on which most others depend.
-
-    Of equals it is the author's first, or in the run of that one what went wrong first in time.
+    """Find the failed check on which most others depend; None where none needs a correction.
 
     A node that crashed does not stay alive, and has no publisher either: of checks that failed
     for the same reason the first stands for all, with the checks that wait for any of them. A
-    check that is only shown need not be corrected. None where no check needs it.
+    check that is only shown need not be corrected.
     """
     shown = only_shown(checks)
-    found = [check for check in reasons(checks) if check not in shown]
-    most = max((sum(others(check, checks)) for check in found), default=0)
-    equals = [one for one in checks if one.id in found and sum(others(one.id, checks)) == most]
-    ends = [one for one in equals if one.scenario == equals[0].scenario and one.evidence.moments]
-    if equals and equals[0] in ends:
-        return min(ends, key=lambda one: one.evidence.moments[-1].time_s).id
-    return equals[0].id if equals else None
+    dependents = {check: sum(others(check, checks)) for check in reasons(checks)}
+    candidates = [check for check in checks if check.id in dependents and check.id not in shown]
+    if not candidates:
+        return None
+    most = max(dependents[check.id] for check in candidates)
+    equals = [check for check in candidates if dependents[check.id] == most]
+    return _earliest(equals).id
+
+
+def _earliest(equals: Sequence[CheckPart]) -> CheckPart:
+    """The author's first check; or that of its run which went wrong first, if times tell."""
+    first = equals[0]
+    if not first.evidence.moments:
+        return first
+    of_run = [one for one in equals if one.scenario == first.scenario and one.evidence.moments]
+    return min(of_run, key=lambda one: one.evidence.moments[-1].time_s)
