@@ -99,7 +99,7 @@ def result_schema() -> dict[str, Any]:
 
 def _check(result: CheckResult) -> model.CheckPart:
     decisive = result.decisive
-    missed = result.status in (Status.FAILED, Status.SKIPPED)
+    hints = result.hints if result.status in (Status.FAILED, Status.SKIPPED) else ()
     return model.CheckPart(
         **_finding(decisive),
         id=result.id,
@@ -107,19 +107,22 @@ def _check(result: CheckResult) -> model.CheckPart:
         points=result.points,
         max_points=result.max_points,
         visibility=result.visibility.value,
-        author_hint="".join(result.hints[:1]) if missed else "",
-        further_hints=result.hints[1:] if missed else (),
+        author_hint=hints[0] if hints else "",
+        further_hints=hints[1:],
         waits_for=result.waits_for,
         other_scenarios=tuple(
-            model.FindingPart(**_finding(item)) for item in result.findings if item is not decisive
+            model.FindingPart(**_finding(other))
+            for other in result.findings
+            if other is not decisive
         ),
     )
 
 
-def _finding(item: ScenarioFinding) -> dict[str, Any]:
-    own = {"scenario": item.scenario, "traceback": item.traceback}
-    names = model.FindingPart.model_fields.keys() - own.keys()
-    return {**own, **{name: getattr(item.finding, name) for name in names}}
+def _finding(finding: ScenarioFinding) -> dict[str, Any]:
+    """The fields of a :class:`FindingPart`: those of the finding, and what is known of its run."""
+    of_run = {"scenario": finding.scenario, "traceback": finding.traceback}
+    names = model.FindingPart.model_fields.keys() - of_run.keys()
+    return {**of_run, **{name: getattr(finding.finding, name) for name in names}}
 
 
 def _scenario(recording: Recording, facts: RunFacts) -> model.ScenarioPart:
@@ -148,30 +151,38 @@ def remarks(recording: Recording) -> tuple[str, ...]:
     """
     if recording.bag is not None:
         return tuple(f"the bag {code(recording.bag)}: {note}" for note in recording.bag_notes)
-    names = f"so that everything else could be judged: {codes(map(str, recording.names.wrong))}"
-    renamed = (f"this run corrected wrong names, {names}",) if recording.names else ()
-    forged = (
-        f"{one.text}: only what the simulator of the assignment publishes there counts as the truth"
-        for one in recording.incidents
-        if one.kind == "forged_truth"
+    return (
+        *_corrected_names(recording),
+        *_imitations(recording),
+        *_excess(recording),
+        *_forged_reports(recording),
+        *_unlisted_modules(recording),
+        *_forged_truth(recording),
     )
-    return (*renamed, *_posing(recording), *_excess(recording), *_tricks(recording), *forged)
 
 
-def _posing(recording: Recording) -> Iterator[str]:
+def _corrected_names(recording: Recording) -> Iterator[str]:
+    if recording.names:
+        wrong = codes(map(str, recording.names.wrong))
+        yield (f"this run corrected wrong names, so that everything else could be judged: {wrong}")
+
+
+def _imitations(recording: Recording) -> Iterator[str]:
     """Names of the probe and topics of the robot, unless the assignment asks for them."""
     for node in recording.student_nodes:
         if node.name.rpartition("/")[2] == PROBE_NODE:
             name = code(node.name)
             yield f"a node of the submission is called {name}, like the node that watches the run"
-    heard = {e.topic for e in recording.endpoints if e.owner is Owner.PROBE}
-    posing = set(Untouched().topics) - (heard if recording.scene is None else set())
-    taken: dict[str, set[str]] = {}
+    topics_of_robots = set(Untouched().topics)
+    if recording.scene is None:
+        # Without a robot, what the probe listens to is asked for.
+        topics_of_robots -= {e.topic for e in recording.endpoints if e.owner is Owner.PROBE}
+    topics_by_node: dict[str, set[str]] = {}
     for endpoint in recording.student_endpoints(Kind.PUBLISHER):
         # A robot is not the only one to publish transforms.
-        if endpoint.topic in posing and endpoint.type != TRANSFORMS:
-            taken.setdefault(endpoint.node, set()).add(endpoint.topic)
-    for node_name, topics in sorted(taken.items()):
+        if endpoint.topic in topics_of_robots and endpoint.type != TRANSFORMS:
+            topics_by_node.setdefault(endpoint.node, set()).add(endpoint.topic)
+    for node_name, topics in sorted(topics_by_node.items()):
         yield f"the node {code(node_name)} publishes on {codes(sorted(topics))}, which robots do"
 
 
@@ -180,14 +191,8 @@ def _excess(recording: Recording) -> Iterator[str]:
     others = recording.environment.get("other_domains")
     if others:
         yield f"the submission joined another ROS domain: {others}"
-    for topic, messages in recording.messages.items():
-        times = [message.stamp_ns for message in messages]
-        numbers = [*range(len(messages))]
-        if len(recording.student_endpoints(Kind.PUBLISHER, topic)) == 1:
-            # A publisher numbers its messages: of a flood most are lost on the way.
-            numbers = [message.sequence for message in messages]
-        lasts = (bisect_left(times, time + NS) - 1 for time in times)
-        most = max((numbers[last] - numbers[i] + 1 for i, last in enumerate(lasts)), default=0)
+    for topic in recording.messages:
+        most = _most_within_a_second(recording, topic)
         if most > _FLOOD:
             yield f"{most} messages were sent on {code(topic)} within 1 s"
     for process in recording.processes:
@@ -196,14 +201,33 @@ def _excess(recording: Recording) -> Iterator[str]:
             yield f"{code(process.name)} printed {left_out} more than rosgrade keeps"
 
 
-def _tricks(recording: Recording) -> Iterator[str]:
-    if not any(breach.what == "forged report" for breach in recording.breaches):
-        for process in dict.fromkeys(item.process for item in recording.declared("foreign")):
-            yield (
-                f"{code(process)} wrote into the channel through which rosgrade reports from "
-                "inside a process; such a report is never proof"
-            )
-    # Such libraries are perhaps missing where a class is graded.
+def _most_within_a_second(recording: Recording, topic: str) -> int:
+    """The largest number of messages that were sent on a topic within a second."""
+    messages = recording.messages[topic]
+    times = [message.stamp_ns for message in messages]
+    numbers = list(range(len(messages)))
+    if len(recording.student_endpoints(Kind.PUBLISHER, topic)) == 1:
+        # A publisher numbers its messages: of a flood most are lost on the way.
+        numbers = [message.sequence for message in messages]
+    most = 0
+    for first, time_ns in enumerate(times):
+        last = bisect_left(times, time_ns + NS) - 1
+        most = max(most, numbers[last] - numbers[first] + 1)
+    return most
+
+
+def _forged_reports(recording: Recording) -> Iterator[str]:
+    if any(breach.what == "forged report" for breach in recording.breaches):
+        return
+    for process in dict.fromkeys(item.process for item in recording.declared("foreign")):
+        yield (
+            f"{code(process)} wrote into the channel through which rosgrade reports from "
+            "inside a process; such a report is never proof"
+        )
+
+
+def _unlisted_modules(recording: Recording) -> Iterator[str]:
+    """Libraries of Python that are perhaps missing where a class is graded."""
     modules = recording.environment.get("unlisted", "").split()
     if modules:
         has_none = recording.environment.get("sandbox", "none") == "none"
@@ -212,6 +236,15 @@ def _tricks(recording: Recording) -> Iterator[str]:
             f"the code imports {codes(modules)}, found {here}: elsewhere, Python has only "
             "the standard library, ROS 2, `numpy`, and what the assignment allows"
         )
+
+
+def _forged_truth(recording: Recording) -> Iterator[str]:
+    for incident in recording.incidents:
+        if incident.kind == "forged_truth":
+            yield (
+                f"{incident.text}: only what the simulator of the assignment publishes there "
+                "counts as the truth"
+            )
 
 
 _FINDING = frozenset({"scenario", "status", "expected", "hint", "concept", "asks"})

@@ -41,44 +41,45 @@ class Row(NamedTuple):
 def explain(check: CheckPart, result: Result) -> list[Row]:
     """Say why a check ended as it did; what is the same in several scenarios is said once."""
     same_advice: dict[tuple[str, ...], list[FindingPart]] = {}
-    for item in check.findings:
-        if item.status is check.status:
-            same_advice.setdefault(advice(check, item), []).append(item)
+    for finding in check.findings:
+        if finding.status is check.status:
+            same_advice.setdefault(advice(check, finding), []).append(finding)
     rows: list[Row] = []
-    for texts, items in same_advice.items():
-        rows += _seen(items, several=len(check.findings) > 1)
+    for texts, findings in same_advice.items():
+        rows += _asked_and_observed(findings, several=len(check.findings) > 1)
         rows += [Row(ADVICE[min(index, 1)], one_line(text)) for index, text in enumerate(texts)]
-        places = dict.fromkeys(one_line(str(place)) for item in items for place in places_of(item))
-        rows += [Row("where", place) for place in places]
-        log = next((item.evidence.log for item in items if item.evidence.log), ())
+        places = (one_line(str(place)) for finding in findings for place in places_of(finding))
+        rows += [Row("where", place) for place in dict.fromkeys(places)]
+        log = next((finding.evidence.log for finding in findings if finding.evidence.log), ())
         if log:
             rows.append(Row("printed", clean("\n".join(log))))
-        named = filter(None, dict.fromkeys(one_line(item.concept) for item in items))
-        rows += [Row("read", f"`rosgrade explain {concept}`") for concept in named]
+        concepts = dict.fromkeys(one_line(finding.concept) for finding in findings)
+        rows += [Row("read", f"`rosgrade explain {concept}`") for concept in concepts if concept]
     if waits := points_waiting(check, result):
         rows.append(Row("waiting", waits))
     return rows
 
 
-def _seen(items: Sequence[FindingPart], *, several: bool) -> Iterator[Row]:
+def _asked_and_observed(findings: Sequence[FindingPart], *, several: bool) -> Iterator[Row]:
+    """What was expected and observed, once for all scenarios with the same."""
     scenarios: dict[tuple[str, str], list[str]] = {}
-    for item in items:
-        key = (one_line(item.expected), one_line(item.observed))
-        scenarios.setdefault(key, []).append(one_line(item.scenario or ""))
-    before = None
+    for finding in findings:
+        texts = (one_line(finding.expected), one_line(finding.observed))
+        scenarios.setdefault(texts, []).append(one_line(finding.scenario or ""))
+    said = None
     for (expected, observed), names in scenarios.items():
         if several and names[0]:
             yield Row("scenario", listing(names))
-        if expected != before:
+        if expected != said:
             yield Row("expected", expected)
         yield Row("observed", observed)
-        before = expected
+        said = expected
 
 
 def advice(check: CheckPart, finding: FindingPart) -> tuple[str, ...]:
     """What to try next: the check's hint, then the author's own where a check failed."""
-    own = check.author_hint if finding.status is Status.FAILED else ""
-    return tuple(dict.fromkeys(text for text in (finding.hint, own) if text))
+    author_hint = check.author_hint if finding.status is Status.FAILED else ""
+    return tuple(dict.fromkeys(text for text in (finding.hint, author_hint) if text))
 
 
 def spot(place: SourceError) -> str:
@@ -88,8 +89,11 @@ def spot(place: SourceError) -> str:
 
 def plain(check: CheckPart, result: Result) -> str:
     """:func:`explain` as text, a line for each; several lines stand below their name."""
-    rows = [(name, "\n" if "\n" in text else " ", text) for name, text in explain(check, result)]
-    return "\n".join(f"{name}:{before}{text}" for name, before, text in rows)
+    lines = []
+    for name, text in explain(check, result):
+        separator = "\n" if "\n" in text else " "
+        lines.append(f"{name}:{separator}{text}")
+    return "\n".join(lines)
 
 
 class Notes(NamedTuple):
@@ -109,13 +113,14 @@ def notes_of_runs(result: Result) -> list[Notes]:
     """Names that were taken, limits of the sandbox, and what else is worth knowing."""
     reached = [(breach, run.id) for run in result.scenarios for breach in run.breaches]
     remarked = [(remark, run.id) for run in result.scenarios for remark in run.remarks]
-    kinds = (("Limits of the sandbox that were reached", reached), ("Worth knowing", remarked))
-    return names_taken(result) + [Notes(title, _lines(found)) for title, found in kinds if found]
+    titled = (("Limits of the sandbox that were reached", reached), ("Worth knowing", remarked))
+    return names_taken(result) + [Notes(title, _lines(notes)) for title, notes in titled if notes]
 
 
-def _lines(found: Sequence[tuple[str, str]]) -> tuple[str, ...]:
+def _lines(notes: Sequence[tuple[str, str]]) -> tuple[str, ...]:
+    """A line for each text, with all runs that it is about."""
     runs: dict[str, list[str]] = {}
-    for text, run in found:
+    for text, run in notes:
         runs.setdefault(one_line(text), []).append(one_line(run))
     lines = [
         f"scenario{'s' if len(names) > 1 else ''} {listing(names)}: {cut(text, MOST_CHARACTERS)}"
@@ -132,8 +137,8 @@ def heading(check: CheckPart) -> str:
 
 def status_words(check: CheckPart) -> StatusWords:
     """The status of a check for people."""
-    mild = check.status is Status.FAILED and not check.max_points
-    return NO_POINTS if mild else STATUS[check.status]
+    loses_nothing = check.status is Status.FAILED and not check.max_points
+    return NO_POINTS if loses_nothing else STATUS[check.status]
 
 
 def points(check: CheckPart) -> str:
@@ -147,25 +152,36 @@ def points_waiting(check: CheckPart, result: Result) -> str:
 
     What waits for several checks is counted at the first of them.
     """
-    lost = total(one.max_points for one in result.checks if check.id in one.waits_for[:1])
-    return f"{counted_points(lost)} {'waits' if lost == 1 else 'wait'} for this" if lost else ""
+    points = total(one.max_points for one in result.checks if check.id in one.waits_for[:1])
+    if not points:
+        return ""
+    return f"{counted_points(points)} {_waits(points)} for this"
+
+
+def _waits(count: float) -> str:
+    return "waits" if count == 1 else "wait"
 
 
 def waiting(result: Result, check: CheckPart) -> str:
     """How many other checks a failed one keeps from passing, or nothing."""
-    same, count = others(check.id, result.checks)
+    same, waiting = others(check.id, result.checks)
     if same:
-        return f"{counted(same + count, 'other check')} did not pass for the same reason."
-    verb = "waits" if count == 1 else "wait"
-    return f"{counted(count, 'other check')} {verb} for it." if count else ""
+        return f"{counted(same + waiting, 'other check')} did not pass for the same reason."
+    if not waiting:
+        return ""
+    return f"{counted(waiting, 'other check')} {_waits(waiting)} for it."
 
 
 def same_as(result: Result) -> dict[str, CheckPart]:
     """Failed checks that name the same mistake as one before them, by id: the first that does."""
-    first: dict[Hashable, str] = {}
-    found = {name: first.setdefault(why, name) for name, why in reasons(result.checks).items()}
     checks = {check.id: check for check in result.checks}
-    return {name: checks[other] for name, other in found.items() if name != other}
+    first_with: dict[Hashable, str] = {}
+    repeated = {}
+    for check, reason in reasons(result.checks).items():
+        first = first_with.setdefault(reason, check)
+        if first != check:
+            repeated[check] = checks[first]
+    return repeated
 
 
 def score(result: Result) -> str:
@@ -191,31 +207,8 @@ def way_on(result: Result) -> str:
 
 def headline(result: Result) -> str:
     """One sentence on the whole, and what is judged only at grading."""
-    every, withheld = len(result.checks), result.withheld
-    passed, failed, skipped, errors = (
-        len(result.of(status))
-        for status in (Status.PASSED, Status.FAILED, Status.SKIPPED, Status.ERROR)
-    )
-    full = "Full points for the checks" if result.adjustments else "Full points"
-    if not result.graded:
-        text = "Something failed in the grader or the machine; no points are lost"
-        if asks(result):
-            text = "It cannot be seen which name is meant; no points are lost"
-        left = total(check.max_points for check in result.open)
-        if left:
-            earned = number(total(check.points for check in result.checks))
-            text += f": {earned} of {number(result.max_score)} points so far, {number(left)} open"
-    elif result.score == result.max_score > 0 or passed == every:
-        text = f"{passed} of {every} visible checks passed" if withheld.checks else full
-        if failed:
-            text += f"; {counted(failed, 'check')} without points failed"
-    else:
-        text = f"{counted(failed, 'check')} failed"
-        if not failed:
-            text = f"{passed} of {counted(every, 'check')} passed"
-        elif skipped:
-            verb = "waits" if skipped == 1 else "wait"
-            text += f", {counted(skipped, 'other')} {verb} for {'it' if failed == 1 else 'them'}"
+    text = _outcome(result) if result.graded else _not_graded(result)
+    errors, withheld = len(result.of(Status.ERROR)), result.withheld
     if result.graded and errors:
         which = "" if result.settled else " without points"
         text += f"; {counted(errors, 'check')}{which} could not be judged"
@@ -226,14 +219,42 @@ def headline(result: Result) -> str:
     return f"{text}."
 
 
+def _not_graded(result: Result) -> str:
+    text = "Something failed in the grader or the machine; no points are lost"
+    if asks(result):
+        text = "It cannot be seen which name is meant; no points are lost"
+    left = total(check.max_points for check in result.open)
+    if left:
+        earned = number(total(check.points for check in result.checks))
+        text += f": {earned} of {number(result.max_score)} points so far, {number(left)} open"
+    return text
+
+
+def _outcome(result: Result) -> str:
+    """How many checks passed, or failed."""
+    every, passed = len(result.checks), len(result.of(Status.PASSED))
+    failed, skipped = len(result.of(Status.FAILED)), len(result.of(Status.SKIPPED))
+    if result.score == result.max_score > 0 or passed == every:
+        text = "Full points for the checks" if result.adjustments else "Full points"
+        if result.withheld.checks:
+            text = f"{passed} of {every} visible checks passed"
+        return f"{text}; {counted(failed, 'check')} without points failed" if failed else text
+    if not failed:
+        return f"{passed} of {counted(every, 'check')} passed"
+    text = f"{counted(failed, 'check')} failed"
+    if skipped:
+        cause = "it" if failed == 1 else "them"
+        text += f", {counted(skipped, 'other')} {_waits(skipped)} for {cause}"
+    return text
+
+
 def summary(result: Result) -> str:
     """The score with its adjustments, what failed and why, and what persons wrote.
 
     Args:
         result: As far as the student may see it.
     """
-    head = f"{one_line(result.assignment.id)}: {score(result)}"
-    lines = [head, headline(result)]
+    lines = [f"{one_line(result.assignment.id)}: {score(result)}", headline(result)]
     lines += [f"  {additions.line(one)}" for one in result.adjustments]
     blocks = ["\n".join(lines)]
     if result.submission.problem:
@@ -244,7 +265,8 @@ def summary(result: Result) -> str:
         lines += [f"  {row.name}: {row.text}" for row in rows if row.name != "printed"]
         blocks.append("\n".join(lines))
     for comment in result.comments:
-        where = additions.place(comment)
-        who = f"{one_line(comment.by)}{f' ({where})' if where else ''}"
+        who, where = one_line(comment.by), additions.place(comment)
+        if where:
+            who += f" ({where})"
         blocks.append(f"{who}:\n{clean(comment.text)}")
     return "\n\n".join(blocks) + "\n"
