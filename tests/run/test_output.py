@@ -129,6 +129,11 @@ def test_a_tracer_that_reports_what_cannot_be_kept_is_no_forger(value: object) -
     assert traced(line).declarations == ()
 
 
+def test_a_report_is_at_most_one_level_deep_whatever_stands_beside_it() -> None:
+    report = {"kind": "timer", "pid": 7, "group": {}, "other": {"deeper": {}}}
+    assert traced(json.dumps(report).encode()).declarations == ()
+
+
 def test_a_pipe_that_stays_open_does_not_hold_us_up() -> None:
     reader = OutputReader(1000)
     read_end, write_end = os.pipe()
