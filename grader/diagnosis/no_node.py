@@ -16,7 +16,7 @@ from grader.findings.finding import Evidence, Finding, nodes_seen, until_the_end
 from grader.findings.words import INIT, code, codes
 from grader.measure import declarations
 from grader.recording.interaction import EXECUTOR_SERVICES
-from grader.recording.model import Ending, Process, Recording
+from grader.recording.model import OF_ROS, Ending, Process, Recording
 from grader.spec.name import TOPIC
 from grader.spec.nearest_name import meant, nearest
 
@@ -110,7 +110,8 @@ def meant_node(recording: Recording, name: str) -> str | None:
         for call in recording.calls
         if not call.service.endswith(tuple(EXECUTOR_SERVICES))
     }
-    nodes = {node.name for node in recording.written_nodes if _NAME.fullmatch(node.name)} - asked
+    written = {node.name for node in recording.student_nodes if not OF_ROS.fullmatch(node.name)}
+    nodes = set(filter(_NAME.fullmatch, written)) - asked
     bases = {node: node.rpartition("/")[2] for node in nodes}
     meant_base = meant(name.rpartition("/")[2], bases.values())
     candidates = [node for node in nodes if bases[node] == meant_base]

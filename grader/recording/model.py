@@ -29,8 +29,8 @@ PROBE_NODE = "rosgrade_probe"
 BAG, BAG_NOTES, BAG_RECEIVED = "bag", "bag_notes", "bag_received"
 BAG_RENAMED = "bag_renamed"
 """Keys of ``Recording.environment``, where a bag was read in place of a run."""
-# Of `ros2 launch` itself, what the commands of ros2 hide, and that of a TransformListener in C++.
-_OF_ROS2 = re.compile(r"/(.*/)?(_.*|launch_ros_\d+|transform_listener_impl_[0-9a-f]+)")
+OF_ROS = re.compile(r"/(.*/)?(_.*|launch_ros_\d+|transform_listener_impl_[0-9a-f]+)")
+"""Nodes of `ros2 launch` itself, what commands of ros2 hide, and a TransformListener's in C++."""
 
 
 class Owner(str, Enum):
@@ -423,7 +423,7 @@ class Recording:
     def written_nodes(self) -> tuple[Node, ...]:
         """The student's nodes but those that ROS makes by itself; all if there are no others."""
         there = self.student_nodes
-        return tuple(node for node in there if not _OF_ROS2.fullmatch(node.name)) or there
+        return tuple(node for node in there if not OF_ROS.fullmatch(node.name)) or there
 
     def student_endpoints(self, kind: Kind, topic: str | None = None) -> tuple[Endpoint, ...]:
         """The student's endpoints of a kind, on one topic or on all."""

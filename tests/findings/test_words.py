@@ -90,7 +90,11 @@ def _texts(statement: ast.stmt) -> Iterator[str]:
             hidden |= {id(part) for part in node.values}
         if isinstance(node, ast.Call) and ast.unparse(node.func) in ("Field", "re.compile"):
             hidden |= {id(part) for part in ast.walk(node)}
-        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("Words", "worded", "EntityKind"):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in (
+            "Words",
+            "worded",
+            "EntityKind",
+        ):
             named = [one.value for one in node.keywords if one.arg == "python"]
             hidden |= {id(part) for part in ast.walk([*named, *node.args][0])}
     for node in ast.walk(statement):
