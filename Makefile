@@ -16,7 +16,7 @@ demo: setup ## grade the reference solution, then a broken one
 	@$(run) -m grader.dev.demo
 
 test: lint ## lint, type-check and run every test
-	@$(run) -m pytest -q -rs --durations=10 -n 4 --no-loadscope-reorder
+	@$(run) -m pytest -q -rs --durations=10 -n 4 --dist loadfile --no-loadscope-reorder
 
 lint: setup ## check style, types, imports between folders and dead code; print the house
 	@.venv/bin/ruff check --quiet

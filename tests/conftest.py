@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from xdist.scheduler import LoadFileScheduling
 
 from grader.errors import GraderFault
 from grader.submission.build.toolchain import check_toolchain, has_headers, headers_package
@@ -41,19 +40,6 @@ def pytest_collection_finish() -> None:
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A cache folder of rosgrade's: the Python of the sandbox in it is made once."""
     return tmp_path_factory.mktemp("cache")
-
-
-class Scheduling(LoadFileScheduling):
-    """One worker runs a file, for its fixtures; of the selftests each takes what is next."""
-
-    def _split_scope(self, nodeid: str) -> str:
-        apart = "/test_selftest.py::test_the_mutation_score_is_perfect" in nodeid
-        return nodeid if apart else super()._split_scope(nodeid)
-
-
-def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> Scheduling:
-    """Share the tests out."""
-    return Scheduling(config, log)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
