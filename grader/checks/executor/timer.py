@@ -87,7 +87,7 @@ def _has_timer(recording: Recording, topic: str, declared: DeclaredTimer) -> Fin
 
 
 def _why_no_callback_publishes(recording: Recording, topic: str) -> Finding | None:
-    """Why no callback publishes, or why nobody can tell; None where a callback does."""
+    """Why a callback does not publish, or why that is not known; None where one does."""
     pause = paused(recording, topic)
     if pause is not None and pause.uncalled_ns:
         return _published_in_pause(recording, pause)

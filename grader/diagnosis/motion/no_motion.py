@@ -84,7 +84,7 @@ def approach(recording: Recording, goal: Goal) -> Approach | Finding:
     not_judged = why_not_judged(recording)
     if not_judged is not None:
         return not_judged
-    # That nobody knows the goal is our fault: it is said before what the student did wrong.
+    # A goal that the recording does not have is our fault, so it comes before the student's faults.
     try:
         pose = goal.pose(recording.values)
     except UnknownValue as error:

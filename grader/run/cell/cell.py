@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import select
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -17,6 +16,7 @@ from grader.run.cell.companions import Companions
 from grader.run.cell.domain import joined_domains
 from grader.run.cell.ending import EndingConditions, ExitBarrier
 from grader.run.cell.graph import GraphObserver
+from grader.run.cell.prefork_protocol import readable
 from grader.run.cell.probe import Probe
 from grader.run.cell.progress_events import LineTeller, tell
 from grader.run.cell.simulated import Simulated, simulated_by_us
@@ -497,6 +497,5 @@ class Cell:
 
 def _raise_if_abandoned() -> None:
     """Raise if standard input has ended, as it does with the runner that ordered the run."""
-    readable, _, _ = select.select([0], [], [], 0)
-    if readable and not os.read(0, 1):
+    if readable((0,), limit_s=0.0) and not os.read(0, 1):
         raise Abandoned
