@@ -7,13 +7,22 @@ that the tests stay short. `rosgrade selftest` grades them all.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
 
 from grader.assignment.load import list_assignments, load_assignment
 from grader.assignment.reference import reference_of
-from grader.authoring.mutants.selftest import Role, Setup, Trial, mutation_score, selftest, trials
+from grader.authoring.mutants.selftest import (
+    Role,
+    Setup,
+    Trial,
+    TrialResult,
+    mutation_score,
+    selftest,
+    trials,
+)
 from grader.grading.grading import Grading
 from grader.grading.type_support import missing_underlays
 from grader.machine import resources, ros
@@ -42,24 +51,26 @@ NAMES = [
 ]
 
 
+AT_ONCE = 3
+"""Assignments: a robot that drives leaves the machine to others for most of the time."""
+
+
 @pytest.fixture(scope="module")
-def runner() -> Iterator[Runner]:
-    """Runs the trials of all assignments: what it prepares is made once."""
-    with Runner(ros.find()) as made:
-        yield made
+def graded(request: pytest.FixtureRequest) -> Iterator[Mapping[str, Future[list[TrialResult]]]]:
+    """What the trials of each assignment that is asked for will yield.
+
+    One runner makes them all: what it prepares is made once.
+    """
+    tests = [item for item in request.session.items if item.path == request.path]
+    names = [test.callspec.params["name"] for test in tests if isinstance(test, pytest.Function)]
+    with Runner(ros.find()) as runner, ThreadPoolExecutor(AT_ONCE) as pool:
+        yield {name: pool.submit(grade_some, name, runner) for name in names}
 
 
-def middle(some: Sequence[Trial]) -> Trial:
-    return some[len(some) // 2]
-
-
-@pytest.mark.ros
-@pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
-def test_the_mutation_score_is_perfect(name: str, runner: Runner) -> None:
+def grade_some(name: str, runner: Runner) -> list[TrialResult]:
     loaded = load_assignment(EXAMPLES.get(name, name))
-    for missing in missing_underlays(loaded):
-        pytest.skip(missing)
+    if missing_underlays(loaded):
+        return []
     every = trials(loaded)
     mutants = [trial for trial in every if trial.role is Role.MUTANT]
     assert len(mutants) >= LEAST_MUTANTS
@@ -69,7 +80,22 @@ def test_the_mutation_score_is_perfect(name: str, runner: Runner) -> None:
     kept = (every[0], middle(imposed or mutants), *starter)
     grading = Grading(loaded, runner, resources.cache_folder())
     setup = Setup(loaded, grading, reference_of(loaded.assignment.id, loaded.folder))
-    results = list(selftest(setup, kept, jobs=cpu_count()))
+    return list(selftest(setup, kept, jobs=cpu_count()))
+
+
+def middle(some: Sequence[Trial]) -> Trial:
+    return some[len(some) // 2]
+
+
+@pytest.mark.ros
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_the_mutation_score_is_perfect(
+    name: str, graded: Mapping[str, Future[list[TrialResult]]]
+) -> None:
+    for missing in missing_underlays(load_assignment(EXAMPLES.get(name, name))):
+        pytest.skip(missing)
+    results = graded[name].result()
     wrong = {
         result.trial.id: (result.mistake, *result.findings) for result in results if result.wrong
     }
