@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import rclpy
 from pydantic import TypeAdapter, ValidationError
@@ -30,9 +30,6 @@ from sim.simulation import Simulation
 from sim.turtles.screen import TurtleScreen
 from sim.turtles.simulation import Turtles
 from sim.world import World, read_world
-
-if TYPE_CHECKING:
-    pass
 
 _REFRESH_NS = NS // 10
 _LINE_NS = NS
