@@ -51,7 +51,7 @@ NAMES = [
 ]
 
 
-AT_ONCE = 3
+AT_ONCE = 2
 """Assignments: a robot that drives leaves the machine to others for most of the time."""
 
 
