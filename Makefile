@@ -15,8 +15,9 @@ setup: ## make .venv with everything in it; does nothing when it is up to date
 demo: setup ## grade the reference solution, then a broken one
 	@$(run) -m grader.dev.demo
 
+# With more than three, runs that the others disturb are made again, and all takes longer.
 test: lint ## lint, type-check and run every test
-	@$(run) -m pytest -q -rs --durations=10 -n 4 --dist loadfile --no-loadscope-reorder
+	@$(run) -m pytest -q -rs --durations=10 -n 3 --dist loadfile --no-loadscope-reorder
 
 lint: setup ## check style, types, imports between folders and dead code; print the house
 	@.venv/bin/ruff check --quiet
