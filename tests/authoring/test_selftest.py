@@ -63,8 +63,11 @@ def graded(request: pytest.FixtureRequest) -> Iterator[Mapping[str, Future[list[
     """
     tests = [item for item in request.session.items if item.path == request.path]
     names = [test.callspec.params["name"] for test in tests if isinstance(test, pytest.Function)]
-    with Runner(ros.find()) as runner, ThreadPoolExecutor(AT_ONCE) as pool:
+    with Runner(ros.find()) as runner:
+        pool = ThreadPoolExecutor(AT_ONCE)
         yield {name: pool.submit(grade_some, name, runner) for name in names}
+        # After Ctrl-C there are some left.
+        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def grade_some(name: str, runner: Runner) -> list[TrialResult]:
