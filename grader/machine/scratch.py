@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import os
 import tempfile
@@ -52,6 +53,10 @@ class Scratch:
             self._folder.cleanup()
         except RecursionError:
             remove_tree(self.path)
+        except OSError as error:
+            # After Ctrl-C what still ends may write into it; then the next process removes it.
+            if error.errno != errno.ENOTEMPTY:
+                raise
         finally:
             if self._lock is not None:
                 os.close(self._lock)

@@ -39,6 +39,27 @@ def test_it_is_gone_after_its_block(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert list(tmp_path.iterdir()) == []
 
 
+def test_what_is_still_written_while_it_is_removed_is_no_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    remove_folder = os.rmdir
+
+    def late(path: str, *, dir_fd: int | None = None) -> None:
+        folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY, dir_fd=dir_fd)
+        os.close(os.open("late", os.O_CREAT, dir_fd=folder))
+        os.close(folder)
+        remove_folder(path, dir_fd=dir_fd)
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with Scratch("test") as path:
+        (path / "cell").mkdir()
+        monkeypatch.setattr(os, "rmdir", late)
+    monkeypatch.undo()
+    assert (path / "cell" / "late").exists()
+    remove_stale(tmp_path, age_s=0.0)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_where_no_temporary_file_can_be_written_one_sentence_says_what_to_do(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
