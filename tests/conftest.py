@@ -43,15 +43,10 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mix files that wait with those that compute; skip what compiles where nothing can."""
-    files = dict.fromkeys(item.path for item in items)
-    waiting = {item.path for item in items if item.get_closest_marker("ros")}
-    computing = [file for file in files if file not in waiting]
-    place = {file: number / len(computing) for number, file in enumerate(computing)}
-    # They also take longer, and short ones at the end keep every worker busy until then.
-    ros = [file for file in files if file in waiting]
-    place |= {file: 0.8 * number / len(ros) for number, file in enumerate(ros)}
-    items.sort(key=lambda item: place[item.path])
+    """Put long files first; skip what compiles where nothing can, and say why."""
+    # Short ones at the end keep every worker busy until then.
+    long = {item.path for item in items if any(map(item.get_closest_marker, ("ros", "slow")))}
+    items.sort(key=lambda item: item.path not in long)
     try:
         check_toolchain(os.environ["PATH"])
         if not has_headers():

@@ -52,14 +52,14 @@ NAMES = [
 
 
 AT_ONCE = 2
-"""Assignments: a robot that drives leaves the machine to others for most of the time."""
+"""Assignments. While a robot drives, the machine has time for another one."""
 
 
 @pytest.fixture(scope="module")
 def graded(request: pytest.FixtureRequest) -> Iterator[Mapping[str, Future[list[TrialResult]]]]:
-    """What the trials of each assignment that is asked for will yield.
+    """The results of each assignment's trials, once they are there.
 
-    One runner makes them all: what it prepares is made once.
+    One runner makes the runs of all: what it prepares is made once.
     """
     tests = [item for item in request.session.items if item.path == request.path]
     names = [test.callspec.params["name"] for test in tests if isinstance(test, pytest.Function)]
@@ -72,8 +72,8 @@ def graded(request: pytest.FixtureRequest) -> Iterator[Mapping[str, Future[list[
 
 def grade_some(name: str, runner: Runner) -> list[TrialResult]:
     loaded = load_assignment(EXAMPLES.get(name, name))
-    if missing_underlays(loaded):
-        return []
+    for missing in missing_underlays(loaded):
+        pytest.skip(missing)
     every = trials(loaded)
     mutants = [trial for trial in every if trial.role is Role.MUTANT]
     assert len(mutants) >= LEAST_MUTANTS
@@ -96,8 +96,6 @@ def middle(some: Sequence[Trial]) -> Trial:
 def test_the_mutation_score_is_perfect(
     name: str, graded: Mapping[str, Future[list[TrialResult]]]
 ) -> None:
-    for missing in missing_underlays(load_assignment(EXAMPLES.get(name, name))):
-        pytest.skip(missing)
     results = graded[name].result()
     wrong = {
         result.trial.id: (result.mistake, *result.findings) for result in results if result.wrong
