@@ -467,7 +467,8 @@ def test_a_cell_that_is_stopped_is_a_fault_of_the_machine_within_bounds(
     with pytest.raises(GraderFault, match="killed, or stopped by a signal such as SIGSTOP"):
         run_node(nodes.timed(), progress, until={"elapsed": "300 s"}, timeout="300 s")
     assert time.monotonic() - began_s < 120.0
-    assert run_node(nodes.timed()).ending is Ending.UNTIL
+    second = run_node(nodes.timed())
+    assert second.ending is Ending.UNTIL, second.faults
 
 
 def test_a_launch_with_after_starts_later_and_the_run_waits_for_it(run_node: RunNode) -> None:
